@@ -1,0 +1,27 @@
+//! Stick-slip friction of a slider held by breakable contacts: parameter sweeps of the model of Capozza et al.,
+//! "Stabilizing stick-slip friction", PRL 107, 024301 (2011).
+//!
+//! ```text
+//! sweep file -> plan -> jobs -> kernel -> events -> tables -> reduced data -> figures
+//!               sweep/    run/    solver/   observe/  store/     reduce/         figure/
+//!                                 model/
+//! ```
+//!
+//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `store` <- `run`; `store` <- `reduce` <- `figure`.
+//! Only the binary's `cli` prints.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | parameters | all that defines one realisation of the model, seed included ([`model::Parameters`]) |
+//! | contact event | a contact breaks or attaches ([`model::ContactEvent`]) |
+//! | segment | a stretch of time without a contact event ([`solver::Segment`]) |
+//! | rupture | a run of breaks without a gap longer than the wave crossing time |
+//! | slip, precursor | a rupture of all blocks; any other of at least one block's worth of breaks ([`observe::Slip`]) |
+//! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
+//! | job | one point of a sweep: canonical parameters and what is recorded, known by a hash of both |
+//! | part | consecutive jobs of the plan, committed together |
+//! | set | all jobs that differ in the seed alone |
+
+pub mod model;
+pub mod observe;
+pub mod solver;

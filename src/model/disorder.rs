@@ -1,0 +1,254 @@
+//! Keyed disorder: threshold, stiffness and delay of every contact, as a function of (seed, contact, generation) alone.
+//!
+//! Method: `ChaCha8`; the key is the seed, the stream is the contact's index, the word position is [`WORDS_PER_DRAW`] ×
+//! generation. A threshold that is not positive is drawn again [`REDRAW_STRIDE`] words further on, so that no draw
+//! depends on another. Normal deviates come from the inverse of the normal distribution (M. J. Wichura, algorithm AS
+//! 241, Appl. Statist. 37, 477, 1988), exponential ones from a logarithm, with `libm`'s functions: the same bits on every
+//! machine. Contract: the mapping is pinned by known-answer tests; changing it changes [`RNG_SCHEME`].
+
+use super::Parameters;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Name and version of the mapping from (seed, contact, generation) to a contact; written into every result.
+pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
+
+/// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
+const WORDS_PER_DRAW: u128 = 4;
+/// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
+const DRAWS_PER_REFILL: u32 = 16;
+/// Distance of the words of a redrawn threshold: beyond those of any generation.
+const REDRAW_STRIDE: u128 = 1 << 40;
+/// Uniform deviates lie in (0, 1): 53 random bits, shifted by half a step.
+const UNIFORM_STEP: f64 = 1.0 / 9_007_199_254_740_992.0;
+
+/// One life of a contact, as drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Threshold `f_i`, in N.
+    pub threshold: f64,
+    /// Stiffness `k_i = k sqrt(f_i/f_s)`, in N/m.
+    pub stiffness: f64,
+    /// Reach `f_i/k_i`, in m: the elongation at which it breaks.
+    pub reach: f64,
+    /// Delay `t_r` between the breaking of the previous life and the start of this one, in s. Not used by generation 0.
+    pub delay: f64,
+}
+
+/// The source of all contacts of one job.
+#[derive(Clone, Debug)]
+pub struct Disorder {
+    generator: ChaCha8Rng,
+    mean_threshold: f64,
+    threshold_deviation: f64,
+    mean_stiffness: f64,
+    reattachment_time: f64,
+    /// The words of [`DRAWS_PER_REFILL`] generations for each contact, and the first of these generations.
+    buffered: Vec<[u64; 2 * DRAWS_PER_REFILL as usize]>,
+    buffered_from: Vec<u32>,
+}
+
+impl Disorder {
+    /// The disorder of a set of parameters.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Self {
+        let contacts = parameters.blocks * parameters.contacts_per_block;
+        Self {
+            generator: ChaCha8Rng::seed_from_u64(parameters.seed),
+            mean_threshold: parameters.mean_threshold,
+            threshold_deviation: parameters.threshold_deviation,
+            mean_stiffness: parameters.contact_stiffness,
+            reattachment_time: parameters.reattachment_time,
+            buffered: vec![[0; 2 * DRAWS_PER_REFILL as usize]; contacts],
+            buffered_from: vec![u32::MAX; contacts],
+        }
+    }
+
+    /// The given life of a contact; `contact` counts through all blocks, `block · N_s + i`.
+    pub fn draw(&mut self, contact: usize, generation: u32) -> Contact {
+        let first = generation - generation % DRAWS_PER_REFILL;
+        if self.buffered_from[contact] != first {
+            self.seek(contact, first, 0);
+            for word in &mut self.buffered[contact] {
+                *word = self.generator.next_u64();
+            }
+            self.buffered_from[contact] = first;
+        }
+        let slot = 2 * (generation - first) as usize;
+        let [for_threshold, for_delay] = [self.buffered[contact][slot], self.buffered[contact][slot + 1]];
+        let threshold = self.threshold(contact, generation, for_threshold);
+        Contact {
+            threshold,
+            stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
+            reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
+            delay: -self.reattachment_time * libm::log(uniform(for_delay)),
+        }
+    }
+
+    fn threshold(&mut self, contact: usize, generation: u32, word: u64) -> f64 {
+        if self.threshold_deviation == 0.0 {
+            return self.mean_threshold;
+        }
+        let mut threshold = self.threshold_from(word);
+        let mut redraw = 0;
+        while threshold <= 0.0 {
+            redraw += 1;
+            self.seek(contact, generation, redraw);
+            let word = self.generator.next_u64();
+            threshold = self.threshold_from(word);
+        }
+        threshold
+    }
+
+    fn threshold_from(&self, word: u64) -> f64 {
+        self.mean_threshold + self.threshold_deviation * standard_normal_quantile(uniform(word))
+    }
+
+    fn seek(&mut self, contact: usize, generation: u32, redraw: u128) {
+        self.generator.set_stream(contact as u64);
+        self.generator.set_word_pos(u128::from(generation) * WORDS_PER_DRAW + redraw * REDRAW_STRIDE);
+    }
+}
+
+/// A uniform deviate in (0, 1) from 64 random bits, never 0 and never 1.
+#[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
+fn uniform(word: u64) -> f64 {
+    ((word >> 11) as f64 + 0.5) * UNIFORM_STEP
+}
+
+/// Quantile of the standard normal distribution, to about 1e-16 (AS 241, PPND16).
+#[expect(clippy::excessive_precision, reason = "coefficients as published")]
+fn standard_normal_quantile(probability: f64) -> f64 {
+    const CENTRAL_NUMERATOR: [f64; 8] = [
+        3.387_132_872_796_366_608_0,
+        1.331_416_678_917_843_774_5e2,
+        1.971_590_950_306_551_442_7e3,
+        1.373_169_376_550_946_112_5e4,
+        4.592_195_393_154_987_145_7e4,
+        6.726_577_092_700_870_085_3e4,
+        3.343_057_558_358_812_810_5e4,
+        2.509_080_928_730_122_672_7e3,
+    ];
+    const CENTRAL_DENOMINATOR: [f64; 8] = [
+        1.0,
+        4.231_333_070_160_091_125_2e1,
+        6.871_870_074_920_579_083_0e2,
+        5.394_196_021_424_751_107_7e3,
+        2.121_379_430_158_659_586_7e4,
+        3.930_789_580_009_271_061_0e4,
+        2.872_908_573_572_194_267_4e4,
+        5.226_495_278_852_854_561_0e3,
+    ];
+    const MIDDLE_NUMERATOR: [f64; 8] = [
+        1.423_437_110_749_683_577_34,
+        4.630_337_846_156_545_295_90,
+        5.769_497_221_460_691_405_50,
+        3.647_848_324_763_204_605_04,
+        1.270_458_252_452_368_382_58,
+        2.417_807_251_774_506_117_70e-1,
+        2.272_384_498_926_918_458_33e-2,
+        7.745_450_142_783_414_076_40e-4,
+    ];
+    const MIDDLE_DENOMINATOR: [f64; 8] = [
+        1.0,
+        2.053_191_626_637_758_821_87,
+        1.676_384_830_183_803_849_40,
+        6.897_673_349_851_000_045_50e-1,
+        1.481_039_764_274_800_745_90e-1,
+        1.519_866_656_361_645_719_66e-2,
+        5.475_938_084_995_344_946_00e-4,
+        1.050_750_071_644_416_843_24e-9,
+    ];
+    const TAIL_NUMERATOR: [f64; 8] = [
+        6.657_904_643_501_103_777_20,
+        5.463_784_911_164_114_369_90,
+        1.784_826_539_917_291_335_80,
+        2.965_605_718_285_048_912_30e-1,
+        2.653_218_952_657_612_309_30e-2,
+        1.242_660_947_388_078_438_60e-3,
+        2.711_555_568_743_487_578_15e-5,
+        2.010_334_399_292_288_132_65e-7,
+    ];
+    const TAIL_DENOMINATOR: [f64; 8] = [
+        1.0,
+        5.998_322_065_558_879_376_90e-1,
+        1.369_298_809_227_358_053_10e-1,
+        1.487_536_129_085_061_485_25e-2,
+        7.868_691_311_456_132_591_00e-4,
+        1.846_318_317_510_054_681_80e-5,
+        1.421_511_758_316_445_888_70e-7,
+        2.044_263_103_389_939_785_64e-15,
+    ];
+    let horner = |coefficients: &[f64; 8], x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
+    let ratio = |numerator: &[f64; 8], denominator: &[f64; 8], x: f64| horner(numerator, x) / horner(denominator, x);
+
+    let offset = probability - 0.5;
+    if offset.abs() <= 0.425 {
+        return offset * ratio(&CENTRAL_NUMERATOR, &CENTRAL_DENOMINATOR, 0.180_625 - offset * offset);
+    }
+    let tail = if offset < 0.0 { probability } else { 1.0 - probability };
+    let depth = (-libm::log(tail)).sqrt();
+    let magnitude = if depth <= 5.0 {
+        ratio(&MIDDLE_NUMERATOR, &MIDDLE_DENOMINATOR, depth - 1.6)
+    } else {
+        ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth - 5.0)
+    };
+    magnitude.copysign(offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_the_normal_distribution_are_those_of_its_tables() {
+        for (probability, quantile) in [
+            (0.5, 0.0),
+            (0.25, -0.674_489_750_196_081_7),
+            (0.001, -3.090_232_306_167_813_5),
+            (1e-20, -9.262_340_089_798_408),
+            (0.975, 1.959_963_984_540_054),
+        ] {
+            let difference: f64 = standard_normal_quantile(probability) - quantile;
+            assert!(difference.abs() <= 4e-15 * (1.0 + quantile.abs()), "{probability}: off by {difference}");
+        }
+    }
+
+    #[test]
+    fn a_draw_does_not_depend_on_the_order_of_draws() {
+        let parameters = Parameters { threshold_deviation: 0.4, seed: 3, ..Parameters::default() };
+        let mut forward = Disorder::new(&parameters);
+        let mut backward = Disorder::new(&parameters);
+        let keys: Vec<(usize, u32)> = (0..60).map(|i| (i * 7 % 1400, (i * 13 % 50) as u32)).collect();
+        let first: Vec<Contact> = keys.iter().map(|&(c, g)| forward.draw(c, g)).collect();
+        let mut second: Vec<Contact> = keys.iter().rev().map(|&(c, g)| backward.draw(c, g)).collect();
+        second.reverse();
+        assert_eq!(first, second);
+    }
+
+    #[test]
+    fn moments_are_those_of_the_model() {
+        let parameters = Parameters { threshold_deviation: 0.1, ..Parameters::default() };
+        let mut disorder = Disorder::new(&parameters);
+        let draws: Vec<Contact> =
+            (0..1400).flat_map(|c| (0..100).map(move |g| (c, g))).map(|(c, g)| disorder.draw(c, g)).collect();
+        let count = draws.len() as f64;
+        let mean = |of: &dyn Fn(&Contact) -> f64| draws.iter().map(of).sum::<f64>() / count;
+        let threshold = mean(&|c| c.threshold);
+        let deviation = mean(&|c| (c.threshold - threshold).powi(2)).sqrt();
+        // Four standard errors of each estimate.
+        assert!((threshold - 1.37).abs() < 4.0 * 0.1 / count.sqrt());
+        assert!((deviation - 0.1).abs() < 4.0 * 0.1 / (2.0 * count).sqrt());
+        assert!((mean(&|c| c.delay) - 0.005).abs() < 4.0 * 0.005 / count.sqrt());
+        let contact = draws[17];
+        assert!((contact.stiffness * contact.reach - contact.threshold).abs() < 1e-15 * 4.0);
+    }
+
+    #[test]
+    fn thresholds_that_are_not_positive_are_drawn_again() {
+        let parameters = Parameters { threshold_deviation: 1.37, ..Parameters::default() };
+        let mut disorder = Disorder::new(&parameters);
+        let least = (0..1400).map(|c| disorder.draw(c, 0).threshold).fold(f64::INFINITY, f64::min);
+        assert!(least > 0.0);
+    }
+}

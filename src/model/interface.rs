@@ -1,0 +1,262 @@
+//! The interface: the contacts between the blocks and the substrate, and what each block feels of them.
+//!
+//! A block's contacts act together: force on block j = (Σ k_i a_i) - (Σ k_i) x_j over its attached contacts, so a step
+//! costs O(N). Single contacts are looked at only when the block reaches its nearest break position or a reattachment
+//! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
+
+use super::{BreakOn, Disorder, Parameters};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// What happened to a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// It attached, unstressed.
+    Attach,
+    /// It broke.
+    Break,
+}
+
+/// One event of one contact, as observers see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactEvent {
+    /// Time, in s.
+    pub time: f64,
+    /// Block, counted from 0 at the trailing edge.
+    pub block: usize,
+    /// Contact within its block, counted from 0.
+    pub contact: usize,
+    /// Life of the contact: 0 is the initial attachment.
+    pub generation: u32,
+    /// Attached or broke.
+    pub change: Change,
+    /// Displacement of the block, in m.
+    pub displacement: f64,
+    /// Force of the contact at this instant, in N; positive when it pulls the block back.
+    pub force: f64,
+    /// Threshold `f_i` of this life, in N.
+    pub threshold: f64,
+    /// Stiffness `k_i` of this life, in N/m.
+    pub stiffness: f64,
+}
+
+/// A reattachment that is due. Ordered so that the heap yields the earliest, ties by contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Due {
+    time: f64,
+    contact: usize,
+}
+
+impl Eq for Due {}
+
+impl Ord for Due {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.time.total_cmp(&self.time).then(other.contact.cmp(&self.contact))
+    }
+}
+
+impl PartialOrd for Due {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// Width in which sums over the contacts of a block are taken: fixed, so that their rounding does not depend on the
+/// processor.
+const LANES: usize = 8;
+
+/// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::shift`].
+#[derive(Clone, Debug)]
+pub struct Interface {
+    contacts_per_block: usize,
+    /// Contacts per block in memory: `contacts_per_block` rounded up to whole lanes; the rest stay detached for ever.
+    stride: usize,
+    break_on: BreakOn,
+    disorder: Disorder,
+    threshold: Vec<f64>,
+    anchor: Vec<f64>,
+    generation: Vec<u32>,
+    /// Stiffness of each contact while attached, else 0.
+    attached_stiffness: Vec<f64>,
+    /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
+    upper: Vec<f64>,
+    lower: Vec<f64>,
+    reattachments: BinaryHeap<Due>,
+    /// Per block: Σ k_i of the attached contacts, in N/m.
+    pub block_stiffness: Vec<f64>,
+    /// Per block: Σ k_i a_i of the attached contacts, in N.
+    pub block_pull: Vec<f64>,
+    /// Per block: the nearest position above at which a contact breaks, in m.
+    pub block_upper: Vec<f64>,
+    /// Per block: the nearest position below at which a contact breaks, in m.
+    pub block_lower: Vec<f64>,
+}
+
+impl Interface {
+    /// All contacts attached and unstressed at displacement 0, each in generation 0.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Self {
+        let blocks = parameters.blocks;
+        let stride = parameters.contacts_per_block.next_multiple_of(LANES);
+        let slots = blocks * stride;
+        let mut interface = Self {
+            contacts_per_block: parameters.contacts_per_block,
+            stride,
+            break_on: parameters.break_on,
+            disorder: Disorder::new(parameters),
+            threshold: vec![0.0; slots],
+            anchor: vec![0.0; slots],
+            generation: vec![0; slots],
+            attached_stiffness: vec![0.0; slots],
+            upper: vec![f64::INFINITY; slots],
+            lower: vec![f64::NEG_INFINITY; slots],
+            reattachments: BinaryHeap::new(),
+            block_stiffness: vec![0.0; blocks],
+            block_pull: vec![0.0; blocks],
+            block_upper: vec![0.0; blocks],
+            block_lower: vec![0.0; blocks],
+        };
+        for block in 0..blocks {
+            for contact in 0..parameters.contacts_per_block {
+                interface.attach(block, contact, 0, 0.0);
+            }
+            interface.gather(block);
+        }
+        interface
+    }
+
+    /// The initial attachment of every contact as events at time 0, in order.
+    pub fn initial_attachments(&self) -> impl Iterator<Item = ContactEvent> {
+        (0..self.block_stiffness.len())
+            .flat_map(move |block| (0..self.contacts_per_block).map(move |contact| (block, contact)))
+            .map(|(block, contact)| self.event(block, contact, 0.0, 0.0, Change::Attach))
+    }
+
+    /// Time of the next reattachment, in s; infinite when no contact is detached.
+    #[must_use]
+    pub fn next_reattachment(&self) -> f64 {
+        self.reattachments.peek().map_or(f64::INFINITY, |due| due.time)
+    }
+
+    /// Block of the next reattachment, if any contact is detached.
+    #[must_use]
+    pub fn next_reattachment_block(&self) -> Option<usize> {
+        self.reattachments.peek().map(|due| due.contact / self.contacts_per_block)
+    }
+
+    /// Attaches the contact that is due next, unstressed where its block is at that moment.
+    ///
+    /// # Panics
+    /// When nothing is due: a mistake of the solver.
+    pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
+        let due = self.reattachments.pop().expect("a reattachment is due");
+        let (block, contact) = (due.contact / self.contacts_per_block, due.contact % self.contacts_per_block);
+        let generation = self.generation[block * self.stride + contact] + 1;
+        self.attach(block, contact, generation, displacement);
+        self.gather(block);
+        self.event(block, contact, due.time, displacement, Change::Attach)
+    }
+
+    /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
+    /// tells each to `log`.
+    pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
+        let slots = block * self.stride..block * self.stride + self.contacts_per_block;
+        for (contact, slot) in slots.enumerate() {
+            if self.upper[slot] <= displacement || self.lower[slot] >= displacement {
+                log(self.event(block, contact, time, displacement, Change::Break));
+                self.detach(block, contact, time);
+            }
+        }
+        self.gather(block);
+    }
+
+    /// Moves the frame: subtracts `shift` m from every position.
+    pub fn shift(&mut self, shift: f64) {
+        for positions in [&mut self.anchor, &mut self.upper, &mut self.lower] {
+            positions.iter_mut().for_each(|position| *position -= shift);
+        }
+        for block in 0..self.block_stiffness.len() {
+            self.gather(block);
+        }
+    }
+
+    /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
+    pub fn shift_time(&mut self, shift: f64) {
+        let mut due = std::mem::take(&mut self.reattachments).into_vec();
+        due.iter_mut().for_each(|due| due.time -= shift);
+        self.reattachments = due.into();
+    }
+
+    /// Elastic energy in the attached contacts for given displacements in m, in J.
+    #[must_use]
+    pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
+        (0..displacements.len() * self.stride)
+            .map(|slot| {
+                let elongation = displacements[slot / self.stride] - self.anchor[slot];
+                0.5 * self.attached_stiffness[slot] * elongation * elongation
+            })
+            .sum()
+    }
+
+    fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
+        let slot = block * self.stride + contact;
+        let stiffness = self.attached_stiffness[slot];
+        ContactEvent {
+            time,
+            block,
+            contact,
+            generation: self.generation[slot],
+            change,
+            displacement,
+            force: stiffness * (displacement - self.anchor[slot]),
+            threshold: self.threshold[slot],
+            stiffness,
+        }
+    }
+
+    fn attach(&mut self, block: usize, contact: usize, generation: u32, displacement: f64) {
+        let slot = block * self.stride + contact;
+        let drawn = self.disorder.draw(block * self.contacts_per_block + contact, generation);
+        self.threshold[slot] = drawn.threshold;
+        self.generation[slot] = generation;
+        self.attached_stiffness[slot] = drawn.stiffness;
+        self.anchor[slot] = displacement;
+        self.upper[slot] = displacement + drawn.reach;
+        self.lower[slot] = match self.break_on {
+            BreakOn::Magnitude => displacement - drawn.reach,
+            BreakOn::Tension => f64::NEG_INFINITY,
+        };
+    }
+
+    fn detach(&mut self, block: usize, contact: usize, time: f64) {
+        let slot = block * self.stride + contact;
+        let index = block * self.contacts_per_block + contact;
+        self.attached_stiffness[slot] = 0.0;
+        self.upper[slot] = f64::INFINITY;
+        self.lower[slot] = f64::NEG_INFINITY;
+        let delay = self.disorder.draw(index, self.generation[slot] + 1).delay;
+        self.reattachments.push(Due { time: time + delay, contact: index });
+    }
+
+    /// Takes the sums and nearest break positions of a block anew, in fixed lanes.
+    fn gather(&mut self, block: usize) {
+        let slots = block * self.stride..(block + 1) * self.stride;
+        let mut stiffness = [0.0; LANES];
+        let mut pull = [0.0; LANES];
+        let mut upper = [f64::INFINITY; LANES];
+        let mut lower = [f64::NEG_INFINITY; LANES];
+        for first in slots.step_by(LANES) {
+            for lane in 0..LANES {
+                let slot = first + lane;
+                stiffness[lane] += self.attached_stiffness[slot];
+                pull[lane] += self.attached_stiffness[slot] * self.anchor[slot];
+                upper[lane] = if self.upper[slot] < upper[lane] { self.upper[slot] } else { upper[lane] };
+                lower[lane] = if self.lower[slot] > lower[lane] { self.lower[slot] } else { lower[lane] };
+            }
+        }
+        self.block_stiffness[block] = stiffness.iter().sum();
+        self.block_pull[block] = pull.iter().sum();
+        self.block_upper[block] = upper.into_iter().fold(f64::INFINITY, f64::min);
+        self.block_lower[block] = lower.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    }
+}

@@ -1,0 +1,91 @@
+//! The slider as an elastic chain: its stiffness matrix S, frequencies and limits of stability.
+//!
+//! S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block, and the driving spring
+//! at block 1. All blocks have the same mass m, so the squared angular frequencies are the eigenvalues of S/m.
+
+use super::Parameters;
+
+/// The tridiagonal stiffness matrix of the slider for given contact stiffnesses.
+#[derive(Clone, Debug)]
+pub struct StiffnessMatrix {
+    /// Diagonal, one entry a block, in N/m.
+    pub diagonal: Vec<f64>,
+    /// Off-diagonal entry -`K_int`, the same everywhere, in N/m.
+    pub coupling: f64,
+}
+
+impl StiffnessMatrix {
+    /// The matrix for `contacts[j]` N/m of attached contacts at block j, with the driving spring.
+    #[must_use]
+    pub fn new(parameters: &Parameters, contacts: &[f64]) -> Self {
+        let coupling = parameters.coupling_stiffness();
+        let last = contacts.len() - 1;
+        let mut diagonal: Vec<f64> = contacts
+            .iter()
+            .enumerate()
+            .map(|(j, contact)| {
+                let neighbours = usize::from(j > 0) + usize::from(j < last);
+                contact + neighbours as f64 * coupling
+            })
+            .collect();
+        diagonal[0] += parameters.drive_stiffness;
+        Self { diagonal, coupling: -coupling }
+    }
+
+    /// The matrix with every contact attached, at its mean stiffness.
+    #[must_use]
+    pub fn intact(parameters: &Parameters) -> Self {
+        Self::new(parameters, &vec![parameters.block_contact_stiffness(); parameters.blocks])
+    }
+
+    /// Number of eigenvalues below a value, by the signs of the pivots of S - λ.
+    fn eigenvalues_below(&self, value: f64) -> usize {
+        let mut pivot = 1.0_f64;
+        let mut below = 0;
+        for (j, diagonal) in self.diagonal.iter().enumerate() {
+            let fill = if j == 0 { 0.0 } else { self.coupling * self.coupling / pivot };
+            pivot = diagonal - value - fill;
+            if pivot == 0.0 {
+                pivot = f64::MIN_POSITIVE;
+            }
+            below += usize::from(pivot < 0.0);
+        }
+        below
+    }
+
+    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m.
+    #[must_use]
+    pub fn eigenvalue(&self, index: usize) -> f64 {
+        let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
+        let (mut low, mut high) = (-f64::EPSILON * widest, widest * (1.0 + f64::EPSILON));
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return high;
+            }
+            if self.eigenvalues_below(middle) > index { high = middle } else { low = middle }
+        }
+    }
+
+    /// Solves S y = f e_1 for y_1 = y of the trailing edge and returns f/y_1, in N/m: the stiffness seen there.
+    #[must_use]
+    pub fn end_stiffness(&self) -> f64 {
+        let last = self.diagonal.len() - 1;
+        self.diagonal[..last]
+            .iter()
+            .rev()
+            .fold(self.diagonal[last], |pivot, diagonal| diagonal - self.coupling * self.coupling / pivot)
+    }
+}
+
+/// Largest angular frequency of the intact slider, in rad/s.
+#[must_use]
+pub fn largest_frequency(parameters: &Parameters) -> f64 {
+    (StiffnessMatrix::intact(parameters).eigenvalue(parameters.blocks - 1) / parameters.block_mass()).sqrt()
+}
+
+/// Largest stable time step 2/ω_max of an explicit leapfrog scheme on the intact slider, in s.
+#[must_use]
+pub fn stability_limit(parameters: &Parameters) -> f64 {
+    2.0 / largest_frequency(parameters)
+}

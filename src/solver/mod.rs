@@ -1,0 +1,116 @@
+//! Solvers: advance a model from contact event to contact event and tell an observer what happened.
+//!
+//! The one door is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear force as
+//! a closed-form function of time. Nothing that it sees tells which solver runs.
+
+mod fixed_step;
+mod segment;
+
+pub use segment::{ForcePath, Segment};
+
+use crate::model::{ContactEvent, Parameters};
+use std::sync::atomic::AtomicBool;
+
+/// The method and its one setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// Explicit velocity-Verlet with damping, contacts tested after each step.
+    FixedStep {
+        /// Time step dt, in s. Below the stability limit 2/ω_max.
+        time_step: f64,
+    },
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self::FixedStep { time_step: 1e-6 }
+    }
+}
+
+/// What follows a simulation and says when it has seen enough.
+pub trait Observer {
+    /// Time passes without a contact event. Segments come in order and without gaps.
+    fn advance(&mut self, segment: &Segment<'_>);
+
+    /// A contact breaks or attaches, at the end of the segment before.
+    fn contact(&mut self, event: &ContactEvent);
+
+    /// Whether the simulation may end. Asked after each segment and its events.
+    fn is_satisfied(&self) -> bool;
+}
+
+/// Bounds on a simulation, whatever its observer wants.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    /// Model time at which the simulation ends, in s. Infinite: the observer alone decides.
+    pub end_time: f64,
+    /// Largest number of contact events.
+    pub events: u64,
+    /// Ends the simulation when it turns true.
+    pub interrupt: Option<&'a AtomicBool>,
+}
+
+/// What a simulation cost and how it ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Model time reached, in s.
+    pub end_time: f64,
+    /// Whether the observer was satisfied before the end time.
+    pub satisfied: bool,
+    /// Steps of the solver.
+    pub steps: u64,
+    /// Contacts broken.
+    pub breaks: u64,
+    /// Contacts reattached.
+    pub reattachments: u64,
+}
+
+/// Why a simulation could not go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulationError {
+    /// The time step is not stable.
+    #[error("dt = {time_step:e} s: must be below the stability limit 2/omega_max = {limit:.4e} s of these parameters")]
+    UnstableStep {
+        /// The refused step, in s.
+        time_step: f64,
+        /// The limit, in s.
+        limit: f64,
+    },
+    /// The state is no longer finite.
+    #[error("at t = {time} s: the state is not finite; a smaller dt or tolerance may help")]
+    NotFinite {
+        /// Model time, in s.
+        time: f64,
+    },
+    /// More contact events than allowed.
+    #[error(
+        "at t = {time} s: {events} contact events, the most allowed; raise the budget (record.max_events) if they are wanted"
+    )]
+    EventBudget {
+        /// Model time, in s.
+        time: f64,
+        /// The budget.
+        events: u64,
+    },
+    /// Stopped from outside.
+    #[error("at t = {time} s: interrupted")]
+    Interrupted {
+        /// Model time, in s.
+        time: f64,
+    },
+}
+
+/// Runs one realisation until the observer is satisfied or the end time is reached.
+///
+/// # Errors
+/// When the solver's setting does not fit the parameters, or the run cannot go on: see [`SimulationError`].
+pub fn simulate(
+    parameters: &Parameters,
+    solver: Solver,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+) -> Result<Summary, SimulationError> {
+    match solver {
+        Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer),
+    }
+}
