@@ -43,20 +43,15 @@ impl Drive {
         if self.is_modulated() { TAU * (time / self.period).fract() } else { 0.0 }
     }
 
-    /// Displacement u(t) of the driven end, in m, at a time in s.
-    #[must_use]
-    pub fn displacement(&self, time: f64) -> f64 {
+    /// Displacement u(t) in m and velocity u'(t) in m/s of the driven end, at a time in s.
+    pub fn motion(&self, time: f64) -> (f64, f64) {
         let ramp = self.velocity * time;
-        if self.is_modulated() { ramp + self.amplitude * (libm::cos(self.phase(time)) - 1.0) } else { ramp }
-    }
-
-    /// Velocity u'(t), in m/s, at a time in s.
-    #[must_use]
-    pub fn velocity_at(&self, time: f64) -> f64 {
         if self.is_modulated() {
-            self.velocity - self.amplitude * self.angular_frequency * libm::sin(self.phase(time))
+            let (sine, cosine) = libm::sincos(self.phase(time));
+            let rate = self.amplitude * self.angular_frequency;
+            (ramp + self.amplitude * (cosine - 1.0), self.velocity - rate * sine)
         } else {
-            self.velocity
+            (ramp, self.velocity)
         }
     }
 }

@@ -173,7 +173,9 @@ impl Interface {
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
         for positions in [&mut self.anchor, &mut self.upper, &mut self.lower] {
-            positions.iter_mut().for_each(|position| *position -= shift);
+            for position in positions {
+                *position -= shift;
+            }
         }
         for block in 0..self.block_stiffness.len() {
             self.gather(block);
@@ -183,7 +185,9 @@ impl Interface {
     /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
     pub fn shift_time(&mut self, shift: f64) {
         let mut due = std::mem::take(&mut self.reattachments).into_vec();
-        due.iter_mut().for_each(|due| due.time -= shift);
+        for due in &mut due {
+            due.time -= shift;
+        }
         self.reattachments = due.into();
     }
 

@@ -2,9 +2,15 @@
 //!
 //! Knows no solver's inside and no file. Each observer computes one thing; a run holds those that its sweep asks for.
 
+mod phase;
+mod rupture;
+mod sample;
 mod slip;
 
-pub use slip::{Precursor, Slip};
+pub use phase::{OVERSHOOT, phase};
+pub use rupture::{Rupture, advance_speed};
+pub use sample::{AttachedMap, ContactLog, MapRow, Together, Trace, TraceRow};
+pub use slip::{Precursor, Slip, SlipObserver};
 
 /// What a job records: how many slips, from where, and which tables.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,14 @@
-//! Slips and precursors as rows of measurements.
+//! Slips and precursors: found from the contact events, measured on the shear force.
+//!
+//! Definitions: a slip is a rupture of all blocks; a precursor any other of at least `precursor_size` breaks; smaller ones
+//! are creep. The onset of a slip is the largest shear force between the previous slip's end (its last break) and the
+//! instant at which its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
+
+use super::Recording;
+use super::phase::phase;
+use super::rupture::{Rupture, advance_speed};
+use crate::model::{Change, ContactEvent, Parameters};
+use crate::solver::{Observer, Segment};
 
 /// One slip: a rupture that breaks contacts at every block.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,4 +66,251 @@ pub struct Precursor {
     pub reach: u64,
     /// Speed of its front, in m/s; `None` if fewer than three blocks lie on it.
     pub front_speed: Option<f64>,
+}
+
+/// A largest shear force, in N, and its time, in s.
+#[derive(Clone, Copy, Debug)]
+struct Peak {
+    time: f64,
+    force: f64,
+}
+
+impl Peak {
+    fn raise(&mut self, other: Peak) {
+        if other.force > self.force {
+            *self = other;
+        }
+    }
+}
+
+/// An observer that finds slips and precursors.
+#[derive(Clone, Debug)]
+pub struct SlipObserver {
+    parameters: Parameters,
+    eta: f64,
+    recording: Recording,
+    precursor_size: u64,
+    crossing_time: f64,
+    /// Shear force at the end of the last segment, and the impulse since the start, in N s.
+    now: Peak,
+    impulse: f64,
+    /// Peaks since the last slip's end, since the last rupture of precursor size, and since the last break.
+    since_slip: Peak,
+    since_precursor: Peak,
+    since_break: Peak,
+    rupture: Option<Active>,
+    slips_seen: u64,
+    last_onset: Option<f64>,
+    slips: Vec<Slip>,
+    precursors: Vec<Precursor>,
+    /// Precursors of the slip to come: onset of the last, and those that advanced the reach (time, position).
+    pending: u64,
+    last_precursor_onset: Option<f64>,
+    advances: Vec<(f64, f64)>,
+    furthest: Option<usize>,
+    /// Time and impulse at the end of start-up and of the last slip.
+    first_mark: Option<(f64, f64)>,
+    last_mark: Option<(f64, f64)>,
+    ruptures: u64,
+}
+
+/// A rupture in progress, with what its force tells.
+#[derive(Clone, Debug)]
+struct Active {
+    rupture: Rupture,
+    /// Peak since the last slip, when the rupture reached the leading edge.
+    onset: Option<Peak>,
+    /// Peak since the last precursor, when the rupture began.
+    precursor_onset: Peak,
+    /// Least force so far, and up to the last break, in N.
+    least: f64,
+    least_at_last_break: f64,
+    /// Impulse at the last break, in N s.
+    impulse_at_last_break: f64,
+}
+
+impl SlipObserver {
+    /// An observer for one job.
+    pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
+        let start = Peak { time: 0.0, force: 0.0 };
+        Self {
+            parameters: parameters.clone(),
+            eta: parameters.eta(),
+            recording: *recording,
+            precursor_size: recording.precursor_size.unwrap_or(parameters.contacts_per_block as u64),
+            crossing_time: parameters.wave_crossing_time(),
+            now: start,
+            impulse: 0.0,
+            since_slip: start,
+            since_precursor: start,
+            since_break: start,
+            rupture: None,
+            slips_seen: 0,
+            last_onset: None,
+            slips: Vec::new(),
+            precursors: Vec::new(),
+            pending: 0,
+            last_precursor_onset: None,
+            advances: Vec::new(),
+            furthest: None,
+            first_mark: None,
+            last_mark: None,
+            ruptures: 0,
+        }
+    }
+
+    /// The slips past start-up.
+    pub fn slips(&self) -> &[Slip] {
+        &self.slips
+    }
+
+    /// Slips, and precursors if they are recorded; empty otherwise.
+    pub fn into_rows(self) -> (Vec<Slip>, Vec<Precursor>) {
+        (self.slips, self.precursors)
+    }
+
+    /// Ruptures of any size that have ended.
+    pub fn ruptures(&self) -> u64 {
+        self.ruptures
+    }
+
+    /// Mean friction: the time mean of F_S over whole cycles, from the end of the last slip of start-up (of the first slip,
+    /// if none is discarded) to the end of the last slip, in N. `None` if no cycle is whole.
+    pub fn mean_friction(&self) -> Option<f64> {
+        let ((start, from), (end, to)) = (self.first_mark?, self.last_mark?);
+        (end > start).then(|| (to - from) / (end - start))
+    }
+
+    fn begin_or_extend(&mut self, event: &ContactEvent) {
+        if self.rupture.as_ref().is_some_and(|active| event.time - active.rupture.last_time > self.crossing_time) {
+            self.finish_rupture();
+        }
+        let blocks = self.parameters.blocks;
+        let active = if let Some(active) = &mut self.rupture {
+            active.rupture.include(event);
+            active
+        } else {
+            self.rupture.insert(Active {
+                rupture: Rupture::new(event, blocks),
+                onset: None,
+                precursor_onset: self.since_precursor,
+                least: self.now.force,
+                least_at_last_break: self.now.force,
+                impulse_at_last_break: self.impulse,
+            })
+        };
+        if event.block + 1 == blocks && active.onset.is_none() {
+            active.onset = Some(self.since_slip);
+        }
+        active.least_at_last_break = active.least;
+        active.impulse_at_last_break = self.impulse;
+        self.since_break = Peak { time: event.time, force: self.now.force };
+    }
+
+    fn finish_rupture(&mut self) {
+        let Some(active) = self.rupture.take() else { return };
+        self.ruptures += 1;
+        if active.rupture.spans_slider() {
+            self.record_slip(&active);
+        } else if active.rupture.size >= self.precursor_size {
+            self.record_precursor(&active);
+        }
+    }
+
+    fn record_slip(&mut self, active: &Active) {
+        let rupture = &active.rupture;
+        // A rupture of all blocks has reached the leading edge.
+        let onset = active.onset.unwrap_or(self.since_slip);
+        let discard = self.recording.discard;
+        if self.slips_seen >= discard {
+            self.slips.push(Slip {
+                number: self.slips_seen - discard,
+                onset: onset.time,
+                interval: self.last_onset.map(|last| onset.time - last),
+                phase: self.parameters.modulation_period.map(|period| phase(onset.time, period, self.eta)),
+                peak_force: onset.force,
+                drop: onset.force - active.least_at_last_break,
+                nucleation: rupture.first_time,
+                nucleation_block: rupture.first_block as u64 + 1,
+                duration: rupture.last_time - rupture.first_time,
+                size: rupture.size,
+                front_speed: rupture.front_speed(&self.parameters),
+                precursors: self.pending,
+                slow_front_speed: advance_speed(self.advances.iter().copied()),
+            });
+        }
+        self.slips_seen += 1;
+        let mark = (rupture.last_time, active.impulse_at_last_break);
+        if self.slips_seen == discard.max(1) {
+            self.first_mark = Some(mark);
+        }
+        self.last_mark = Some(mark);
+        self.last_onset = Some(onset.time);
+        self.since_slip = self.since_break;
+        self.since_precursor = self.since_break;
+        self.pending = 0;
+        self.last_precursor_onset = None;
+        self.advances.clear();
+        self.furthest = None;
+    }
+
+    fn record_precursor(&mut self, active: &Active) {
+        let rupture = &active.rupture;
+        let onset = active.precursor_onset.time;
+        if self.recording.precursors && self.slips_seen >= self.recording.discard {
+            self.precursors.push(Precursor {
+                slip: self.slips_seen - self.recording.discard,
+                precursor: self.pending,
+                onset,
+                interval: self.last_precursor_onset.map(|last| onset - last),
+                nucleation: rupture.first_time,
+                nucleation_block: rupture.first_block as u64 + 1,
+                duration: rupture.last_time - rupture.first_time,
+                size: rupture.size,
+                extent: rupture.extent() as u64,
+                reach: rupture.reach as u64 + 1,
+                front_speed: rupture.front_speed(&self.parameters),
+            });
+        }
+        if self.furthest.is_none_or(|furthest| rupture.reach > furthest) {
+            let position = (rupture.reach + 1) as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
+            self.advances.push((rupture.first_time, position));
+            self.furthest = Some(rupture.reach);
+        }
+        self.pending += 1;
+        self.last_precursor_onset = Some(onset);
+        self.since_precursor = self.since_break;
+    }
+}
+
+impl Observer for SlipObserver {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other.
+        if let Some((time, force)) = segment.maximum_above(self.since_break.force) {
+            let peak = Peak { time, force };
+            self.since_break = peak;
+            self.since_precursor.raise(peak);
+            self.since_slip.raise(peak);
+        }
+        if let Some(active) = &mut self.rupture
+            && let Some((_, force)) = segment.minimum_below(active.least)
+        {
+            active.least = force;
+        }
+        self.impulse += segment.impulse();
+        self.now = Peak { time: segment.end(), force: segment.force_after(segment.duration) };
+        if self.rupture.as_ref().is_some_and(|active| self.now.time - active.rupture.last_time > self.crossing_time) {
+            self.finish_rupture();
+        }
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        if event.change == Change::Break {
+            self.begin_or_extend(event);
+        }
+    }
+
+    fn is_satisfied(&self) -> bool {
+        self.slips.len() as u64 >= self.recording.slips
+    }
 }

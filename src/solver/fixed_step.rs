@@ -1,10 +1,162 @@
-//! stub
-use super::*;
+//! Fixed step: explicit velocity-Verlet with damping, contacts tested after each step.
+//!
+//! Source: the textbook scheme (Verlet 1967; Swope et al. 1982), the damping taken half before and half after the
+//! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract: first-order
+//! errors in the times of events, second-order between them; O(N) work per step through the block sums. It is kept
+//! plain: the baseline of speed, and a witness for the other solver.
+
+use super::segment::{ForcePath, Segment};
+use super::{Limits, Observer, SimulationError, Summary};
+use crate::model::slider::stability_limit;
+use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use std::sync::atomic::Ordering;
+
+/// Steps between two looks at the interrupt flag and at the state's finiteness.
+const STEPS_PER_CHECK: u64 = 4096;
+
+/// Displacements, velocities and accelerations of the blocks, in m, m/s, m/s².
+struct Motion {
+    displacement: Vec<f64>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl Motion {
+    /// Accelerations without damping, from the chain, the contacts and the shear force at the trailing edge, in N.
+    fn accelerate(&mut self, interface: &Interface, shear_force: f64, coupling: f64, mass: f64) {
+        let x = &self.displacement[..];
+        let blocks = x.len();
+        let stiffness = &interface.block_stiffness[..blocks];
+        let pull = &interface.block_pull[..blocks];
+        let a = &mut self.acceleration[..blocks];
+        let inverse_mass = 1.0 / mass;
+        for j in 1..blocks.saturating_sub(1) {
+            let chain = coupling * ((x[j + 1] - x[j]) - (x[j] - x[j - 1]));
+            a[j] = (chain + pull[j] - stiffness[j] * x[j]) * inverse_mass;
+        }
+        let last = blocks - 1;
+        a[0] = pull[0] - stiffness[0] * x[0] + shear_force;
+        if last > 0 {
+            a[0] += coupling * (x[1] - x[0]);
+            let chain = coupling * (x[last - 1] - x[last]);
+            a[last] = (chain + pull[last] - stiffness[last] * x[last]) * inverse_mass;
+        }
+        a[0] *= inverse_mass;
+    }
+
+    /// Whether any block is at or past a break position.
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
+    fn reaches_a_break(&self, interface: &Interface) -> bool {
+        let blocks = self.displacement.len();
+        let (x, upper, lower) =
+            (&self.displacement[..blocks], &interface.block_upper[..blocks], &interface.block_lower[..blocks]);
+        (0..blocks).fold(false, |any, j| any | (x[j] >= upper[j]) | (x[j] <= lower[j]))
+    }
+}
+
+/// Runs the scheme with `time_step` s; see [`super::simulate`].
 pub(super) fn run(
-    _p: &Parameters,
-    _dt: f64,
-    _l: Limits<'_>,
-    _o: &mut dyn Observer,
+    parameters: &Parameters,
+    time_step: f64,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Summary, SimulationError> {
-    todo!()
+    let limit = stability_limit(parameters);
+    if !(time_step > 0.0 && time_step < limit) {
+        return Err(SimulationError::UnstableStep { time_step, limit });
+    }
+    let blocks = parameters.blocks;
+    let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
+    let drive = Drive::new(parameters);
+    let mut interface = Interface::new(parameters);
+    let mut motion =
+        Motion { displacement: vec![0.0; blocks], velocity: vec![0.0; blocks], acceleration: vec![0.0; blocks] };
+    let mut summary = Summary::default();
+    let half = 0.5 * time_step;
+    let damp_before = 1.0 - half * parameters.damping_rate;
+    let damp_after = 1.0 / (1.0 + half * parameters.damping_rate);
+
+    for event in interface.initial_attachments() {
+        observer.contact(&event);
+    }
+    let mut force = 0.0;
+    let mut force_rate = drive.stiffness * drive.velocity;
+    motion.accelerate(&interface, force, coupling, mass);
+    while !observer.is_satisfied() {
+        let start = summary.steps as f64 * time_step;
+        if start >= limits.end_time {
+            return Ok(summary);
+        }
+        summary.steps += 1;
+        let time = summary.steps as f64 * time_step;
+        for ((x, v), a) in motion.displacement.iter_mut().zip(&mut motion.velocity).zip(&motion.acceleration) {
+            *v = *v * damp_before + half * a;
+            *x += time_step * *v;
+        }
+        let (driven, drive_velocity) = drive.motion(time);
+        let next_force = drive.stiffness * (driven - motion.displacement[0]);
+        motion.accelerate(&interface, next_force, coupling, mass);
+        for (v, a) in motion.velocity.iter_mut().zip(&motion.acceleration) {
+            *v = (*v + half * a) * damp_after;
+        }
+        let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
+        let coefficients = hermite(force, next_force, time_step * force_rate, time_step * next_rate);
+        observer.advance(&Segment {
+            start,
+            duration: time_step,
+            path: ForcePath::Polynomial { coefficients: &coefficients, scale: time_step },
+        });
+        (force, force_rate) = (next_force, next_rate);
+        summary.end_time = time;
+
+        if interface.next_reattachment() <= time || motion.reaches_a_break(&interface) {
+            change_contacts(&mut interface, &motion.displacement, time, &mut summary, observer);
+            if summary.breaks + summary.reattachments > limits.events {
+                return Err(SimulationError::EventBudget { time, events: limits.events });
+            }
+            // The next step starts from the new contacts.
+            motion.accelerate(&interface, force, coupling, mass);
+        }
+        if summary.steps.is_multiple_of(STEPS_PER_CHECK) {
+            if !motion.displacement.iter().sum::<f64>().is_finite() {
+                return Err(SimulationError::NotFinite { time });
+            }
+            if limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                return Err(SimulationError::Interrupted { time });
+            }
+        }
+    }
+    summary.satisfied = true;
+    Ok(summary)
+}
+
+/// Reattaches what is due and breaks what is reached, at the end of a step.
+fn change_contacts(
+    interface: &mut Interface,
+    displacement: &[f64],
+    time: f64,
+    summary: &mut Summary,
+    observer: &mut dyn Observer,
+) {
+    while interface.next_reattachment() <= time
+        && let Some(block) = interface.next_reattachment_block()
+    {
+        let event = interface.reattach_next(displacement[block]);
+        summary.reattachments += 1;
+        observer.contact(&ContactEvent { time, ..event });
+    }
+    for (block, &x) in displacement.iter().enumerate() {
+        if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
+            interface.break_reached(block, time, x, |event| {
+                summary.breaks += 1;
+                observer.contact(&event);
+            });
+        }
+    }
+}
+
+/// Coefficients in [0, 1] of the cubic with these values and slopes at its ends.
+fn hermite(start: f64, end: f64, start_slope: f64, end_slope: f64) -> [f64; 4] {
+    let rise = end - start;
+    [start, start_slope, 3.0 * rise - 2.0 * start_slope - end_slope, start_slope + end_slope - 2.0 * rise]
 }

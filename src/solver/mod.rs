@@ -4,6 +4,7 @@
 //! a closed-form function of time. Nothing that it sees tells which solver runs.
 
 mod fixed_step;
+mod polynomial;
 mod segment;
 
 pub use segment::{ForcePath, Segment};

@@ -1,0 +1,184 @@
+//! Records on request: traces, space-time maps and the contact log of one job. A sweep holds none of these.
+
+use crate::model::{Change, ContactEvent, Drive, Parameters};
+use crate::solver::{Observer, Segment};
+
+/// Several observers in step; the first decides when it is enough.
+pub struct Together<'a> {
+    /// The observer that decides.
+    pub lead: &'a mut dyn Observer,
+    /// Those that follow.
+    pub others: Vec<&'a mut dyn Observer>,
+}
+
+impl Observer for Together<'_> {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        self.lead.advance(segment);
+        self.others.iter_mut().for_each(|other| other.advance(segment));
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        self.lead.contact(event);
+        self.others.iter_mut().for_each(|other| other.contact(event));
+    }
+
+    fn is_satisfied(&self) -> bool {
+        self.lead.is_satisfied()
+    }
+}
+
+/// Regular instants, 0, d, 2d, ..., as time passes.
+#[derive(Clone, Debug)]
+struct Sampling {
+    spacing: f64,
+    next: u64,
+}
+
+impl Sampling {
+    fn new(spacing: f64) -> Self {
+        Self { spacing, next: 0 }
+    }
+
+    /// The next instant, if it lies before the end of the segment.
+    fn within(&mut self, segment: &Segment<'_>) -> Option<f64> {
+        let time = self.next as f64 * self.spacing;
+        let is_within = time < segment.end();
+        self.next += u64::from(is_within);
+        is_within.then_some(time)
+    }
+}
+
+/// One sample of a trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TraceRow {
+    /// Time, in s.
+    pub time: f64,
+    /// Shear force F_S, in N.
+    pub force: f64,
+    /// Displacement of the trailing edge, in m.
+    pub displacement: f64,
+    /// Attached contacts over all contacts.
+    pub attached_fraction: f64,
+}
+
+/// An observer that samples the shear force at regular instants.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    drive: Drive,
+    contacts: f64,
+    attached: u64,
+    sampling: Sampling,
+    /// The samples so far.
+    pub rows: Vec<TraceRow>,
+}
+
+impl Trace {
+    /// Samples every `spacing` s.
+    pub fn new(parameters: &Parameters, spacing: f64) -> Self {
+        let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
+        let drive = Drive::new(parameters);
+        Self { drive, contacts, attached: 0, sampling: Sampling::new(spacing), rows: Vec::new() }
+    }
+}
+
+impl Observer for Trace {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        while let Some(time) = self.sampling.within(segment) {
+            let force = segment.force_after(time - segment.start);
+            let (driven, _) = self.drive.motion(time);
+            self.rows.push(TraceRow {
+                time,
+                force,
+                displacement: driven - force / self.drive.stiffness,
+                attached_fraction: self.attached as f64 / self.contacts,
+            });
+        }
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        match event.change {
+            Change::Attach => self.attached += 1,
+            Change::Break => self.attached -= 1,
+        }
+    }
+
+    fn is_satisfied(&self) -> bool {
+        false
+    }
+}
+
+/// One cell of a space-time map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapRow {
+    /// Time, in s.
+    pub time: f64,
+    /// Block, counted from 1 at the trailing edge.
+    pub block: u64,
+    /// Attached contacts over the contacts of the block.
+    pub attached_fraction: f64,
+}
+
+/// An observer that samples the attached fraction of every block at regular instants (Fig. 4).
+#[derive(Clone, Debug)]
+pub struct AttachedMap {
+    contacts_per_block: f64,
+    attached: Vec<u32>,
+    sampling: Sampling,
+    /// The cells so far, instant by instant.
+    pub rows: Vec<MapRow>,
+}
+
+impl AttachedMap {
+    /// Samples every `spacing` s.
+    pub fn new(parameters: &Parameters, spacing: f64) -> Self {
+        Self {
+            contacts_per_block: parameters.contacts_per_block as f64,
+            attached: vec![0; parameters.blocks],
+            sampling: Sampling::new(spacing),
+            rows: Vec::new(),
+        }
+    }
+}
+
+impl Observer for AttachedMap {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        while let Some(time) = self.sampling.within(segment) {
+            let cells = self.attached.iter().zip(1..).map(|(&attached, block)| MapRow {
+                time,
+                block,
+                attached_fraction: f64::from(attached) / self.contacts_per_block,
+            });
+            self.rows.extend(cells);
+        }
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        match event.change {
+            Change::Attach => self.attached[event.block] += 1,
+            Change::Break => self.attached[event.block] -= 1,
+        }
+    }
+
+    fn is_satisfied(&self) -> bool {
+        false
+    }
+}
+
+/// An observer that keeps every contact event in order.
+#[derive(Clone, Debug, Default)]
+pub struct ContactLog {
+    /// The events so far.
+    pub events: Vec<ContactEvent>,
+}
+
+impl Observer for ContactLog {
+    fn advance(&mut self, _segment: &Segment<'_>) {}
+
+    fn contact(&mut self, event: &ContactEvent) {
+        self.events.push(*event);
+    }
+
+    fn is_satisfied(&self) -> bool {
+        false
+    }
+}
