@@ -15,6 +15,11 @@ pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * s + c)
 }
 
+/// `Σ c_p s^p` and its derivative.
+pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
+    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * s + c, slope * s + value))
+}
+
 /// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s.
 pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
     let terms = coefficients.iter().enumerate().rev();
@@ -44,13 +49,13 @@ pub(crate) fn maximum(coefficients: &[f64], end: f64) -> (f64, f64) {
 }
 
 /// `Σ_{p>=1} |c_p| w^p`: how far the value strays from c_0 within w.
-fn excursion(coefficients: &[f64], width: f64) -> f64 {
+pub(crate) fn excursion(coefficients: &[f64], width: f64) -> f64 {
     let terms = coefficients[1..].iter().rev();
     width * terms.fold(0.0, |sum, c| sum * width + c.abs())
 }
 
 /// The same polynomial in the variable s - `centre`.
-fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
+pub(crate) fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
     let mut about = [0.0; MOST_COEFFICIENTS];
     about[..coefficients.len()].copy_from_slice(coefficients);
     for p in 0..coefficients.len() {

@@ -1,0 +1,219 @@
+//! First crossings: the first instant at which a polynomial, or a ramp with a cosine, reaches a level from below.
+//!
+//! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
+//! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
+
+use crate::solver::polynomial::{excursion, shifted, value, value_and_slope};
+use std::f64::consts::{PI, TAU};
+
+/// Halvings after which an interval counts as a point: 2^-40 of a step.
+const DEEPEST: u32 = 40;
+
+/// First s in [0, `end`] at which the polynomial is not below zero.
+pub(super) fn first_reach(coefficients: &[f64], end: f64) -> Option<f64> {
+    if coefficients[0] >= 0.0 {
+        return Some(0.0);
+    }
+    // The common case in one test: it rises throughout.
+    let slope_varies: f64 = coefficients.iter().enumerate().skip(2).map(|(p, c)| p as f64 * c.abs()).sum();
+    if end <= 1.0 && coefficients[1] > slope_varies {
+        return rising_root(coefficients, 0.0, end);
+    }
+    first_in(coefficients, 0.0, end, DEEPEST)
+}
+
+fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let about = shifted(coefficients, middle);
+    let about = &about[..coefficients.len()];
+    if about[0] + excursion(about, half) < 0.0 {
+        return None;
+    }
+    let (mut slope_varies, mut power) = (0.0, 1.0);
+    for (p, c) in about.iter().enumerate().skip(2) {
+        power *= half;
+        slope_varies += p as f64 * c.abs() * power;
+    }
+    if about.len() > 1 && about[1].abs() > slope_varies {
+        // It may start at or above the level only if the interval before ended there.
+        if value(coefficients, low) >= 0.0 {
+            return Some(low);
+        }
+        return if about[1] > 0.0 { rising_root(coefficients, low, high) } else { None };
+    }
+    if depth == 0 {
+        return (about[0] >= 0.0).then_some(middle);
+    }
+    first_in(coefficients, low, middle, depth - 1).or_else(|| first_in(coefficients, middle, high, depth - 1))
+}
+
+/// The root of a polynomial that rises from below zero throughout [low, high]; `None` if it stays below.
+fn rising_root(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
+    (value(coefficients, high) >= 0.0).then(|| safeguarded_newton(low, high, |s| value_and_slope(coefficients, s)))
+}
+
+/// Root of a function that rises through zero once between `low` and `high`, to the last bits: Newton's steps, bisection
+/// where they leave the bracket. Returns the last iterate, never a stale end of the bracket.
+fn safeguarded_newton(mut low: f64, mut high: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut s = 0.5 * (low + high);
+    loop {
+        let (height, slope) = function(s);
+        if height >= 0.0 {
+            high = s
+        } else {
+            low = s
+        }
+        let newton = s - height / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if next == s || next <= low || next >= high || (next - s).abs() <= 2.0 * f64::EPSILON * high.abs() {
+            return if newton >= low && newton <= high { newton } else { next };
+        }
+        s = next;
+    }
+}
+
+/// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Driven {
+    pub start: f64,
+    pub rate: f64,
+    pub amplitude: f64,
+    pub phase: f64,
+    pub angular_frequency: f64,
+}
+
+impl Driven {
+    pub fn value(&self, elapsed: f64) -> f64 {
+        let ramp = self.start + self.rate * elapsed;
+        if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }
+    }
+
+    fn angle(&self, elapsed: f64) -> f64 {
+        // Whole periods are taken off first, so that long leaps lose no digits of the phase.
+        TAU * (elapsed * self.angular_frequency / TAU).fract() + self.phase
+    }
+
+    fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
+        let (sine, cosine) = libm::sincos(self.angle(elapsed));
+        let ramp = self.start + self.rate * elapsed;
+        (ramp + self.amplitude * cosine, self.rate - self.amplitude * self.angular_frequency * sine)
+    }
+
+    /// First instant at or after `from` at which the motion is not below `level`; infinite if never.
+    pub fn first_rise_to(&self, level: f64, from: f64) -> f64 {
+        if self.value(from) >= level {
+            return from;
+        }
+        if self.amplitude == 0.0 {
+            return if self.rate > 0.0 { ((level - self.start) / self.rate).max(from) } else { f64::INFINITY };
+        }
+        let newton = |low: f64, high: f64| {
+            safeguarded_newton(low, high, |elapsed| {
+                let (height, slope) = self.value_and_slope(elapsed);
+                (height - level, slope)
+            })
+        };
+        let speed = self.amplitude * self.angular_frequency;
+        if speed <= self.rate {
+            let latest = (level - self.start + self.amplitude) / self.rate;
+            return newton(from, latest.max(from) * (1.0 + f64::EPSILON));
+        }
+        // Maxima lie at ψ = asin(p1/Aω) mod 2π and grow by p1 T from one to the next.
+        let crest = libm::asin(self.rate / speed);
+        let period = TAU / self.angular_frequency;
+        let behind = (crest - self.angle(from)).rem_euclid(TAU);
+        let first = from + behind / self.angular_frequency;
+        let short = level - self.value(first);
+        let skipped = if short <= 0.0 {
+            0.0
+        } else if self.rate > 0.0 {
+            (short / (self.rate * period)).ceil()
+        } else {
+            return f64::INFINITY;
+        };
+        let high = first + skipped * period;
+        // The branch that rises to a maximum begins at the minimum before, π - 2 asin(p1/Aω) earlier... in phase.
+        let low = (high - (PI + 2.0 * crest) / self.angular_frequency).max(from);
+        if self.value(high) < level { high } else { newton(low, high) }
+    }
+
+    /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too, so it
+    /// lies within the first period.
+    pub fn first_fall_to(&self, level: f64, from: f64) -> f64 {
+        if self.value(from) <= level {
+            return from;
+        }
+        let speed = self.amplitude * self.angular_frequency;
+        if speed <= self.rate {
+            return f64::INFINITY;
+        }
+        let trough = PI - libm::asin(self.rate / speed);
+        let behind = (trough - self.angle(from)).rem_euclid(TAU);
+        let low = from + behind / self.angular_frequency;
+        if self.value(low) > level {
+            return f64::INFINITY;
+        }
+        // Before the trough the motion falls, from the crest or from the start.
+        let crest = low - (PI - 2.0 * (PI - trough)) / self.angular_frequency;
+        let high = crest.max(from);
+        safeguarded_newton(high, low, |elapsed| {
+            let (height, slope) = self.value_and_slope(elapsed);
+            (level - height, -slope)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_bump_that_just_reaches_the_level_is_not_missed() {
+        // -(s - 0.3)² + 1e-10: above zero for 2e-5 of the step only.
+        let coefficients = [-0.09 + 1e-10, 0.6, -1.0];
+        let reached = first_reach(&coefficients, 1.0).unwrap();
+        assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
+        assert_eq!(first_reach(&[-0.09 - 1e-10, 0.6, -1.0], 1.0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn the_first_crossing_of_a_polynomial_is_the_first(
+            coefficients in prop::collection::vec(-1.0_f64..1.0, 2..14), end in 0.05_f64..1.0
+        ) {
+            let found = first_reach(&coefficients, end);
+            let until = found.unwrap_or(end);
+            for i in 0..400 {
+                let s = until * f64::from(i) / 400.0;
+                prop_assert!(i == 0 || value(&coefficients, s * (1.0 - 1e-9)) < 1e-12, "missed at {}", s);
+            }
+            if let Some(s) = found.filter(|s| *s > 0.0) {
+                prop_assert!(value(&coefficients, s).abs() < 1e-12);
+            }
+        }
+
+        #[test]
+        fn the_first_rise_and_fall_of_a_driven_block_are_the_first(
+            start in -1.0_f64..1.0, rate in 0.001_f64..2.0, amplitude in 0.0_f64..1.5, phase in -7.0_f64..7.0,
+            level in 0.0_f64..4.0, from in 0.0_f64..9.0
+        ) {
+            let driven = Driven { start, rate, amplitude, phase, angular_frequency: 2.5 };
+            let rise = driven.first_rise_to(level, from);
+            prop_assert!(rise >= from);
+            let fall = driven.first_fall_to(-level, from);
+            for i in 1..2000 {
+                let elapsed = from + (rise - from).min(50.0) * f64::from(i) / 2001.0;
+                prop_assert!(driven.value(elapsed) < level + 1e-9, "rise missed at {}", elapsed);
+                let elapsed = from + (fall - from).min(50.0) * f64::from(i) / 2001.0;
+                prop_assert!(driven.value(elapsed) > -level - 1e-9, "fall missed at {}", elapsed);
+            }
+            if rise > from {
+                prop_assert!((driven.value(rise) - level).abs() < 1e-9);
+            }
+            if fall.is_finite() && fall > from {
+                prop_assert!((driven.value(fall) + level).abs() < 1e-9);
+            }
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! Leaps over quiet time along the driven solution.
+//!
+//! Between events the driven solution x_p(t) = p0 + p1 t + Re(q e^{iωt}) needs one real and, with modulation, one complex
+//! tridiagonal solve. The rest y = x - x_p is a free damped motion: in every mode the amplitude of e^{γt/2} y is constant
+//! if S' = S - m γ²/4 is positive definite, so that with w = y' and
+//!
+//! ```text
+//! E = ½ m |w + γ y/2|² + ½ yᵀ S' y,    |y_j(t)| <= sqrt(2 E (S'⁻¹)_jj) e^{-γ t/2}
+//! ```
+//!
+//! holds exactly: a bound for each block, and its decay. A leap may therefore start while y is still large, if the bound
+//! shows that meanwhile no block reaches a break position, that y has fallen under the tolerance when the next event
+//! comes, and that the force passes its largest possible value of that time later on. Contract: a leap leaves out at most
+//! `tolerance` · f_s/k of any block's displacement at its end, and no event on its way.
+
+use super::crossing::Driven;
+use super::taylor::{Chain, State};
+use crate::solver::segment::{ForcePath, Segment};
+
+/// The drive as it is at the start of a leap.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DriveNow {
+    /// Stiffness `K_d`, in N/m.
+    pub stiffness: f64,
+    /// Block mass, in kg.
+    pub mass: f64,
+    /// Displacement of the ramp alone, without the cosine, in m.
+    pub ramp: f64,
+    /// Its velocity `V_0`, in m/s.
+    pub velocity: f64,
+    /// Amplitude of the cosine, in m, its phase now, in rad, and its angular frequency, in rad/s.
+    pub amplitude: f64,
+    pub phase: f64,
+    pub angular_frequency: f64,
+}
+
+/// How an attempt to leap ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Attempt {
+    /// The slider moved on by so many seconds; a block reached a break position if one is named.
+    Leapt { elapsed: f64, reached: Option<usize> },
+    /// Not yet: try again after so many seconds.
+    Wait { seconds: f64 },
+}
+
+/// Work space of leaps: one entry a block.
+#[derive(Clone, Debug)]
+pub(super) struct Leap {
+    /// Inverse pivots of S/m, eliminated from the leading edge.
+    inverse_pivot: Vec<f64>,
+    /// The same of S'/m, and pivots of S'/m eliminated from the trailing edge.
+    inverse_shifted: Vec<f64>,
+    shifted_before: Vec<f64>,
+    /// Inverse complex pivots of (S - mω² + imγω)/m.
+    inverse_complex: Vec<[f64; 2]>,
+    start: Vec<f64>,
+    rate: Vec<f64>,
+    wave: Vec<[f64; 2]>,
+    residue: Vec<f64>,
+}
+
+impl Leap {
+    pub fn new(blocks: usize) -> Self {
+        let zeros = vec![0.0; blocks];
+        Self {
+            inverse_pivot: zeros.clone(),
+            inverse_shifted: zeros.clone(),
+            shifted_before: zeros.clone(),
+            inverse_complex: vec![[0.0; 2]; blocks],
+            start: zeros.clone(),
+            rate: zeros.clone(),
+            wave: vec![[0.0; 2]; blocks],
+            residue: zeros,
+        }
+    }
+
+    /// Tries to leap by at most `horizon` s, leaving out no displacement above `error` m, and writes the state at its end.
+    /// `emit` receives the shear force on the way.
+    pub fn attempt(
+        &mut self,
+        chain: &Chain,
+        drive: &DriveNow,
+        horizon: f64,
+        error: f64,
+        state: &mut State,
+        emit: impl FnOnce(Segment<'_>),
+    ) -> Attempt {
+        let damping = chain.damping_rate;
+        let wait = |folds: f64| Attempt::Wait { seconds: 2.0 * folds / damping };
+        if !self.eliminate(chain) {
+            return wait(1.0);
+        }
+        self.solve_driven(chain, drive);
+        let energy = self.free_energy(chain, drive, state);
+        let largest = self.bound_free_motion(chain, energy);
+        let decay = if largest <= error { 0.0 } else { 2.0 * libm::log(largest / error) / damping };
+        if decay >= horizon {
+            return Attempt::Wait { seconds: horizon };
+        }
+        if decay > 0.0 && !self.stays_clear(chain, drive, decay, error) {
+            return wait(0.7);
+        }
+        let (elapsed, reached) = self.first_reached(chain, drive, decay, horizon);
+        if elapsed <= decay && decay > 0.0 {
+            return wait(0.7);
+        }
+        if !elapsed.is_finite() {
+            return Attempt::Wait { seconds: f64::INFINITY };
+        }
+        let path = self.force_path(drive);
+        let segment = Segment { start: 0.0, duration: elapsed, path };
+        if decay > 0.0 {
+            let passed = Segment { start: 0.0, duration: decay, path }.maximum_above(f64::NEG_INFINITY);
+            let hidden = passed.map_or(f64::INFINITY, |(_, force)| force) + drive.stiffness * self.residue[0];
+            if segment.maximum_above(hidden).is_none() {
+                return wait(0.7);
+            }
+        }
+        emit(segment);
+        self.follow(chain, drive, elapsed, state);
+        Attempt::Leapt { elapsed, reached }
+    }
+
+    /// Pivots of S/m and of S'/m from both ends; false if S' is not positive definite.
+    fn eliminate(&mut self, chain: &Chain) -> bool {
+        let blocks = chain.layout.blocks;
+        let shift = 0.25 * chain.damping_rate * chain.damping_rate;
+        let coupling_squared = chain.coupling[0][0] * chain.coupling[0][0];
+        let (mut ahead, mut ahead_shifted, mut before_shifted) = (0.0, 0.0, 0.0);
+        let mut least = f64::INFINITY;
+        for count in 0..blocks {
+            let (far, near) = (blocks - 1 - count, count);
+            let diagonal = chain.at(&chain.diagonal, far);
+            let pivot = diagonal - coupling_squared * ahead;
+            let pivot_shifted = diagonal - shift - coupling_squared * ahead_shifted;
+            let pivot_before = chain.at(&chain.diagonal, near) - shift - coupling_squared * before_shifted;
+            least = least.min(pivot_shifted).min(pivot_before);
+            ahead = 1.0 / pivot;
+            ahead_shifted = 1.0 / pivot_shifted;
+            before_shifted = 1.0 / pivot_before;
+            self.inverse_pivot[far] = ahead;
+            self.inverse_shifted[far] = ahead_shifted;
+            self.shifted_before[near] = pivot_before;
+        }
+        least > 0.0
+    }
+
+    /// p0, p1 and q of the driven solution.
+    fn solve_driven(&mut self, chain: &Chain, drive: &DriveNow) {
+        let blocks = chain.layout.blocks;
+        let coupling = chain.coupling[0][0];
+        let pulling = drive.stiffness / drive.mass;
+        self.rate[0] = pulling * drive.velocity * self.inverse_pivot[0];
+        for j in 1..blocks {
+            self.rate[j] = coupling * self.rate[j - 1] * self.inverse_pivot[j];
+        }
+        // Forward from the leading edge, the right-hand side kept in `start`, then back.
+        let mut carried = 0.0;
+        for j in (0..blocks).rev() {
+            let own = chain.at(&chain.pull, j) - chain.damping_rate * self.rate[j];
+            self.start[j] = own + coupling * carried;
+            carried = self.start[j] * self.inverse_pivot[j];
+        }
+        self.start[0] += pulling * drive.ramp;
+        self.start[0] *= self.inverse_pivot[0];
+        for j in 1..blocks {
+            self.start[j] = (self.start[j] + coupling * self.start[j - 1]) * self.inverse_pivot[j];
+        }
+        if drive.amplitude > 0.0 {
+            self.solve_wave(chain, drive, pulling * drive.amplitude);
+        }
+    }
+
+    /// q, with the drive's phase of now in it.
+    fn solve_wave(&mut self, chain: &Chain, drive: &DriveNow, acceleration: f64) {
+        let blocks = chain.layout.blocks;
+        let coupling = chain.coupling[0][0];
+        let frequency = drive.angular_frequency;
+        let (shift, loss) = (frequency * frequency, chain.damping_rate * frequency);
+        let mut ahead = [0.0, 0.0];
+        for j in (0..blocks).rev() {
+            let squared = coupling * coupling;
+            let pivot = [chain.at(&chain.diagonal, j) - shift - squared * ahead[0], loss - squared * ahead[1]];
+            let scale = 1.0 / (pivot[0] * pivot[0] + pivot[1] * pivot[1]);
+            ahead = [pivot[0] * scale, -pivot[1] * scale];
+            self.inverse_complex[j] = ahead;
+        }
+        let (sine, cosine) = libm::sincos(drive.phase);
+        let mut wave = product([acceleration * cosine, acceleration * sine], self.inverse_complex[0]);
+        self.wave[0] = wave;
+        for j in 1..blocks {
+            wave = product([coupling * wave[0], coupling * wave[1]], self.inverse_complex[j]);
+            self.wave[j] = wave;
+        }
+    }
+
+    /// E/m of the free motion, in m²/s².
+    fn free_energy(&self, chain: &Chain, drive: &DriveNow, state: &State) -> f64 {
+        let blocks = chain.layout.blocks;
+        let coupling = chain.coupling[0][0];
+        let damping = chain.damping_rate;
+        let shift = 0.25 * damping * damping;
+        let (mut energy, mut before) = (0.0, 0.0);
+        for j in 0..blocks {
+            let y = chain.at(&state.displacement, j) - self.start[j] - self.wave[j][0];
+            // d/dt Re(q e^{iωt}) = -ω Im q at the start.
+            let w = chain.at(&state.velocity, j) - self.rate[j] + drive.angular_frequency * self.wave[j][1];
+            let turned = w + 0.5 * damping * y;
+            energy += turned * turned + y * ((chain.at(&chain.diagonal, j) - shift) * y - 2.0 * coupling * before);
+            before = y;
+        }
+        0.5 * energy.max(0.0)
+    }
+
+    /// Bounds |y_j| now into `residue`; returns the largest.
+    fn bound_free_motion(&mut self, chain: &Chain, energy: f64) -> f64 {
+        let shift = 0.25 * chain.damping_rate * chain.damping_rate;
+        let mut largest = 0.0_f64;
+        for j in 0..chain.layout.blocks {
+            let ahead = 1.0 / self.inverse_shifted[j];
+            let compliance = 1.0 / (ahead + self.shifted_before[j] - (chain.at(&chain.diagonal, j) - shift));
+            self.residue[j] = (2.0 * energy * compliance).sqrt();
+            largest = largest.max(self.residue[j]);
+        }
+        largest
+    }
+
+    /// Whether no block can reach a break position within `decay` s, driven and free motion together.
+    fn stays_clear(&self, chain: &Chain, drive: &DriveNow, decay: f64, error: f64) -> bool {
+        let turns = drive.amplitude > 0.0;
+        (0..chain.layout.blocks).all(|j| {
+            let swing = if turns { libm::hypot(self.wave[j][0], self.wave[j][1]) } else { 0.0 };
+            // Ramp and decaying bound together are convex in time: largest at the ends.
+            let highest = (self.start[j] + self.residue[j]).max(self.start[j] + self.rate[j] * decay + error) + swing;
+            let lowest = self.start[j] - self.residue[j] - swing;
+            highest < chain.at(&chain.upper, j) && lowest > chain.at(&chain.lower, j)
+        })
+    }
+
+    /// The first instant after `decay` at which a block reaches a break position, up to `horizon`, and that block.
+    fn first_reached(&self, chain: &Chain, drive: &DriveNow, decay: f64, horizon: f64) -> (f64, Option<usize>) {
+        let mut first = (horizon, None);
+        for j in 0..chain.layout.blocks {
+            let [real, imaginary] = self.wave[j];
+            let (upper, lower) = (chain.at(&chain.upper, j), chain.at(&chain.lower, j));
+            if drive.amplitude == 0.0 {
+                // The rate is positive, so the ramp alone only rises.
+                let elapsed = ((upper - self.start[j]) / self.rate[j]).max(decay);
+                if elapsed < first.0 || lower >= self.start[j] {
+                    first = (if lower >= self.start[j] { decay } else { elapsed }, Some(j));
+                }
+                continue;
+            }
+            let swing = libm::hypot(real, imaginary);
+            let rises_before = self.start[j] + self.rate[j] * first.0 + swing >= upper;
+            let falls_at_all = self.start[j] + self.rate[j] * decay - swing <= lower;
+            if !(rises_before || falls_at_all) {
+                continue;
+            }
+            let driven = Driven {
+                start: self.start[j],
+                rate: self.rate[j],
+                amplitude: swing,
+                phase: libm::atan2(imaginary, real),
+                angular_frequency: drive.angular_frequency,
+            };
+            let rise = if rises_before { driven.first_rise_to(upper, decay) } else { f64::INFINITY };
+            let fall = if falls_at_all { driven.first_fall_to(lower, decay) } else { f64::INFINITY };
+            if rise.min(fall) < first.0 {
+                first = (rise.min(fall), Some(j));
+            }
+        }
+        first
+    }
+
+    /// The shear force along the driven solution.
+    fn force_path(&self, drive: &DriveNow) -> ForcePath<'static> {
+        let (sine, cosine) = libm::sincos(drive.phase);
+        let real = drive.amplitude * cosine - self.wave[0][0];
+        let imaginary = drive.amplitude * sine - self.wave[0][1];
+        ForcePath::Harmonic {
+            start: drive.stiffness * (drive.ramp - self.start[0]),
+            rate: drive.stiffness * (drive.velocity - self.rate[0]),
+            amplitude: drive.stiffness * libm::hypot(real, imaginary),
+            phase: libm::atan2(imaginary, real),
+            angular_frequency: drive.angular_frequency,
+        }
+    }
+
+    /// Writes the driven solution after so many seconds into the state.
+    fn follow(&self, chain: &Chain, drive: &DriveNow, elapsed: f64, state: &mut State) {
+        let turn = std::f64::consts::TAU * (elapsed * drive.angular_frequency / std::f64::consts::TAU).fract();
+        let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(turn) } else { (0.0, 1.0) };
+        for j in 0..chain.layout.blocks {
+            let [real, imaginary] = product(self.wave[j], [cosine, sine]);
+            let (row, lane) = chain.layout.slot(j);
+            state.displacement[row][lane] = self.start[j] + self.rate[j] * elapsed + real;
+            state.velocity[row][lane] = self.rate[j] - drive.angular_frequency * imaginary;
+        }
+    }
+}
+
+fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+}

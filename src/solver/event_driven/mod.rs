@@ -1,0 +1,359 @@
+//! Event-driven: from contact event to contact event, in closed form where nothing happens.
+//!
+//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and locates
+//! the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap follows the
+//! driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of displacement of the
+//! order of `tolerance` · f_s/k.
+//!
+//! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
+
+mod crossing;
+mod lanes;
+mod leap;
+mod taylor;
+
+use self::crossing::first_reach;
+use self::lanes::Layout;
+use self::leap::{Attempt, DriveNow, Leap};
+use self::taylor::{Chain, Kernels, Series, State, StepInput};
+use super::polynomial::MOST_COEFFICIENTS;
+use super::segment::{ForcePath, Segment};
+use super::{Limits, Observer, SimulationError, Summary};
+use crate::model::slider::largest_frequency;
+use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use std::sync::atomic::Ordering;
+
+/// Longest step, in units of the shortest time scale: the cheapest per unit of time, and still far from where the series
+/// would lose digits.
+const LONGEST_STEP: f64 = 4.0;
+/// Steps are halved at most so often where events crowd; further only if a series does not converge.
+const MOST_HALVINGS: i32 = 7;
+/// Halvings at which a series that does not converge ends the run.
+const HOPELESS_HALVINGS: i32 = 60;
+/// A step aims at so many times the time that recent steps covered before an event cut them.
+const STEP_AHEAD: f64 = 2.5;
+/// A leap is tried only if no reattachment is due within so many longest steps.
+const WORTHWHILE_LEAP: f64 = 6.0;
+/// Part of the tolerance that one step's truncation may take.
+const TRUNCATION_SHARE: f64 = 0.1;
+/// Local time at which the frame moves, in s.
+const FRAME_SPAN: f64 = 0.0625;
+/// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
+const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
+const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
+/// Steps between two looks at the interrupt flag.
+const STEPS_PER_CHECK: u64 = 1024;
+
+/// Runs the method with this tolerance, relative to the contact reach; see [`super::simulate`].
+pub(super) fn run(
+    parameters: &Parameters,
+    tolerance: f64,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+) -> Result<Summary, SimulationError> {
+    let kernels = Kernels::available().pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
+    Run::new(parameters, tolerance, limits, kernels).to_the_end(observer)
+}
+
+/// One simulation in progress. Times and displacements are local to the frame but where said otherwise.
+struct Run<'a> {
+    limits: Limits<'a>,
+    drive: Drive,
+    mass: f64,
+    kernels: Kernels,
+    interface: Interface,
+    chain: Chain,
+    state: State,
+    series: Series,
+    leap: Leap,
+    candidates: Vec<(usize, usize)>,
+    /// Largest error left in one step and by one leap, in m.
+    truncation: f64,
+    left_out: f64,
+    /// Absolute time and displacement of the frame's origin, in s and m.
+    epoch: f64,
+    origin: f64,
+    time: f64,
+    /// Displacement of the drive's ramp at the epoch.
+    ramp_at_epoch: f64,
+    longest_step: f64,
+    typical_advance: f64,
+    next_leap: f64,
+    summary: Summary,
+}
+
+impl<'a> Run<'a> {
+    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Kernels) -> Self {
+        let drive = Drive::new(parameters);
+        let layout = Layout::new(parameters.blocks);
+        let interface = Interface::new(parameters);
+        let mass = parameters.block_mass();
+        let fastest = largest_frequency(parameters).max(drive.angular_frequency).max(parameters.damping_rate);
+        let longest_step = LONGEST_STEP / fastest;
+        let mut run = Self {
+            limits,
+            drive,
+            mass,
+            kernels,
+            chain: Chain::new(parameters, layout),
+            interface,
+            state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) },
+            series: Series::new(layout),
+            leap: Leap::new(parameters.blocks),
+            candidates: Vec::new(),
+            truncation: TRUNCATION_SHARE * tolerance * parameters.contact_reach(),
+            left_out: tolerance * parameters.contact_reach(),
+            epoch: 0.0,
+            origin: 0.0,
+            time: 0.0,
+            // The cosine is counted from its own zero, so the ramp starts Δ below.
+            ramp_at_epoch: -drive.amplitude,
+            longest_step,
+            typical_advance: longest_step,
+            next_leap: 0.0,
+            summary: Summary::default(),
+        };
+        for block in 0..parameters.blocks {
+            run.chain.update(block, &run.interface);
+        }
+        run
+    }
+
+    fn to_the_end(mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+        for event in self.interface.initial_attachments() {
+            observer.contact(&event);
+        }
+        while !observer.is_satisfied() {
+            let until_end = self.limits.end_time - self.epoch - self.time;
+            if until_end <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
+                return Ok(self.finish(false));
+            }
+            let until_attach = self.interface.next_reattachment() - self.time;
+            let horizon = until_attach.min(until_end);
+            let leapt = horizon > WORTHWHILE_LEAP * self.longest_step
+                && self.time >= self.next_leap
+                && self.try_leap(horizon, observer);
+            if !leapt {
+                self.step(horizon, observer)?;
+            }
+            if self.summary.breaks + self.summary.reattachments > self.limits.events {
+                let (time, events) = (self.epoch + self.time, self.limits.events);
+                return Err(SimulationError::EventBudget { time, events });
+            }
+            if self.time > FRAME_SPAN {
+                self.move_frame();
+            }
+            let is_check = self.summary.steps.is_multiple_of(STEPS_PER_CHECK);
+            if is_check && self.limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+                return Err(SimulationError::Interrupted { time: self.epoch + self.time });
+            }
+        }
+        Ok(self.finish(true))
+    }
+
+    fn finish(mut self, satisfied: bool) -> Summary {
+        self.summary.end_time = self.epoch + self.time;
+        self.summary.satisfied = satisfied;
+        self.summary
+    }
+
+    fn phase(&self) -> f64 {
+        self.drive.phase(self.epoch) + self.drive.angular_frequency * self.time
+    }
+
+    /// Tries a leap of at most `horizon` s; false if it is not yet allowed.
+    fn try_leap(&mut self, horizon: f64, observer: &mut dyn Observer) -> bool {
+        let drive = DriveNow {
+            stiffness: self.drive.stiffness,
+            mass: self.mass,
+            ramp: self.ramp_at_epoch + self.drive.velocity * self.time,
+            velocity: self.drive.velocity,
+            amplitude: self.drive.amplitude,
+            phase: self.phase(),
+            angular_frequency: self.drive.angular_frequency,
+        };
+        let start = self.epoch + self.time;
+        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, &mut self.state, |segment| {
+            observer.advance(&Segment { start, ..segment });
+        });
+        match attempt {
+            Attempt::Wait { seconds } => {
+                self.next_leap = self.time + seconds.max(self.longest_step);
+                false
+            }
+            Attempt::Leapt { elapsed, reached } => {
+                self.summary.steps += 1;
+                self.summary.leaps += 1;
+                self.next_leap = 0.0;
+                self.arrive(elapsed, elapsed == horizon);
+                match reached {
+                    Some(block) => self.break_block(block, observer),
+                    None => self.reattach_due(observer),
+                }
+                true
+            }
+        }
+    }
+
+    /// One Taylor step, to the first of its end, a break, and `horizon` s.
+    fn step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
+        let length = self.expand(horizon)?;
+        let end = (horizon / length).min(1.0);
+        let (s, reached) = self.first_break(end);
+        self.summary.steps += 1;
+        let coefficients = self.force_coefficients(length);
+        let duration = s * length;
+        observer.advance(&Segment {
+            start: self.epoch + self.time,
+            duration,
+            path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
+        });
+        self.kernels.evaluate(&self.series, s, length, &mut self.state);
+        let is_attachment = reached.is_none() && s == end && end < 1.0;
+        self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
+        if let Some(block) = reached {
+            self.break_block(block, observer);
+        } else if is_attachment {
+            self.reattach_due(observer);
+        }
+        self.typical_advance += 0.25 * ((if s == 1.0 { 2.0 * length } else { duration }) - self.typical_advance);
+        Ok(())
+    }
+
+    /// Expands the state into a series that reaches at least `horizon` or as far as events let it; returns its length.
+    fn expand(&mut self, horizon: f64) -> Result<f64, SimulationError> {
+        let wanted = (STEP_AHEAD * self.typical_advance).min(horizon).min(self.longest_step);
+        let mut halvings = 0;
+        let mut length = self.longest_step;
+        while halvings < MOST_HALVINGS && 0.5 * length >= wanted {
+            halvings += 1;
+            length *= 0.5;
+        }
+        loop {
+            let input = StepInput { length, error: self.truncation, drive: self.drive_series(length) };
+            if self.kernels.expand(&self.chain, &self.state, &input, &mut self.series) {
+                return Ok(length);
+            }
+            halvings += 1;
+            length *= 0.5;
+            if halvings > HOPELESS_HALVINGS {
+                return Err(SimulationError::NotFinite { time: self.epoch + self.time });
+            }
+        }
+    }
+
+    /// `K_d/m` times the scaled coefficients of the drive's displacement.
+    fn drive_series(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
+        let mut series = [0.0; MOST_COEFFICIENTS];
+        series[0] = self.ramp_at_epoch + self.drive.velocity * self.time;
+        series[1] = self.drive.velocity * length;
+        if self.drive.is_modulated() {
+            let (sine, cosine) = libm::sincos(self.phase());
+            let angle = self.drive.angular_frequency * length;
+            let mut power = self.drive.amplitude;
+            for (p, term) in series.iter_mut().enumerate() {
+                *term += power * [cosine, -sine, -cosine, sine][p % 4];
+                power *= angle / (p + 1) as f64;
+            }
+        }
+        let pulling = self.drive.stiffness / self.mass;
+        series.map(|term| pulling * term)
+    }
+
+    /// Coefficients of F_S over the step.
+    fn force_coefficients(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
+        let driven = self.drive_series(length);
+        let edge = self.series.block(0, 0);
+        let mut force = [0.0; MOST_COEFFICIENTS];
+        for p in 0..=self.series.order {
+            force[p] = self.mass * driven[p] - self.drive.stiffness * edge[p];
+        }
+        force
+    }
+
+    /// The first break in [0, `end`] of the step, and its block; ties go to the smaller block.
+    fn first_break(&mut self, end: f64) -> (f64, Option<usize>) {
+        let mut first = (end, None);
+        self.kernels.reachable(&self.chain, &self.series, &mut self.candidates);
+        for &(row, lane) in &self.candidates {
+            let block = self.chain.layout.block(row, lane);
+            let coefficients = self.series.block(row, lane);
+            let coefficients = &coefficients[..=self.series.order];
+            let mut relative = [0.0; MOST_COEFFICIENTS];
+            let relative = &mut relative[..coefficients.len()];
+            for (level, sign) in [(self.chain.upper[row][lane], 1.0), (-self.chain.lower[row][lane], -1.0)] {
+                if level == f64::INFINITY {
+                    continue;
+                }
+                for (r, c) in relative.iter_mut().zip(coefficients) {
+                    *r = sign * c;
+                }
+                relative[0] -= level;
+                if let Some(s) = first_reach(relative, first.0)
+                    && (s < first.0 || first.1.is_none_or(|earlier| block < earlier))
+                {
+                    first = (s, Some(block));
+                }
+            }
+        }
+        first
+    }
+
+    /// Moves time on, exactly to the next reattachment if that is what came.
+    fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
+        let due = self.interface.next_reattachment();
+        let reached = self.time + elapsed;
+        self.time = if at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached { due } else { reached };
+    }
+
+    /// Breaks what is reached at a block that was found at a break position.
+    fn break_block(&mut self, block: usize, observer: &mut dyn Observer) {
+        let (row, lane) = self.chain.layout.slot(block);
+        let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
+        let x = self.state.displacement[row][lane];
+        // Rounding may leave the block a hair before the position that it was found to reach.
+        let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
+        let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
+        self.interface.break_reached(block, self.time, reached, |event| {
+            summary.breaks += 1;
+            observer.contact(&absolute(event, epoch, origin));
+        });
+        self.chain.update(block, &self.interface);
+    }
+
+    /// Reattaches what is due now.
+    fn reattach_due(&mut self, observer: &mut dyn Observer) {
+        while self.interface.next_reattachment() <= self.time
+            && let Some(block) = self.interface.next_reattachment_block()
+        {
+            let (row, lane) = self.chain.layout.slot(block);
+            let event = self.interface.reattach_next(self.state.displacement[row][lane]);
+            self.summary.reattachments += 1;
+            observer.contact(&absolute(event, self.epoch, self.origin));
+            self.chain.update(block, &self.interface);
+        }
+    }
+
+    /// Moves the frame to where the slider and the clock are.
+    fn move_frame(&mut self) {
+        let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
+        let displacement = (self.state.displacement[0][0] / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
+        self.interface.shift_time(time);
+        self.interface.shift(displacement);
+        for block in 0..self.chain.layout.blocks {
+            let (row, lane) = self.chain.layout.slot(block);
+            self.state.displacement[row][lane] -= displacement;
+            self.chain.update(block, &self.interface);
+        }
+        self.ramp_at_epoch += self.drive.velocity * time - displacement;
+        self.next_leap -= time;
+        self.time -= time;
+        self.epoch += time;
+        self.origin += displacement;
+    }
+}
+
+/// An event with time and displacement counted from the start.
+fn absolute(event: ContactEvent, epoch: f64, origin: f64) -> ContactEvent {
+    ContactEvent { time: epoch + event.time, displacement: origin + event.displacement, ..event }
+}

@@ -1,0 +1,339 @@
+//! Taylor steps of the chain: x(t + s h) = Σ X_p s^p for s in [0, 1].
+//!
+//! With scaled coefficients X_p = h^p x^(p)/p! the equation of motion gives each order from the two before,
+//! X_{p+2} = [ h² (A X_p + forces) - γ h (p+1) X_{p+1} ] / ((p+1)(p+2)), one sweep of a tridiagonal stencil. Orders are
+//! added until two successive terms, times their order, fall under the wanted error. The sum of magnitudes bounds how
+//! far each block strays within the step.
+//!
+//! Every path of [`Kernels`] compiles the same plain code for another set of processor features; since nothing is fused
+//! or reassociated, all give the same bits.
+
+use super::lanes::{LANES, Layout, Row, ghost_after, ghost_before};
+use crate::model::slider::StiffnessMatrix;
+use crate::model::{Interface, Parameters};
+use crate::solver::polynomial::MOST_COEFFICIENTS;
+
+/// Largest order of a step.
+pub(super) const MOST_ORDER: usize = MOST_COEFFICIENTS - 1;
+
+/// The chain's coefficients in lanes, all divided by the block mass.
+#[derive(Clone, Debug)]
+pub(super) struct Chain {
+    pub layout: Layout,
+    mass: f64,
+    /// Diagonal of S without contacts, in N/m.
+    bare: Vec<Row>,
+    /// K_int/m, in 1/s²; 0 in padding.
+    pub coupling: Vec<Row>,
+    /// Diagonal of S/m, in 1/s².
+    pub diagonal: Vec<Row>,
+    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
+    pub pull: Vec<Row>,
+    /// Nearest break positions, in m.
+    pub upper: Vec<Row>,
+    pub lower: Vec<Row>,
+    /// Damping rate γ, in 1/s.
+    pub damping_rate: f64,
+}
+
+impl Chain {
+    /// The chain without contacts, driven at block 1.
+    pub fn new(parameters: &Parameters, layout: Layout) -> Self {
+        let mut chain = Self {
+            layout,
+            mass: parameters.block_mass(),
+            bare: layout.filled(0.0),
+            coupling: layout.filled(0.0),
+            diagonal: layout.filled(0.0),
+            pull: layout.filled(0.0),
+            upper: layout.filled(f64::INFINITY),
+            lower: layout.filled(f64::NEG_INFINITY),
+            damping_rate: parameters.damping_rate,
+        };
+        let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
+        for (block, diagonal) in bare.diagonal.iter().enumerate() {
+            let (row, lane) = layout.slot(block);
+            chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
+            chain.bare[row][lane] = *diagonal;
+        }
+        chain
+    }
+
+    /// Takes over what the contacts of a block have become.
+    pub fn update(&mut self, block: usize, interface: &Interface) {
+        let (row, lane) = self.layout.slot(block);
+        self.diagonal[row][lane] = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
+        self.pull[row][lane] = interface.block_pull[block] / self.mass;
+        self.upper[row][lane] = interface.block_upper[block];
+        self.lower[row][lane] = interface.block_lower[block];
+    }
+
+    /// The entry of a block.
+    #[inline]
+    pub fn at(&self, rows: &[Row], block: usize) -> f64 {
+        let (row, lane) = self.layout.slot(block);
+        rows[row][lane]
+    }
+}
+
+/// What a step needs to know about its length and the drive.
+#[derive(Clone, Debug)]
+pub(super) struct StepInput {
+    /// Length h, in s.
+    pub length: f64,
+    /// Wanted bound on the last terms, in m.
+    pub error: f64,
+    /// Scaled coefficients of the drive's acceleration at block 1, `K_d/m` U_p, in m/s².
+    pub drive: [f64; MOST_COEFFICIENTS],
+}
+
+/// The series of one step.
+#[derive(Clone, Debug)]
+pub(super) struct Series {
+    rows: usize,
+    /// Rows of X_0, then of X_1, and so on.
+    terms: Vec<Row>,
+    /// `Σ_{p>=1} |X_p|` per block, in m.
+    pub excursion: Vec<Row>,
+    /// Order of the last step.
+    pub order: usize,
+}
+
+impl Series {
+    pub fn new(layout: Layout) -> Self {
+        Self {
+            rows: layout.rows,
+            terms: vec![[0.0; LANES]; layout.rows * MOST_COEFFICIENTS],
+            excursion: layout.filled(0.0),
+            order: 0,
+        }
+    }
+
+    fn term(&self, order: usize) -> &[Row] {
+        &self.terms[order * self.rows..(order + 1) * self.rows]
+    }
+
+    /// The coefficients of one block.
+    pub fn block(&self, row: usize, lane: usize) -> [f64; MOST_COEFFICIENTS] {
+        let mut coefficients = [0.0; MOST_COEFFICIENTS];
+        for (p, coefficient) in coefficients.iter_mut().enumerate().take(self.order + 1) {
+            *coefficient = self.terms[p * self.rows + row][lane];
+        }
+        coefficients
+    }
+}
+
+/// Displacements and velocities in lanes.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// In m.
+    pub displacement: Vec<Row>,
+    /// In m/s.
+    pub velocity: Vec<Row>,
+}
+
+/// The hot loops, compiled for the features of one kind of processor.
+#[derive(Clone, Copy)]
+pub(super) struct Kernels {
+    expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
+    evaluate: unsafe fn(&Series, f64, f64, &mut State),
+    reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
+    /// Name of the processor features.
+    pub name: &'static str,
+}
+
+/// Compiles the loops for one set of processor features.
+macro_rules! kernels {
+    ($module:ident, $name:literal $(, $features:literal)?) => {
+        mod $module {
+            use super::{Chain, Kernels, Series, State, StepInput, evaluate, expand, reachable};
+
+            $(#[target_feature(enable = $features)])?
+            fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+                expand(chain, state, input, series)
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn evaluate_here(series: &Series, s: f64, length: f64, state: &mut State) {
+                evaluate(series, s, length, state);
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn reachable_here(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+                reachable(chain, series, blocks);
+            }
+
+            pub(super) const KERNELS: Kernels = Kernels {
+                expand: expand_here,
+                evaluate: evaluate_here,
+                reachable: reachable_here,
+                name: $name,
+            };
+        }
+    };
+}
+
+kernels!(baseline, "baseline");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2, "avx2", "avx2");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512, "avx512", "avx512f,avx512vl,avx512dq");
+
+impl Kernels {
+    /// Every path that this processor can run, the fastest last.
+    pub fn available() -> Vec<Self> {
+        let mut paths = vec![baseline::KERNELS];
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") {
+                paths.push(avx2::KERNELS);
+            }
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+            {
+                paths.push(avx512::KERNELS);
+            }
+        }
+        paths
+    }
+
+    /// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
+    #[inline]
+    pub fn expand(self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+        // SAFETY: `available` yields only paths whose features this processor has.
+        unsafe { (self.expand)(chain, state, input, series) }
+    }
+
+    /// State at s in [0, 1] of a step of so many seconds.
+    #[inline]
+    pub fn evaluate(self, series: &Series, s: f64, length: f64, state: &mut State) {
+        // SAFETY: as above.
+        unsafe { (self.evaluate)(series, s, length, state) }
+    }
+
+    /// Row and lane of every block that may reach a break position within the step.
+    #[inline]
+    pub fn reachable(self, chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+        // SAFETY: as above.
+        unsafe { (self.reachable)(chain, series, blocks) }
+    }
+}
+
+#[inline(always)]
+fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+    let rows = series.rows;
+    let h = input.length;
+    series.terms[..rows].copy_from_slice(&state.displacement[..rows]);
+    for r in 0..rows {
+        for l in 0..LANES {
+            let first = h * state.velocity[r][l];
+            series.terms[rows + r][l] = first;
+            series.excursion[r][l] = first.abs();
+        }
+    }
+    let mut small_before = false;
+    for p in 0..MOST_ORDER - 1 {
+        let next = (p + 2) as f64;
+        let largest = next_order(
+            chain,
+            &mut series.terms[p * rows..(p + 3) * rows],
+            &mut series.excursion,
+            [h * h / ((p + 1) as f64 * next), chain.damping_rate * h / next],
+            p == 0,
+            input.drive[p],
+        );
+        series.order = p + 2;
+        let small = next * largest <= input.error;
+        if small && small_before {
+            return true;
+        }
+        small_before = small;
+    }
+    false
+}
+
+/// Adds one order: `terms` holds X_p, X_{p+1} and room for X_{p+2}, whose largest magnitude is returned.
+#[inline(always)]
+fn next_order(
+    chain: &Chain,
+    terms: &mut [Row],
+    excursion: &mut [Row],
+    [for_force, for_damping]: [f64; 2],
+    with_pull: bool,
+    drive: f64,
+) -> f64 {
+    let rows = excursion.len();
+    let (x, rest) = terms.split_at_mut(rows);
+    let (rate, next) = rest.split_at_mut(rows);
+    let (coupling, diagonal, pull) = (&chain.coupling[..rows], &chain.diagonal[..rows], &chain.pull[..rows]);
+    let (rate, next) = (&rate[..rows], &mut next[..rows]);
+    let mut driven = [0.0; LANES];
+    driven[0] = drive;
+    let mut largest = [0.0; LANES];
+    let mut before = ghost_before(&x[rows - 1]);
+    for r in 0..rows {
+        let after = if r + 1 < rows { x[r + 1] } else { ghost_after(&x[0]) };
+        let here = x[r];
+        let mut row = [0.0; LANES];
+        for l in 0..LANES {
+            let mut force = coupling[r][l] * (before[l] + after[l]) - diagonal[r][l] * here[l];
+            if with_pull {
+                force += pull[r][l];
+            }
+            if r == 0 {
+                force += driven[l];
+            }
+            row[l] = for_force * force - for_damping * rate[r][l];
+        }
+        for l in 0..LANES {
+            let magnitude = row[l].abs();
+            excursion[r][l] += magnitude;
+            largest[l] = if magnitude > largest[l] { magnitude } else { largest[l] };
+        }
+        next[r] = row;
+        before = here;
+    }
+    largest.into_iter().fold(0.0, |most, magnitude| if magnitude > most { magnitude } else { most })
+}
+
+#[inline(always)]
+fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) {
+    let rows = series.rows;
+    let inverse_length = 1.0 / length;
+    for r in 0..rows {
+        let mut value = series.term(series.order)[r];
+        let mut slope = [0.0; LANES];
+        for p in (0..series.order).rev() {
+            let term = &series.terms[p * rows + r];
+            for l in 0..LANES {
+                slope[l] = slope[l] * s + value[l];
+                value[l] = value[l] * s + term[l];
+            }
+        }
+        state.displacement[r] = value;
+        for l in 0..LANES {
+            state.velocity[r][l] = slope[l] * inverse_length;
+        }
+    }
+}
+
+#[inline(always)]
+fn reachable(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+    blocks.clear();
+    for r in 0..series.rows {
+        let (x, excursion) = (&series.terms[r], &series.excursion[r]);
+        let (upper, lower) = (&chain.upper[r], &chain.lower[r]);
+        let mut any = false;
+        for l in 0..LANES {
+            any |= (x[l] + excursion[l] >= upper[l]) | (x[l] - excursion[l] <= lower[l]);
+        }
+        if any {
+            for l in 0..LANES {
+                if x[l] + excursion[l] >= upper[l] || x[l] - excursion[l] <= lower[l] {
+                    blocks.push((r, l));
+                }
+            }
+        }
+    }
+}
