@@ -9,15 +9,22 @@ use std::f64::consts::{PI, TAU};
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
 
-/// First s in [0, `end`] at which the polynomial is not below zero.
+/// First s in [0, `end`], with `end` <= 1, at which the polynomial is not below zero.
 pub(super) fn first_reach(coefficients: &[f64], end: f64) -> Option<f64> {
     if coefficients[0] >= 0.0 {
         return Some(0.0);
     }
-    // The common case in one test: it rises throughout.
-    let slope_varies: f64 = coefficients.iter().enumerate().skip(2).map(|(p, c)| p as f64 * c.abs()).sum();
-    if end <= 1.0 && coefficients[1] > slope_varies {
-        return rising_root(coefficients, 0.0, end);
+    // The common cases in one pass over the coefficients: out of reach, or monotone throughout.
+    let (mut strays, mut slope_varies) = (0.0, 0.0);
+    for (p, c) in coefficients.iter().enumerate().skip(2) {
+        strays += c.abs();
+        slope_varies += p as f64 * c.abs();
+    }
+    if coefficients[0] + coefficients[1].max(0.0) + strays < 0.0 {
+        return None;
+    }
+    if coefficients[1].abs() > slope_varies {
+        return if coefficients[1] > 0.0 { rising_root(coefficients, 0.0, end) } else { None };
     }
     first_in(coefficients, 0.0, end, DEEPEST)
 }

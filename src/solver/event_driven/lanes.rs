@@ -4,11 +4,38 @@
 //! runs in whatever vectors the processor has. Slots beyond the last block keep a coupling, a stiffness and a force of
 //! zero and stay at rest. Contract: no fused and no reassociated operations, so that results do not depend on the width.
 
+use std::ops::{Deref, DerefMut};
+
 /// Lanes of a row.
 pub(super) const LANES: usize = 8;
 
-/// One row: eight blocks that lie R apart.
-pub(super) type Row = [f64; LANES];
+/// One row: eight blocks that lie R apart, in one line of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Row(pub [f64; LANES]);
+
+impl Row {
+    /// The same value in every lane.
+    pub const fn filled(value: f64) -> Self {
+        Self([value; LANES])
+    }
+}
+
+impl Deref for Row {
+    type Target = [f64; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64; LANES] {
+        &self.0
+    }
+}
+
+impl DerefMut for Row {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64; LANES] {
+        &mut self.0
+    }
+}
 
 /// Where blocks lie.
 #[derive(Clone, Copy, Debug)]
@@ -34,18 +61,18 @@ impl Layout {
 
     /// A row for each, filled with one value.
     pub fn filled(self, value: f64) -> Vec<Row> {
-        vec![[value; LANES]; self.rows]
+        vec![Row::filled(value); self.rows]
     }
 }
 
 /// The row before the first: each lane's left neighbour is the last row of the lane before.
 #[inline(always)]
 pub(super) fn ghost_before(last: &Row) -> Row {
-    [0.0, last[0], last[1], last[2], last[3], last[4], last[5], last[6]]
+    Row([0.0, last[0], last[1], last[2], last[3], last[4], last[5], last[6]])
 }
 
 /// The row after the last: each lane's right neighbour is the first row of the lane after.
 #[inline(always)]
 pub(super) fn ghost_after(first: &Row) -> Row {
-    [first[1], first[2], first[3], first[4], first[5], first[6], first[7], 0.0]
+    Row([first[1], first[2], first[3], first[4], first[5], first[6], first[7], 0.0])
 }

@@ -91,7 +91,7 @@ pub(super) struct StepInput {
 #[derive(Clone, Debug)]
 pub(super) struct Series {
     rows: usize,
-    /// Rows of X_0, then of X_1, and so on.
+    /// Rows of X_0, then of X_1, and so on, each with a ghost row before and after.
     terms: Vec<Row>,
     /// `Σ_{p>=1} |X_p|` per block, in m.
     pub excursion: Vec<Row>,
@@ -103,21 +103,22 @@ impl Series {
     pub fn new(layout: Layout) -> Self {
         Self {
             rows: layout.rows,
-            terms: vec![[0.0; LANES]; layout.rows * MOST_COEFFICIENTS],
+            terms: vec![Row::filled(0.0); (layout.rows + 2) * MOST_COEFFICIENTS],
             excursion: layout.filled(0.0),
             order: 0,
         }
     }
 
-    fn term(&self, order: usize) -> &[Row] {
-        &self.terms[order * self.rows..(order + 1) * self.rows]
+    #[inline(always)]
+    fn term(&self, order: usize, row: usize) -> &Row {
+        &self.terms[order * (self.rows + 2) + row + 1]
     }
 
     /// The coefficients of one block.
     pub fn block(&self, row: usize, lane: usize) -> [f64; MOST_COEFFICIENTS] {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         for (p, coefficient) in coefficients.iter_mut().enumerate().take(self.order + 1) {
-            *coefficient = self.terms[p * self.rows + row][lane];
+            *coefficient = self.term(p, row)[lane];
         }
         coefficients
     }
@@ -223,78 +224,97 @@ impl Kernels {
 #[inline(always)]
 fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
     let rows = series.rows;
+    let stride = rows + 2;
     let h = input.length;
-    series.terms[..rows].copy_from_slice(&state.displacement[..rows]);
+    let (x, rest) = series.terms.split_at_mut(stride);
+    x[1..=rows].copy_from_slice(&state.displacement[..rows]);
+    close(&mut x[..stride], 0.0);
+    let rate = &mut rest[..stride];
     for r in 0..rows {
-        for l in 0..LANES {
-            let first = h * state.velocity[r][l];
-            series.terms[rows + r][l] = first;
-            series.excursion[r][l] = first.abs();
-        }
+        rate[r + 1] = Row(state.velocity[r].map(|v| h * v));
     }
-    let mut small_before = false;
+    close(rate, 0.0);
+    for r in 0..rows {
+        series.excursion[r] = Row(rate[r + 1].map(f64::abs));
+    }
     for p in 0..MOST_ORDER - 1 {
         let next = (p + 2) as f64;
-        let largest = next_order(
-            chain,
-            &mut series.terms[p * rows..(p + 3) * rows],
-            &mut series.excursion,
-            [h * h / ((p + 1) as f64 * next), chain.damping_rate * h / next],
-            p == 0,
-            input.drive[p],
-        );
-        series.order = p + 2;
-        let small = next * largest <= input.error;
-        if small && small_before {
-            return true;
+        let for_force = h * h / ((p + 1) as f64 * next);
+        let for_damping = chain.damping_rate * h / next;
+        stencil(chain, &mut series.terms[p * stride..(p + 3) * stride], for_force, for_damping);
+        let added = &mut series.terms[(p + 2) * stride..(p + 3) * stride];
+        if p == 0 {
+            for (row, pull) in added[1..=rows].iter_mut().zip(&chain.pull) {
+                for l in 0..LANES {
+                    row[l] += for_force * pull[l];
+                }
+            }
         }
-        small_before = small;
+        close(added, for_force * input.drive[p]);
+        // Two orders at a time: every second one may vanish by symmetry.
+        if p % 2 == 1 {
+            let added = &series.terms[(p + 1) * stride..(p + 3) * stride];
+            let (lower, upper) = added.split_at(stride);
+            let largest = stray(&lower[1..=rows], &upper[1..=rows], &mut series.excursion);
+            series.order = p + 2;
+            if next * largest <= input.error {
+                return true;
+            }
+        }
     }
     false
 }
 
-/// Adds one order: `terms` holds X_p, X_{p+1} and room for X_{p+2}, whose largest magnitude is returned.
+/// X_{p+2} without pull and drive, for every row: `terms` holds X_p, X_{p+1} and room for it.
 #[inline(always)]
-fn next_order(
-    chain: &Chain,
-    terms: &mut [Row],
-    excursion: &mut [Row],
-    [for_force, for_damping]: [f64; 2],
-    with_pull: bool,
-    drive: f64,
-) -> f64 {
-    let rows = excursion.len();
-    let (x, rest) = terms.split_at_mut(rows);
-    let (rate, next) = rest.split_at_mut(rows);
-    let (coupling, diagonal, pull) = (&chain.coupling[..rows], &chain.diagonal[..rows], &chain.pull[..rows]);
-    let (rate, next) = (&rate[..rows], &mut next[..rows]);
-    let mut driven = [0.0; LANES];
-    driven[0] = drive;
-    let mut largest = [0.0; LANES];
-    let mut before = ghost_before(&x[rows - 1]);
+fn stencil(chain: &Chain, terms: &mut [Row], for_force: f64, for_damping: f64) {
+    let stride = terms.len() / 3;
+    let rows = stride - 2;
+    let (x, rest) = terms.split_at_mut(stride);
+    let (rate, next) = rest.split_at_mut(stride);
+    let (coupling, diagonal) = (&chain.coupling[..rows], &chain.diagonal[..rows]);
+    let (x, rate, next) = (&x[..rows + 2], &rate[..rows + 2], &mut next[..rows + 2]);
     for r in 0..rows {
-        let after = if r + 1 < rows { x[r + 1] } else { ghost_after(&x[0]) };
-        let here = x[r];
-        let mut row = [0.0; LANES];
+        // Whole rows are read before one is written, or the loop over lanes would not run in vectors.
+        let (before, here, after, rate) = (x[r], x[r + 1], x[r + 2], rate[r + 1]);
+        let (coupling, diagonal) = (coupling[r], diagonal[r]);
+        let mut row = Row::filled(0.0);
         for l in 0..LANES {
-            let mut force = coupling[r][l] * (before[l] + after[l]) - diagonal[r][l] * here[l];
-            if with_pull {
-                force += pull[r][l];
-            }
-            if r == 0 {
-                force += driven[l];
-            }
-            row[l] = for_force * force - for_damping * rate[r][l];
+            let force = coupling[l] * (before[l] + after[l]) - diagonal[l] * here[l];
+            row[l] = for_force * force - for_damping * rate[l];
         }
-        for l in 0..LANES {
-            let magnitude = row[l].abs();
-            excursion[r][l] += magnitude;
-            largest[l] = if magnitude > largest[l] { magnitude } else { largest[l] };
-        }
-        next[r] = row;
-        before = here;
+        next[r + 1] = row;
     }
-    largest.into_iter().fold(0.0, |most, magnitude| if magnitude > most { magnitude } else { most })
+}
+
+/// Adds the drive's share to block 1 and fills the ghost rows.
+#[inline(always)]
+fn close(rows: &mut [Row], drive: f64) {
+    let last = rows.len() - 2;
+    let mut first = rows[1];
+    first[0] += drive;
+    rows[1] = first;
+    rows[0] = ghost_before(&rows[last]);
+    rows[last + 1] = ghost_after(&rows[1]);
+}
+
+/// Adds the magnitudes of two orders to the excursions and returns the largest.
+#[inline(always)]
+fn stray(lower: &[Row], upper: &[Row], excursion: &mut [Row]) -> f64 {
+    let mut largest = Row::filled(0.0);
+    for ((lower, upper), excursion) in lower.iter().zip(upper).zip(excursion) {
+        let (one, other, before, most) = (lower.map(f64::abs), upper.map(f64::abs), *excursion, largest);
+        let (mut total, mut more) = (before, most);
+        for l in 0..LANES {
+            total[l] = before[l] + (one[l] + other[l]);
+            let size = if one[l] > other[l] { one[l] } else { other[l] };
+            more[l] = if size > most[l] { size } else { most[l] };
+        }
+        (*excursion, largest) = (total, more);
+    }
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    let pairs = |l: usize| larger(largest[l], largest[l + 4]);
+    larger(larger(pairs(0), pairs(1)), larger(pairs(2), pairs(3)))
 }
 
 #[inline(always)]
@@ -302,10 +322,10 @@ fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) {
     let rows = series.rows;
     let inverse_length = 1.0 / length;
     for r in 0..rows {
-        let mut value = series.term(series.order)[r];
-        let mut slope = [0.0; LANES];
+        let mut value = *series.term(series.order, r);
+        let mut slope = Row::filled(0.0);
         for p in (0..series.order).rev() {
-            let term = &series.terms[p * rows + r];
+            let term = series.term(p, r);
             for l in 0..LANES {
                 slope[l] = slope[l] * s + value[l];
                 value[l] = value[l] * s + term[l];
@@ -322,7 +342,7 @@ fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) {
 fn reachable(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
     blocks.clear();
     for r in 0..series.rows {
-        let (x, excursion) = (&series.terms[r], &series.excursion[r]);
+        let (x, excursion) = (series.term(0, r), &series.excursion[r]);
         let (upper, lower) = (&chain.upper[r], &chain.lower[r]);
         let mut any = false;
         for l in 0..LANES {
