@@ -52,10 +52,15 @@ impl<'a> Places<'a> {
         Ok(())
     }
 
-    /// An error where a quantity is set, or at the head of the file.
+    /// An error where a quantity is set, or the one that bounds it, or at the head of the file.
     fn error(&self, quantity: Quantity, problem: String) -> SweepError {
-        let place = self.set.iter().find(|place| place.quantity == quantity);
-        self.source.error(place.map_or(0, |place| place.at), problem)
+        let bound = match quantity {
+            Quantity::Parameter(Symbol::Dfs) => Quantity::Parameter(Symbol::Fs),
+            Quantity::Parameter(Symbol::Ns) => Quantity::Parameter(Symbol::N),
+            other => other,
+        };
+        let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
+        self.source.error(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
     }
 }
 

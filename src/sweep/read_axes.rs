@@ -85,7 +85,7 @@ fn read_single(entry: &Entry<'_>) -> Result<PlacedAxis, SweepError> {
             Axis::table(vec![Column { quantity, values: values.clone() }]).map_err(|Repeated { earlier, later }| {
                 let (key, value) = (entry.key, values[later]);
                 let problem = format!(
-                    "{key} = {value}: repeats value {} of this axis as value {} (or too closely to tell them apart); \
+                    "{key} = {value}: repeats value {} of this axis, or nearly, as value {}; \
                      keep one, or take fewer points",
                     earlier + 1,
                     later + 1

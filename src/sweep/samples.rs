@@ -120,7 +120,13 @@ mod tests {
     #[test]
     fn samples_are_pinned() {
         // Known answers: points of a sample are parameters of jobs, and so part of every id.
-        assert_eq!(Sample::Sobol.coordinates(1, 3, 7), [0.592596173286438, 0.19461846351623535, 0.3650003671646118]);
-        assert_eq!(Sample::Latin.coordinates(1, 3, 7), [0.035778330406174064, 0.6696838034161677, 0.6556236608885229]);
+        assert_eq!(
+            Sample::Sobol.coordinates(1, 3, 7),
+            [0.592_596_173_286_438, 0.194_618_463_516_235_35, 0.365_000_367_164_611_8]
+        );
+        assert_eq!(
+            Sample::Latin.coordinates(1, 3, 7),
+            [0.035_778_330_406_174_064, 0.669_683_803_416_167_7, 0.655_623_660_888_522_9]
+        );
     }
 }

@@ -59,9 +59,13 @@ impl<'a> Source<'a> {
             let span = error.span().unwrap_or(self.text.len()..self.text.len());
             // The end of the file lies on its last line, not below it.
             let at = span.start.min(self.text.trim_end().len());
-            let found = self.excerpt(span);
-            let found = if found.is_empty() { String::new() } else { format!("{found}: ") };
-            self.error(at, format!("{found}{}; the file must be TOML 1.0", error.message()))
+            let written = match self.excerpt(span) {
+                nothing if nothing.is_empty() => {
+                    self.text.lines().nth(self.line(at) - 1).unwrap_or_default().to_owned()
+                }
+                written => written,
+            };
+            self.error(at, format!("{written}: {}; the file must be TOML 1.0", error.message()))
         })
     }
 

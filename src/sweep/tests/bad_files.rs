@@ -28,7 +28,7 @@ fn what_is_no_toml_is_refused_with_its_line() {
         ("name = \"a\"\n\n[model]\nN = ", 4, &["TOML"]),
         ("name = \"a\"\n[model]\nN = 3\nN = 4", 4, &["N: ", "duplicate key"]),
         ("name = \"a\"\n[model]\n[axes]\n[model]", 4, &["model", "duplicate key"]),
-        ("name = \"a\"\n[model]\nV0 = 1e", 3, &["TOML"]),
+        ("name = \"a\"\n[model]\nV0 = 1e", 3, &["V0 = 1e", "exponent", "TOML"]),
         ("name = \"a\"\r\n[model]\r\nV0 = 'x", 3, &["TOML"]),
     ]);
 }
@@ -120,6 +120,7 @@ fn what_contradicts_itself_or_has_no_effect_is_refused_with_the_other_place() {
         ("name = \"a\"\n[axes]\nDelta = [1]\neta = [1, 1.00000000000001]", 4, &["eta", "repeats value 1"]),
         ("name = \"a\"\n[model]\ndfs = 2", 3, &["dfs = 2", "dfs <= fs"]),
         ("name = \"a\"\n[model]\ndfs = 1\n[axes]\nfs = [2, 0.5]", 3, &["dfs = 1", "at the point fs = 0.5", "where"]),
+        ("name = \"a\"\n[axes]\nV0 = [1]\nfs = [1, 1e-3]", 4, &["dfs = 0.0069", "fs = 0.001"]),
         ("name = \"a\"\n[axes]\nN = [100, 10000]\nNs = [10, 10000]", 4, &["Ns = 10000", "N = 10000"]),
         ("name = \"a\"\n[axes]\nDelta = [1]\nV0 = [1e-200]\neta = [1]", 5, &["eta", "between 1e-100 and 1e100"]),
         ("name = \"a\"\nwhere = \"V0 > 1\"\n[axes]\nN = [1, 2]", 2, &["drops every point"]),
