@@ -17,6 +17,13 @@ const STEP_OF_A_BLOCK: f64 = 2.5e-9;
 /// CPU time of one fixed step beside its blocks, in s: the drive, the observer, the queue of reattachments.
 const STEP_OVERHEAD: f64 = 60e-9;
 
+/// Steps of the event-driven solver for each contact and slip: it breaks and reattaches about twice, and the motion after
+/// slips and precursors is resolved.
+const EVENT_STEPS_OF_A_CONTACT: f64 = 8.0;
+/// CPU time of one event-driven step on one block, and beside its blocks, in s.
+const EVENT_STEP_OF_A_BLOCK: f64 = 4e-9;
+const EVENT_STEP_OVERHEAD: f64 = 150e-9;
+
 /// Predicted interval between slips, in s: the time to load `LOADED_SHARE` of the strength, and one reattachment.
 #[must_use]
 pub fn predicted_interval(parameters: &Parameters) -> f64 {
@@ -35,6 +42,11 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
     let slips = recording.slips as f64 + recording.discard as f64;
     let time = (slips * predicted_interval(parameters)).min(recording.max_time.unwrap_or(f64::INFINITY));
     match solver {
+        Solver::EventDriven { .. } => {
+            let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
+            let steps = time / predicted_interval(parameters) * contacts * EVENT_STEPS_OF_A_CONTACT;
+            steps * (EVENT_STEP_OVERHEAD + EVENT_STEP_OF_A_BLOCK * parameters.blocks as f64)
+        }
         Solver::FixedStep { time_step } => {
             time / time_step * (STEP_OVERHEAD + STEP_OF_A_BLOCK * parameters.blocks as f64)
         }

@@ -12,7 +12,7 @@ use super::read_axes;
 use super::source::{Entry, Section, Source, SweepError, nearest};
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
-use crate::solver::Solver;
+use crate::solver::{Solver, TOLERANCES};
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
@@ -20,7 +20,7 @@ const LONGEST_NAME: usize = 100;
 /// Largest count in `[record]`: what a double, and so every reader of a table, holds exactly.
 const MOST_COUNT: u64 = (1 << 53) - 1;
 /// Solvers by name; the first is meant where none is named.
-const METHODS: [(&str, SolverReader); 1] = [("fixed-step", read_fixed_step)];
+const METHODS: [(&str, SolverReader); 2] = [("event-driven", read_event_driven), ("fixed-step", read_fixed_step)];
 
 type SolverReader = fn(&Section<'_>) -> Result<Solver, SweepError>;
 
@@ -133,6 +133,21 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, SweepError> {
         Some((_, read)) => read(solver),
         None => Err(entry.refuse(format!("unknown method; {}", nearest(method, &names)))),
     }
+}
+
+fn read_event_driven(solver: &Section<'_>) -> Result<Solver, SweepError> {
+    solver.only(&["method", "tolerance"])?;
+    let tolerance = match solver.entry("tolerance") {
+        None => return Ok(Solver::default()),
+        Some(entry) => match entry.number() {
+            Some(crate::model::Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => tolerance,
+            _ => {
+                let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
+                return Err(entry.must_be(&format!("a number from {least:e} to {most:e}, relative to fs/k")));
+            }
+        },
+    };
+    Ok(Solver::EventDriven { tolerance })
 }
 
 fn read_fixed_step(solver: &Section<'_>) -> Result<Solver, SweepError> {

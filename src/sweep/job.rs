@@ -66,6 +66,9 @@ impl fmt::Display for SetId {
 pub(super) fn settings(solver: Solver, recording: &Recording) -> Vec<(&'static str, String)> {
     let none = || "none".to_owned();
     let mut settings = match solver {
+        Solver::EventDriven { tolerance } => {
+            vec![("solver.method", "event-driven".to_owned()), ("solver.tolerance", Shortest(tolerance).to_string())]
+        }
         Solver::FixedStep { time_step } => {
             vec![("solver.method", "fixed-step".to_owned()), ("solver.dt", Shortest(time_step).to_string())]
         }

@@ -66,9 +66,9 @@ fn safeguarded_newton(mut low: f64, mut high: f64, function: impl Fn(f64) -> (f6
     loop {
         let (height, slope) = function(s);
         if height >= 0.0 {
-            high = s
+            high = s;
         } else {
-            low = s
+            low = s;
         }
         let newton = s - height / slope;
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
