@@ -51,7 +51,8 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
         ("name = \"a\"\n[record]\nslip = 3", 3, &["slip = 3", "did you mean slips?"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"", 2, &["dt is missing", "dt = 1e-6"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed\"\ndt = 1", 3, &["\"fixed\"", "fixed-step"]),
-        ("name = \"a\"\n[solver]\ntolerance = 1", 3, &["tolerance = 1", "allowed are method, dt"]),
+        ("name = \"a\"\n[solver]\ndt = 1e-6", 3, &["dt = 1e-6", "allowed are method, tolerance"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ntolerance = 1", 4, &["tolerance = 1", "method, dt"]),
         ("name = \"a\"\n[axes.sobol]\nV0 = { log = [1, 2] }", 2, &["points is missing", "[axes.sobol]"]),
         ("name = \"a\"\n[axes.sobol]\npoints = 4\nseeds = 1", 4, &["seeds = 1", "did you mean seed?"]),
     ]);
@@ -102,7 +103,9 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
         ("name = \"a\"\n[record]\nslips = 0", 3, &["slips = 0", "a whole number from 1"]),
         ("name = \"a\"\n[record]\nmax_time = -1", 3, &["max_time = -1", "finite number > 0, in s"]),
         ("name = \"a\"\n[record]\nprecursors = 1", 3, &["precursors = 1", "true or false"]),
-        ("name = \"a\"\n[solver]\ndt = 0", 3, &["dt = 0", "in s"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ndt = 0", 4, &["dt = 0", "in s"]),
+        ("name = \"a\"\n[solver]\ntolerance = 1", 3, &["tolerance = 1", "from 1e-12 to 1e-2"]),
+        ("name = \"a\"\n[solver]\ntolerance = 0.5", 3, &["tolerance = 0.5", "relative to fs/k"]),
     ]);
 }
 

@@ -115,7 +115,8 @@ fn differences_are_told_but_for_axes_and_conditions() {
     let before = sweep("[model]\nK = 1e8\n[axes]\nV0 = [1e-4]");
     let same = sweep("where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]");
     assert_eq!(before.difference(&same), []);
-    let other = sweep("name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\n[solver]\ndt = 1e-7");
+    let other =
+        sweep("name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\n[solver]\ntolerance = 1e-7");
     let told: Vec<String> = before.difference(&other).iter().map(ToString::to_string).collect();
     assert_eq!(
         told,
@@ -124,7 +125,7 @@ fn differences_are_told_but_for_axes_and_conditions() {
             "model.K: 1e8 -> 2e8",
             "model.Delta: 0 -> 1",
             "model.T: none -> 2",
-            "solver.dt: 1e-6 -> 1e-7",
+            "solver.tolerance: 1e-6 -> 1e-7",
             "record.max_time: none -> 1",
         ]
     );
@@ -133,7 +134,9 @@ fn differences_are_told_but_for_axes_and_conditions() {
 #[test]
 fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
     // 0.6 s each: nine reach 5 s.
-    let dear = [sweep("[record]\nmax_time = 2.5e-6\n[solver]\ndt = 1e-12\n[axes]\nseed = { count = 20 }")];
+    let dear = [sweep(
+        "[record]\nmax_time = 2.5e-6\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = { count = 20 }",
+    )];
     let sizes: Vec<usize> = Plan::new(&dear).parts().map(|part| part.jobs.len()).collect();
     assert_eq!(sizes, [9, 9, 2]);
     let cheap = [sweep("[record]\nmax_time = 1e-9\n[axes]\nseed = { count = 10_000 }")];
