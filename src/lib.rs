@@ -26,3 +26,4 @@ pub mod model;
 pub mod observe;
 pub mod solver;
 pub mod store;
+pub mod sweep;
