@@ -24,5 +24,7 @@
 
 pub mod model;
 pub mod observe;
+pub mod run;
 pub mod solver;
+pub mod store;
 pub mod sweep;
