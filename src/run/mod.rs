@@ -18,7 +18,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use kernel::{Kernel, kernel};
+pub use kernel::{Kernel, kernel, limits};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Status, status};

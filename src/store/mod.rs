@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! columns.rs -> tables.rs     what is written: each column described once
+//!               records.rs    what one simulation writes on request
 //! dataset.rs                  one table as files: same rows, same bytes
 //! storage.rs -> commit.rs     files that appear whole or not at all
 //! layout.rs, manifest.rs      a directory, and which sweeps it belongs to
@@ -14,5 +15,6 @@ pub mod dataset;
 pub mod layout;
 pub mod manifest;
 pub mod part;
+pub mod records;
 pub mod storage;
 pub mod tables;

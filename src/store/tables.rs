@@ -6,6 +6,7 @@ use crate::model::{Parameters, Symbol};
 use crate::observe::{Precursor, Slip};
 use crate::solver::Summary;
 use crate::store::columns::{Column, Getter, Table};
+use crate::store::records;
 
 /// Outcome of a job that recorded all its slips.
 pub const DONE: &str = "done";
@@ -272,14 +273,22 @@ pub fn jobs<'a>() -> Table<JobRow<'a>> {
             "steps of the solver",
             OptionalCount(|row| row.measured(|result| result.record.summary.steps)),
         ),
+        Column::new(
+            "leaps",
+            "",
+            "of these, leaps over quiet time",
+            OptionalCount(|row| row.measured(|result| result.record.summary.leaps)),
+        ),
     ]);
     Table { name: "jobs", meaning: "One row per job", columns }
 }
 
-/// All tables of a sweep in Markdown, one section each.
+/// All tables of a sweep, and those of one simulation, in Markdown, one section each.
 #[must_use]
 pub fn markdown() -> String {
-    [slips().markdown(), precursors().markdown(), jobs().markdown()].join("\n")
+    let sweep = [slips().markdown(), precursors().markdown(), jobs().markdown()];
+    let records = [records::trace().markdown(), records::map().markdown(), records::contacts().markdown()];
+    [sweep, records].concat().join("\n")
 }
 
 #[cfg(test)]
