@@ -25,3 +25,4 @@
 pub mod model;
 pub mod observe;
 pub mod solver;
+pub mod store;
