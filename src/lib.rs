@@ -24,5 +24,6 @@
 
 pub mod model;
 pub mod observe;
+pub mod reduce;
 pub mod solver;
 pub mod store;

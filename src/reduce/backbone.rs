@@ -4,13 +4,14 @@ use super::circular::Directions;
 use super::{PhaseLimits, SetRow};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::store::columns::{Column, Getter, Table};
+use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Bins per decade. Their edges are 10^(k/4), so that one lies on η = 1, where locking begins.
 pub const BINS_PER_DECADE: i32 = 4;
 
 /// A bin of η that holds at least one slip. `None` where there is nothing to average.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "each is described in `backbone`, the table of these rows")]
 pub struct BackboneBin {
     pub eta_low: f64,

@@ -6,12 +6,15 @@ pub mod circular;
 mod histogram;
 mod moments;
 mod point;
+mod reduction;
+mod rows;
 mod set;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
 pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
 pub use moments::{Moments, quantile};
 pub use point::{MOST_POINTS, Point, points};
+pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
 pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow, sets};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
