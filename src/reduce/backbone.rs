@@ -1,7 +1,8 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
+use super::PhaseLimits;
 use super::circular::Directions;
-use super::{PhaseLimits, SetRow};
+use super::set::FinishedSet;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::store::columns::{Column, Getter, Table};
 use serde::Serialize;
@@ -29,7 +30,7 @@ pub struct BackboneBin {
     pub asymptote: f64,
 }
 
-/// Gathers the slips and sets of each bin.
+/// Pools the sets of each bin.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Backbone {
     bins: BTreeMap<i32, Bin>,
@@ -62,19 +63,14 @@ fn bin_of(eta: f64) -> i32 {
 }
 
 impl Backbone {
-    /// Adds the phase of a slip of a set with this η > 0.
-    pub(super) fn push_slip(&mut self, eta: f64, phase: f64, limits: &PhaseLimits) {
-        let bin = self.bins.entry(bin_of(eta)).or_default();
-        bin.phases.push(phase);
-        bin.below += u64::from(limits.is_below(phase));
-    }
-
-    /// Adds a set whose slips are all there.
-    pub(super) fn push_set(&mut self, set: &SetRow) {
-        let Some(phase) = set.phase_mean else { return };
-        let bin = self.bins.entry(bin_of(set.eta)).or_default();
+    /// Adds a set; one without modulation has no phase and is left out.
+    pub(super) fn push(&mut self, set: &FinishedSet) {
+        let Some(phase) = set.row.phase_mean else { return };
+        let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        if set.is_locked {
+        bin.phases.add(&set.phases);
+        bin.below += set.below;
+        if set.row.is_locked {
             bin.locked.push(phase);
         }
     }
@@ -159,26 +155,16 @@ mod tests {
     #[test]
     fn blue_dots_average_locked_sets_and_each_set_counts_once() {
         let mut backbone = Backbone::default();
-        // Both in the bin 5.6 to 10; the second has more slips.
-        for (period, phase, slips) in [(0.01, -1.0, 20), (0.009, -0.6, 60)] {
+        let mut push = |period: f64, phases: &[f64]| {
             let jobs = jobs(1e-6, period);
-            let (eta, limits) = (jobs.parameters.eta(), PhaseLimits::at(jobs.parameters.eta()));
-            let mut set = SetSlips::default();
-            for _ in 0..slips {
-                set.push(&slip(None, Some(phase)), &limits);
-                backbone.push_slip(eta, phase, &limits);
-            }
-            backbone.push_set(&set.finish(jobs).1);
-        }
-        // Of the same bin, but all over the circle.
-        let jobs = jobs(1e-6, 0.0095);
-        let (eta, limits) = (jobs.parameters.eta(), PhaseLimits::at(jobs.parameters.eta()));
-        let mut set = SetSlips::default();
-        for phase in [-4.0, -2.0, 0.0, 2.0] {
-            set.push(&slip(None, Some(phase)), &limits);
-            backbone.push_slip(eta, phase, &limits);
-        }
-        backbone.push_set(&set.finish(jobs).1);
+            let (limits, mut set) = (PhaseLimits::at(jobs.parameters.eta()), SetSlips::default());
+            phases.iter().for_each(|&phase| set.push(&slip(None, Some(phase)), &limits));
+            backbone.push(&set.finish(jobs));
+        };
+        // All in the bin 5.6 to 10; the third is all over the circle.
+        push(0.01, &[-1.0; 20]);
+        push(0.009, &[-0.6; 60]);
+        push(0.0095, &[-4.0, -2.0, 0.0, 2.0]);
         let bins = backbone.finish();
         assert_eq!(bins.len(), 1);
         assert_eq!((bins[0].sets, bins[0].locked_sets, bins[0].slips), (3, 2, 84));

@@ -25,6 +25,13 @@ impl Directions {
         self.count += 1;
     }
 
+    /// Adds all angles of another sum.
+    pub fn add(&mut self, other: &Self) {
+        self.cosines += other.cosines;
+        self.sines += other.sines;
+        self.count += other.count;
+    }
+
     /// Number of angles.
     #[must_use]
     pub const fn count(&self) -> u64 {

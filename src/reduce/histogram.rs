@@ -73,12 +73,12 @@ mod tests {
         for step in 0..500_u32 {
             set.push(&slip(Some(0.1 + 0.001 * f64::from(step % 37)), None), &PhaseLimits::at(0.0));
         }
-        let (sorted, row) = set.finish(jobs(0.0, 1.0));
-        let bins = histogram(&row, &sorted);
+        let set = set.finish(jobs(0.0, 1.0));
+        let bins = histogram(&set.row, &set.intervals);
         assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 500);
         let integral: f64 = bins.iter().map(|bin| bin.density * (bin.high - bin.low)).sum();
         assert!((integral - 1.0).abs() < 1e-12);
         assert!(bins.windows(2).all(|pair| pair[0].high <= pair[1].low * (1.0 + 1e-12)));
-        assert!(histogram(&row, &[]).is_empty());
+        assert!(histogram(&set.row, &[]).is_empty());
     }
 }

@@ -104,17 +104,20 @@ fn reduce_by(
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
     for chunk in chunks(all_jobs, most_slips) {
-        let gathered = gather(storage, &slip_files, chunk, spacing(total), &mut pooled)?;
+        let gathered = gather(storage, &slip_files, chunk, spacing(total))?;
         for (jobs, slips, set_points) in gathered {
-            let (sorted, row) = slips.finish(jobs);
-            set_writer.push(&row)?;
-            for bin in histogram(&row, &sorted) {
+            let set = slips.finish(jobs);
+            let row = &set.row;
+            set_writer.push(row)?;
+            for bin in histogram(row, &set.intervals) {
                 histogram_writer.push(&bin)?;
             }
-            pooled.push_set(&row);
+            pooled.push(&set);
             summary.slips += row.slips;
             summary.locked_sets += u64::from(row.is_locked);
-            kept.extend(set_points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })));
+            kept.extend(
+                set_points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })),
+            );
         }
     }
     kept.sort_by_key(|(place, _)| *place);
@@ -201,13 +204,11 @@ fn gather(
     slip_files: &[PathBuf],
     sets: Vec<SetJobs>,
     spacing: u64,
-    pooled: &mut Backbone,
 ) -> Result<Vec<Gathered>, ReduceError> {
     let index: HashMap<String, usize> =
         sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
     let limits: Vec<PhaseLimits> = sets.iter().map(|set| PhaseLimits::at(set.parameters.eta())).collect();
-    let mut gathered: Vec<Gathered> =
-        sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
+    let mut gathered: Vec<Gathered> = sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
     let mut place = 0;
     for batch in Reader::new(storage, slip_files.to_vec(), Some(&SLIP_COLUMNS)) {
         for_each_slip(&batch?, |set_id, slip| {
@@ -218,9 +219,6 @@ fn gather(
             let parameters = &set.parameters;
             let eta = parameters.eta();
             slips.push(slip, &limits[index]);
-            if let Some(phase) = slip.phase {
-                pooled.push_slip(eta, phase, &limits[index]);
-            }
             if here % spacing == 0 {
                 let point = Point {
                     drive_velocity: parameters.drive_velocity,
@@ -301,8 +299,7 @@ mod tests {
             let path = layout.table("slips").join(&name);
             let mut slip_writer =
                 TableWriter::create(&Disk, &path, crate::store::tables::slips(), &Footer::default()).unwrap();
-            let labels: Vec<JobLabel> =
-                (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
+            let labels: Vec<JobLabel> = (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
             let results: Vec<JobResult> = labels.iter().map(|label| job_result(label, slips)).collect();
             for (job, result) in labels.iter().zip(&results) {
                 result.slips.iter().for_each(|slip| slip_writer.push(&SlipRow { job, slip }).unwrap());

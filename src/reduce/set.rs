@@ -47,8 +47,8 @@ impl SetSlips {
         self.slow_front_speed.extend(slip.slow_front_speed);
     }
 
-    /// Sorted intervals and the statistics of the set.
-    pub(super) fn finish(mut self, jobs: SetJobs) -> (Vec<f64>, SetRow) {
+    /// The statistics of the set.
+    pub(super) fn finish(mut self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
         let period = jobs.parameters.modulation_period;
@@ -88,8 +88,21 @@ impl SetSlips {
             slow_front_speed_mean: self.slow_front_speed.mean(),
             jobs,
         };
-        (self.intervals, row)
+        FinishedSet { row, intervals: self.intervals, phases: self.phases, below: self.below }
     }
+}
+
+/// A set whose slips are all there.
+#[derive(Clone, Debug)]
+pub(super) struct FinishedSet {
+    /// Its statistics.
+    pub(super) row: SetRow,
+    /// Its intervals in s, sorted.
+    pub(super) intervals: Vec<f64>,
+    /// Its phases.
+    pub(super) phases: Directions,
+    /// Slips under the back-bone.
+    pub(super) below: u64,
 }
 
 /// What the jobs table tells about a set.
@@ -252,7 +265,7 @@ pub(super) mod tests {
         let limits = PhaseLimits::at(jobs.parameters.eta());
         let mut set = SetSlips::default();
         slips.into_iter().for_each(|slip| set.push(&slip, &limits));
-        set.finish(jobs).1
+        set.finish(jobs).row
     }
 
     #[test]
