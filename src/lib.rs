@@ -26,5 +26,7 @@ pub mod figure;
 pub mod model;
 pub mod observe;
 pub mod reduce;
+pub mod run;
 pub mod solver;
 pub mod store;
+pub mod sweep;

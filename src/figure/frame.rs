@@ -11,6 +11,12 @@ pub(super) const LABEL_TEXT: u32 = 19;
 pub(super) const LEGEND_TEXT: u32 = 15;
 /// Mean width of a letter over the size of the text.
 const LETTER: f64 = 0.6;
+/// Distance of the rows of a legend.
+const LEGEND_ROW: f64 = 22.0;
+/// Between a legend's border and its entries.
+const PADDING: f64 = 8.0;
+/// Between a frame and a legend in it.
+const INSET: f64 = 14.0;
 const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;
@@ -141,12 +147,9 @@ impl Frame {
     /// A legend.
     pub(super) fn legend(&self, sheet: &mut Sheet, place: LegendPlace, entries: &[(Mark, String)]) {
         const MARK: f64 = 34.0;
-        const PADDING: f64 = 8.0;
-        const INSET: f64 = 14.0;
         let size = f64::from(LEGEND_TEXT);
-        let row = 1.45 * size;
         let letters = entries.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0) as f64;
-        let (width, height) = (MARK + letters * LETTER * size + 2.0 * PADDING, entries.len() as f64 * row + PADDING);
+        let (width, height) = (MARK + letters * LETTER * size + 2.0 * PADDING, entries.len() as f64 * LEGEND_ROW + PADDING);
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let (left, top) = match place {
             LegendPlace::UpperRight => (right - INSET - width, self.top + INSET),
@@ -155,7 +158,7 @@ impl Frame {
         };
         sheet.rectangle((left, top), (width, height), "#ffffff", 0.85);
         for (index, (mark, text)) in entries.iter().enumerate() {
-            let middle = top + 0.5 * PADDING + (index as f64 + 0.5) * row;
+            let middle = top + 0.5 * PADDING + (index as f64 + 0.5) * LEGEND_ROW;
             let (start, end) = (left + PADDING, left + MARK);
             match *mark {
                 Mark::Dot(dot) => {
@@ -171,6 +174,11 @@ impl Frame {
             sheet.text((left + MARK + PADDING, middle + 0.36 * size), text, LEGEND_TEXT, Anchor::Start);
         }
     }
+}
+
+/// Space that a legend of so many entries takes at the top or bottom of a frame.
+pub(super) fn legend_space(entries: usize) -> f64 {
+    INSET + entries as f64 * LEGEND_ROW + PADDING
 }
 
 fn major(axis: &Axis) -> Vec<f64> {

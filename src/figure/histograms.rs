@@ -2,11 +2,11 @@
 
 use super::FigureError;
 use super::axis::{Axis, bounds};
-use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, RIGHT, UNDER};
+use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, RIGHT, UNDER, legend_space};
 use super::picture::{BLACK, Ink, LIGHT_GREY, Picture, RED, Sheet, Stroke};
 
 const WIDTH: f64 = 660.0;
-const PANEL_HEIGHT: f64 = 150.0;
+const PANEL_HEIGHT: f64 = 160.0;
 const GAP: f64 = 12.0;
 /// Panels that fit a page.
 pub const MOST_PANELS: usize = 4;
@@ -51,14 +51,15 @@ pub fn histograms(panels: &[HistogramPanel]) -> Result<Picture, FigureError> {
     let margin = 0.04 * (high - low);
     for (index, panel) in panels.iter().enumerate() {
         let highest = all_bars(panel).iter().map(|bar| bar.2).fold(0.0, f64::max);
+        let rows = 1 + usize::from(panel.overlay.is_some());
         let frame = Frame {
             left: LEFT,
             top: ABOVE + index as f64 * (PANEL_HEIGHT + GAP),
             width: WIDTH - LEFT - RIGHT,
             height: PANEL_HEIGHT,
             x: Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin),
-            // Room for the legend.
-            y: Axis::few("Probability density (1/s)", 0.0, 1.3 * highest),
+            // The legend covers no bar.
+            y: Axis::few("Probability density (1/s)", 0.0, highest * PANEL_HEIGHT / (PANEL_HEIGHT - legend_space(rows))),
         };
         draw(&mut sheet, &frame, panel);
         let is_last = index + 1 == panels.len();

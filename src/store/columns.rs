@@ -329,7 +329,9 @@ mod tests {
     #[test]
     fn rows_become_columns_of_the_described_types_with_nulls_where_a_value_is_missing() {
         let (table, mut buffer) = (table(), table().buffer());
-        rows().iter().for_each(|row| table.push(&mut buffer, row));
+        for row in &rows() {
+            table.push(&mut buffer, row);
+        }
         assert_eq!(buffer.len(), 2);
         let batch = buffer.take().unwrap();
         let expected: Vec<ArrayRef> = vec![
@@ -348,7 +350,9 @@ mod tests {
     #[test]
     fn copied_rows_equal_pushed_rows() {
         let (table, mut pushed, mut copied) = (table(), table().buffer(), table().buffer());
-        rows().iter().for_each(|row| table.push(&mut pushed, row));
+        for row in &rows() {
+            table.push(&mut pushed, row);
+        }
         let batch = pushed.take().unwrap();
         copied.copy(&batch, 0..1).unwrap();
         copied.copy(&batch, 1..2).unwrap();
