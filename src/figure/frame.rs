@@ -149,7 +149,8 @@ impl Frame {
         const MARK: f64 = 34.0;
         let size = f64::from(LEGEND_TEXT);
         let letters = entries.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0) as f64;
-        let (width, height) = (MARK + letters * LETTER * size + 2.0 * PADDING, entries.len() as f64 * LEGEND_ROW + PADDING);
+        let (width, height) =
+            (MARK + letters * LETTER * size + 2.0 * PADDING, entries.len() as f64 * LEGEND_ROW + PADDING);
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let (left, top) = match place {
             LegendPlace::UpperRight => (right - INSET - width, self.top + INSET),

@@ -59,7 +59,11 @@ pub fn histograms(panels: &[HistogramPanel]) -> Result<Picture, FigureError> {
             height: PANEL_HEIGHT,
             x: Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin),
             // The legend covers no bar.
-            y: Axis::few("Probability density (1/s)", 0.0, highest * PANEL_HEIGHT / (PANEL_HEIGHT - legend_space(rows))),
+            y: Axis::few(
+                "Probability density (1/s)",
+                0.0,
+                highest * PANEL_HEIGHT / (PANEL_HEIGHT - legend_space(rows)),
+            ),
         };
         draw(&mut sheet, &frame, panel);
         let is_last = index + 1 == panels.len();

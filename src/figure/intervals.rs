@@ -90,7 +90,7 @@ mod tests {
             drive_velocity: 1e-4,
             amplitude: 1e-6,
             period: Some(0.01),
-            eta: 6.28,
+            eta: 20.0,
             interval: Some(n as f64 * 0.01),
             periods: Some(n),
             phase: Some(-0.5),

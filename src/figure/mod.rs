@@ -2,6 +2,7 @@
 
 mod axis;
 mod backbone;
+mod draw;
 mod frame;
 mod histograms;
 mod intervals;
@@ -10,11 +11,15 @@ mod simulation;
 mod work_precision;
 
 pub use backbone::backbone;
+pub use draw::draw_all;
 pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
 pub use intervals::intervals;
 pub use picture::Picture;
 pub use simulation::{AttachedMap, simulation};
 pub use work_precision::{WorkPrecision, work_precision};
+
+use crate::store::dataset::DatasetError;
+use crate::store::storage::StorageError;
 
 /// A figure that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -35,4 +40,10 @@ pub enum FigureError {
         /// The reason.
         reason: String,
     },
+    /// The reduced data cannot be read.
+    #[error("{0}; if it is missing or damaged, reduce the tables again")]
+    Reduced(#[from] DatasetError),
+    /// A figure cannot be put in its place.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
 }

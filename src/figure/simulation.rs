@@ -14,6 +14,7 @@ const MAP_HEIGHT: f64 = 260.0;
 const GAP: f64 = 52.0;
 /// Right of the frames, for the colour bar and its numbers.
 const BESIDE: f64 = 92.0;
+const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 /// A PNG has two pixels per unit; more columns would not be seen.
 const COLUMNS_PER_UNIT: f64 = 1.0;
@@ -65,7 +66,6 @@ pub fn simulation(trace: &[(f64, f64)], map: Option<AttachedMap<'_>>) -> Result<
         return Ok(sheet.finish());
     };
 
-    const MILLIMETRES: f64 = 1e3;
     let below = Frame {
         top: ABOVE + TRACE_HEIGHT + GAP,
         height: MAP_HEIGHT,

@@ -158,7 +158,9 @@ mod tests {
         let mut push = |period: f64, phases: &[f64]| {
             let jobs = jobs(1e-6, period);
             let (limits, mut set) = (PhaseLimits::at(jobs.parameters.eta()), SetSlips::default());
-            phases.iter().for_each(|&phase| set.push(&slip(None, Some(phase)), &limits));
+            for &phase in phases {
+                set.push(&slip(None, Some(phase)), &limits);
+            }
             backbone.push(&set.finish(jobs));
         };
         // All in the bin 5.6 to 10; the third is all over the circle.

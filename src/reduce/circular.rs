@@ -160,7 +160,9 @@ mod tests {
 
     fn of(angles: &[f64]) -> Directions {
         let mut directions = Directions::default();
-        angles.iter().for_each(|&angle| directions.push(angle));
+        for &angle in angles {
+            directions.push(angle);
+        }
         directions
     }
 

@@ -21,11 +21,11 @@ pub(super) const SLIP_COLUMNS: [&str; 10] = [
     "slow_front_speed",
 ];
 
-fn real(array: &Float64Array, row: usize) -> Option<f64> {
+pub(super) fn real(array: &Float64Array, row: usize) -> Option<f64> {
     array.is_valid(row).then(|| array.value(row))
 }
 
-fn count(array: &Int64Array, row: usize) -> Option<u64> {
+pub(super) fn count(array: &Int64Array, row: usize) -> Option<u64> {
     array.is_valid(row).then(|| array.value(row).cast_unsigned())
 }
 
