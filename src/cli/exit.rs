@@ -56,6 +56,7 @@ impl Exit {
             return match error {
                 ReduceError::Dataset(error) => Self::of_cause(error),
                 ReduceError::NoJobs { .. } => Some(Self::Usage),
+                ReduceError::Storage(_) => None,
             };
         }
         if let Some(error) = cause.downcast_ref::<DirectoryError>() {

@@ -71,10 +71,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ("parts", report.parts.to_string()),
             ("slips to record", report.slips.to_string()),
             ("predicted CPU time", output::duration(totals.cost)),
-            (
-                "predicted wall time",
-                format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds)),
-            ),
+            ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
         ]);
     }
     Ok(Exit::Done)

@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let mut progress = Progress::new();
     let report = stickslip::run::run(
         &Disk,
-        sweep,
+        &sweep,
         &root,
         options,
         &|job, interrupt| kernel(&job.parameters, &recording, solver, interrupt),

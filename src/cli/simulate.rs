@@ -353,9 +353,8 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
             slip.precursors
         );
     }
-    let or_none = |value: Option<f64>, unit: &str| {
-        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"))
-    };
+    let or_none =
+        |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
     output::pairs(&[
         ("job", report.job_id),
         ("simulated time", format!("{:.6} s", report.simulated_seconds)),
