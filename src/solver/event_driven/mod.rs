@@ -8,15 +8,16 @@
 //! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
 
 mod crossing;
+mod glide;
 mod lanes;
 mod leap;
 mod taylor;
 
 use self::crossing::first_reach;
 use self::lanes::Layout;
-use self::leap::{Attempt, DriveNow, Leap};
+use self::leap::{Attempt, Bounds, DriveNow, Leap};
 use self::taylor::{Chain, Kernels, Series, State, StepInput};
-use super::polynomial::MOST_COEFFICIENTS;
+use super::polynomial::{self, MOST_COEFFICIENTS};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
@@ -79,6 +80,8 @@ struct Run<'a> {
     longest_step: f64,
     typical_advance: f64,
     next_leap: f64,
+    /// Largest shear force at the last break and at the ends of steps since, in N.
+    passed_force: f64,
     summary: Summary,
 }
 
@@ -99,7 +102,7 @@ impl<'a> Run<'a> {
             interface,
             state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) },
             series: Series::new(layout),
-            leap: Leap::new(parameters.blocks),
+            leap: Leap::new(layout),
             candidates: Vec::new(),
             truncation: TRUNCATION_SHARE * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),
@@ -111,6 +114,7 @@ impl<'a> Run<'a> {
             longest_step,
             typical_advance: longest_step,
             next_leap: 0.0,
+            passed_force: 0.0,
             summary: Summary::default(),
         };
         for block in 0..parameters.blocks {
@@ -173,7 +177,8 @@ impl<'a> Run<'a> {
             angular_frequency: self.drive.angular_frequency,
         };
         let start = self.epoch + self.time;
-        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, &mut self.state, |segment| {
+        let bounds = Bounds { horizon, error: self.left_out, passed: self.passed_force };
+        let attempt = self.leap.attempt(&self.chain, self.kernels, &drive, bounds, &mut self.state, |segment| {
             observer.advance(&Segment { start, ..segment });
         });
         match attempt {
@@ -209,6 +214,7 @@ impl<'a> Run<'a> {
             path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
         });
         self.kernels.evaluate(&self.series, s, length, &mut self.state);
+        self.passed_force = self.passed_force.max(polynomial::value(&coefficients[..=self.series.order], s));
         let is_attachment = reached.is_none() && s == end && end < 1.0;
         self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
         if let Some(block) = reached {
@@ -311,6 +317,7 @@ impl<'a> Run<'a> {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
         let x = self.state.displacement[row][lane];
+        self.passed_force = self.shear_force();
         // Rounding may leave the block a hair before the position that it was found to reach.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
@@ -319,6 +326,13 @@ impl<'a> Run<'a> {
             observer.contact(&absolute(event, epoch, origin));
         });
         self.chain.update(block, &self.interface);
+    }
+
+    /// F_S now, in N.
+    fn shear_force(&self) -> f64 {
+        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
+        let cosine = if self.drive.is_modulated() { libm::cos(self.phase()) } else { 0.0 };
+        self.drive.stiffness * (ramp + self.drive.amplitude * cosine - self.state.displacement[0][0])
     }
 
     /// Reattaches what is due now.

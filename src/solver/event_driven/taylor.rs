@@ -8,6 +8,7 @@
 //! Every path of [`Kernels`] compiles the same plain code for another set of processor features; since nothing is fused
 //! or reassociated, all give the same bits.
 
+use super::glide::{Glide, advance};
 use super::lanes::{LANES, Layout, Row, ghost_after, ghost_before};
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
@@ -139,6 +140,7 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
+    glide: unsafe fn(&Chain, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
     pub name: &'static str,
@@ -148,7 +150,7 @@ pub(super) struct Kernels {
 macro_rules! kernels {
     ($module:ident, $name:literal $(, $features:literal)?) => {
         mod $module {
-            use super::{Chain, Kernels, Series, State, StepInput, evaluate, expand, reachable};
+            use super::{Chain, Glide, Kernels, Series, State, StepInput, advance, evaluate, expand, reachable};
 
             $(#[target_feature(enable = $features)])?
             fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
@@ -165,10 +167,16 @@ macro_rules! kernels {
                 reachable(chain, series, blocks);
             }
 
+            $(#[target_feature(enable = $features)])?
+            fn glide_here(chain: &Chain, seconds: f64, glide: &mut Glide) {
+                advance(chain, seconds, glide);
+            }
+
             pub(super) const KERNELS: Kernels = Kernels {
                 expand: expand_here,
                 evaluate: evaluate_here,
                 reachable: reachable_here,
+                glide: glide_here,
                 name: $name,
             };
         }
@@ -219,6 +227,13 @@ impl Kernels {
     pub fn reachable(self, chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
         // SAFETY: as above.
         unsafe { (self.reachable)(chain, series, blocks) }
+    }
+
+    /// Carries the free motion over so many seconds.
+    #[inline]
+    pub fn glide(self, chain: &Chain, seconds: f64, glide: &mut Glide) {
+        // SAFETY: as above.
+        unsafe { (self.glide)(chain, seconds, glide) }
     }
 }
 
