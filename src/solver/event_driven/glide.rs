@@ -13,7 +13,7 @@
 //! motion over θ, a third of what Taylor steps need, and nothing is evaluated on the way. Contract: errors of rounding
 //! only.
 
-use super::lanes::{LANES, Row, ghost_after, ghost_before};
+use super::lanes::{LANES, Row, flat, flat_mut, ghost_after, ghost_before};
 use super::taylor::Chain;
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
@@ -132,23 +132,17 @@ fn recur(
     [cosine, sine]: [&mut [Row]; 2],
     [even, odd]: [f64; 2],
 ) {
-    let rows = diagonal.len();
-    let (coupling, here, next) = (&coupling[..rows], &here[..rows + 2], &mut next[..rows + 2]);
-    let (cosine, sine) = (&mut cosine[..rows], &mut sine[..rows]);
-    for r in 0..rows {
-        let (left, middle, right, old) = (here[r], here[r + 1], here[r + 2], next[r + 1]);
-        let (d, c, cos, sin) = (diagonal[r], coupling[r], cosine[r], sine[r]);
-        let (mut row, mut new_cosine, mut new_sine) = (Row::filled(0.0), Row::filled(0.0), Row::filled(0.0));
-        for l in 0..LANES {
-            row[l] = twice * (d[l] * middle[l] - c[l] * (left[l] + right[l])) - keep * old[l];
-        }
-        for l in 0..LANES {
-            new_cosine[l] = cos[l] + even * row[l];
-            new_sine[l] = sin[l] + odd * row[l];
-        }
-        next[r + 1] = row;
-        cosine[r] = new_cosine;
-        sine[r] = new_sine;
+    let entries = diagonal.len() * LANES;
+    let (diagonal, coupling) = (&flat(diagonal)[..entries], &flat(coupling)[..entries]);
+    let (left, middle, right) = (&flat(here)[..entries], &flat(&here[1..])[..entries], &flat(&here[2..])[..entries]);
+    let next = &mut flat_mut(&mut next[1..])[..entries];
+    let (cosine, sine) = (&mut flat_mut(cosine)[..entries], &mut flat_mut(sine)[..entries]);
+    for i in 0..entries {
+        let product = diagonal[i] * middle[i] - coupling[i] * (left[i] + right[i]);
+        let term = twice * product - keep * next[i];
+        next[i] = term;
+        cosine[i] += even * term;
+        sine[i] += odd * term;
     }
 }
 

@@ -9,7 +9,7 @@
 //! or reassociated, all give the same bits.
 
 use super::glide::{Glide, advance};
-use super::lanes::{LANES, Layout, Row, ghost_after, ghost_before};
+use super::lanes::{LANES, Layout, Row, flat, flat_mut, ghost_after, ghost_before};
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
 use crate::solver::polynomial::MOST_COEFFICIENTS;
@@ -288,18 +288,14 @@ fn stencil(chain: &Chain, terms: &mut [Row], for_force: f64, for_damping: f64) {
     let rows = stride - 2;
     let (x, rest) = terms.split_at_mut(stride);
     let (rate, next) = rest.split_at_mut(stride);
-    let (coupling, diagonal) = (&chain.coupling[..rows], &chain.diagonal[..rows]);
-    let (x, rate, next) = (&x[..rows + 2], &rate[..rows + 2], &mut next[..rows + 2]);
-    for r in 0..rows {
-        // Whole rows are read before one is written, or the loop over lanes would not run in vectors.
-        let (before, here, after, rate) = (x[r], x[r + 1], x[r + 2], rate[r + 1]);
-        let (coupling, diagonal) = (coupling[r], diagonal[r]);
-        let mut row = Row::filled(0.0);
-        for l in 0..LANES {
-            let force = coupling[l] * (before[l] + after[l]) - diagonal[l] * here[l];
-            row[l] = for_force * force - for_damping * rate[l];
-        }
-        next[r + 1] = row;
+    let entries = rows * LANES;
+    let (coupling, diagonal) = (&flat(&chain.coupling)[..entries], &flat(&chain.diagonal)[..entries]);
+    let (before, here, after) = (&flat(x)[..entries], &flat(&x[1..])[..entries], &flat(&x[2..])[..entries]);
+    let rate = &flat(&rate[1..])[..entries];
+    let next = &mut flat_mut(&mut next[1..])[..entries];
+    for i in 0..entries {
+        let force = coupling[i] * (before[i] + after[i]) - diagonal[i] * here[i];
+        next[i] = for_force * force - for_damping * rate[i];
     }
 }
 
