@@ -48,7 +48,7 @@ def test_every_column_is_documented(results):
             assert f"`{field.name}`" in text, f"{table}.{field.name} is not in docs/"
 
 
-@pytest.mark.parametrize("text", examples())
+@pytest.mark.parametrize("text", list(examples()))
 def test_the_sweep_files_in_the_documentation_can_run(stickslip, tmp_path, text):
     sweep = tmp_path / "example.toml"
     sweep.write_text(text)
