@@ -22,6 +22,11 @@
 //! | part | consecutive jobs of the plan, committed together |
 //! | set | all jobs that differ in the seed alone |
 
+pub mod figure;
 pub mod model;
 pub mod observe;
+pub mod reduce;
+pub mod run;
 pub mod solver;
+pub mod store;
+pub mod sweep;

@@ -219,7 +219,7 @@ mod tests {
         let parameters = Parameters { threshold_deviation: 0.4, seed: 3, ..Parameters::default() };
         let mut forward = Disorder::new(&parameters);
         let mut backward = Disorder::new(&parameters);
-        let keys: Vec<(usize, u32)> = (0..60).map(|i| (i * 7 % 1400, (i * 13 % 50) as u32)).collect();
+        let keys: Vec<(usize, u32)> = (0..60_u32).map(|i| (i as usize * 7 % 1400, i * 13 % 50)).collect();
         let first: Vec<Contact> = keys.iter().map(|&(c, g)| forward.draw(c, g)).collect();
         let mut second: Vec<Contact> = keys.iter().rev().map(|&(c, g)| backward.draw(c, g)).collect();
         second.reverse();

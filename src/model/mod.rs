@@ -10,6 +10,7 @@ pub mod theory;
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
 pub use interface::{Change, ContactEvent, Interface};
+pub(crate) use parameters::Shortest;
 pub use parameters::{BreakOn, Description, ParameterError, Parameters, Symbol, Value};
 
 /// Version of the equations and definitions; part of every job id. Raised when the same parameters give other results.

@@ -11,6 +11,7 @@ mod segment;
 pub use segment::{ForcePath, Segment};
 
 use crate::model::{ContactEvent, Parameters};
+use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
 
 /// The method and its one setting.
@@ -33,6 +34,9 @@ impl Default for Solver {
         Self::EventDriven { tolerance: 1e-6 }
     }
 }
+
+/// Tolerances of the event-driven solver that make sense: rounding lies below, other physics above.
+pub const TOLERANCES: RangeInclusive<f64> = 1e-12..=1e-2;
 
 /// What follows a simulation and says when it has seen enough.
 pub trait Observer {
@@ -85,6 +89,12 @@ pub enum SimulationError {
         /// The limit, in s.
         limit: f64,
     },
+    /// The tolerance is out of range.
+    #[error("tolerance = {tolerance:e}: must lie from {:e} to {:e}, relative to fs/k", TOLERANCES.start(), TOLERANCES.end())]
+    BadTolerance {
+        /// The refused tolerance.
+        tolerance: f64,
+    },
     /// The state is no longer finite.
     #[error("at t = {time} s: the state is not finite; a smaller dt or tolerance may help")]
     NotFinite {
@@ -120,6 +130,9 @@ pub fn simulate(
     observer: &mut dyn Observer,
 ) -> Result<Summary, SimulationError> {
     match solver {
+        Solver::EventDriven { tolerance } if !TOLERANCES.contains(&tolerance) => {
+            Err(SimulationError::BadTolerance { tolerance })
+        }
         Solver::EventDriven { tolerance } => event_driven::run(parameters, tolerance, limits, observer),
         Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer),
     }

@@ -52,7 +52,7 @@ pub(super) fn run(
     observer: &mut dyn Observer,
 ) -> Result<Summary, SimulationError> {
     let kernels = Kernels::available().pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
-    Run::new(parameters, tolerance, limits, kernels).to_the_end(observer)
+    Run::new(parameters, tolerance, limits, kernels).finished(observer)
 }
 
 /// One simulation in progress. Times and displacements are local to the frame but where said otherwise.
@@ -119,14 +119,14 @@ impl<'a> Run<'a> {
         run
     }
 
-    fn to_the_end(mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+    fn finished(mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         for event in self.interface.initial_attachments() {
             observer.contact(&event);
         }
         while !observer.is_satisfied() {
             let until_end = self.limits.end_time - self.epoch - self.time;
             if until_end <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
-                return Ok(self.finish(false));
+                return Ok(self.summary(false));
             }
             let until_attach = self.interface.next_reattachment() - self.time;
             let horizon = until_attach.min(until_end);
@@ -148,10 +148,10 @@ impl<'a> Run<'a> {
                 return Err(SimulationError::Interrupted { time: self.epoch + self.time });
             }
         }
-        Ok(self.finish(true))
+        Ok(self.summary(true))
     }
 
-    fn finish(mut self, satisfied: bool) -> Summary {
+    fn summary(mut self, satisfied: bool) -> Summary {
         self.summary.end_time = self.epoch + self.time;
         self.summary.satisfied = satisfied;
         self.summary
@@ -356,4 +356,37 @@ impl<'a> Run<'a> {
 /// An event with time and displacement counted from the start.
 fn absolute(event: ContactEvent, epoch: f64, origin: f64) -> ContactEvent {
     ContactEvent { time: epoch + event.time, displacement: origin + event.displacement, ..event }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::ContactLog;
+
+    #[test]
+    fn every_set_of_processor_features_gives_the_same_bits() {
+        let plain = Parameters::default();
+        let modulated = Parameters {
+            blocks: 13,
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(1.0 / 58.0),
+            seed: 5,
+            ..Parameters::default()
+        };
+        for parameters in [plain, modulated] {
+            let logs: Vec<(&str, Vec<ContactEvent>)> = Kernels::available()
+                .into_iter()
+                .map(|kernels| {
+                    let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
+                    let mut log = ContactLog::default();
+                    Run::new(&parameters, 1e-6, limits, kernels).finished(&mut log).unwrap();
+                    (kernels.name, log.events)
+                })
+                .collect();
+            assert!(logs[0].1.len() > 2 * parameters.blocks * parameters.contacts_per_block, "no slip to compare");
+            for (name, log) in &logs[1..] {
+                assert_eq!(*log, logs[0].1, "{name} differs from {}", logs[0].0);
+            }
+        }
+    }
 }

@@ -139,7 +139,8 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
-    /// Name of the processor features.
+    /// Name of the processor features, for tests and reports.
+    #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
     pub name: &'static str,
 }
 
@@ -346,7 +347,8 @@ fn reachable(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
         let (upper, lower) = (&chain.upper[r], &chain.lower[r]);
         let mut any = false;
         for l in 0..LANES {
-            any |= (x[l] + excursion[l] >= upper[l]) | (x[l] - excursion[l] <= lower[l]);
+            any |= x[l] + excursion[l] >= upper[l];
+            any |= x[l] - excursion[l] <= lower[l];
         }
         if any {
             for l in 0..LANES {

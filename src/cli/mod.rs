@@ -1,0 +1,61 @@
+//! Flags, text and JSON output, progress, exit codes: the only code that prints.
+
+mod completions;
+mod exit;
+mod output;
+mod plan;
+mod progress;
+mod reduce;
+mod run;
+mod simulate;
+mod status;
+
+use self::exit::Exit;
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301, 2011).
+#[derive(Debug, Parser)]
+#[command(name = "stickslip", version, max_term_width = 100, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  stickslip plan sweeps/fig3.toml            what would run, and what it would cost
+  stickslip run sweeps/fig3.toml             run or resume it, down to its figures
+  stickslip simulate --slips 10 --plot a.png one realisation, drawn
+
+Exit codes: 0 done, 1 failed jobs remain, 2 bad usage or bad sweep file, 3 stopped early but resumable,
+4 damaged data.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Plan(plan::Arguments),
+    Run(run::Arguments),
+    Status(status::Arguments),
+    Reduce(reduce::ReduceArguments),
+    Plot(reduce::PlotArguments),
+    Simulate(simulate::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// Parses the command line, does what it asks, and says how it ended.
+pub fn main() -> ExitCode {
+    let ended = match Cli::parse().command {
+        Command::Plan(arguments) => plan::plan(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Status(arguments) => status::status(&arguments),
+        Command::Reduce(arguments) => reduce::reduce(&arguments),
+        Command::Plot(arguments) => reduce::plot(&arguments),
+        Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Completions(arguments) => completions::completions(&arguments),
+    };
+    let exit = ended.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        Exit::of(&error)
+    });
+    ExitCode::from(exit as u8)
+}

@@ -1,0 +1,94 @@
+//! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
+
+use super::output;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+use stickslip::run::RunEvent;
+
+/// Time between two plain lines.
+const PLAIN_SPACING: Duration = Duration::from_secs(10);
+/// Steps of the bar: thousandths of the predicted cost.
+const RESOLUTION: f64 = 1000.0;
+
+/// Shows the events of a run.
+pub struct Progress {
+    bar: ProgressBar,
+    is_terminal: bool,
+    begin: Instant,
+    last_line: Instant,
+    jobs: u64,
+    jobs_done: u64,
+    predicted: f64,
+    predicted_done: f64,
+}
+
+impl Progress {
+    pub fn new() -> Self {
+        let is_terminal = std::io::stderr().is_terminal();
+        let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let now = Instant::now();
+        Self {
+            bar: ProgressBar::with_draw_target(Some(0), target),
+            is_terminal,
+            begin: now,
+            last_line: now,
+            jobs: 0,
+            jobs_done: 0,
+            predicted: 0.0,
+            predicted_done: 0.0,
+        }
+    }
+
+    pub fn show(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Started { jobs, predicted_cost, jobs_there, threads } => {
+                self.jobs = jobs;
+                self.predicted = predicted_cost;
+                self.say(&format!(
+                    "running {}, {jobs_there} there already; about {} on {}",
+                    output::count(jobs, "job"),
+                    output::duration(predicted_cost / threads as f64),
+                    output::count(threads as u64, "thread"),
+                ));
+                self.bar.set_length(RESOLUTION as u64);
+                if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
+                    self.bar.set_style(style.progress_chars("=> "));
+                }
+            }
+            RunEvent::JobDone { predicted_cost, .. } => self.advance(predicted_cost),
+            RunEvent::JobFailed { job_id, reason, predicted_cost, .. } => {
+                self.say(&format!("job {job_id} failed: {reason}"));
+                self.advance(predicted_cost);
+            }
+            RunEvent::Stopping => self.say("stopping: jobs in flight end, finished parts are kept"),
+            RunEvent::PartCommitted { .. } => {}
+            RunEvent::Finished(_) => self.bar.finish_and_clear(),
+        }
+    }
+
+    /// A line that stays.
+    fn say(&self, line: &str) {
+        if self.is_terminal {
+            self.bar.suspend(|| eprintln!("{line}"));
+        } else {
+            eprintln!("{line}");
+        }
+    }
+
+    fn advance(&mut self, predicted_cost: f64) {
+        self.jobs_done += 1;
+        self.predicted_done += predicted_cost;
+        let share = if self.predicted > 0.0 { (self.predicted_done / self.predicted).min(1.0) } else { 1.0 };
+        let elapsed = self.begin.elapsed().as_secs_f64();
+        let left = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::INFINITY };
+        let text = format!("{} of {} jobs, {} left", self.jobs_done, self.jobs, output::duration(left));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
+        self.bar.set_position((RESOLUTION * share) as u64);
+        self.bar.set_message(text.clone());
+        if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
+            self.last_line = Instant::now();
+            eprintln!("{:.0} %: {text}", 100.0 * share);
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! `stickslip reduce` and `stickslip plot`: tables to reduced data, reduced data to figures.
+
+use super::exit::Exit;
+use super::output;
+use anyhow::Result;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use stickslip::figure::draw_all;
+use stickslip::reduce::{self, ReductionSummary};
+use stickslip::store::dataset::Footer;
+use stickslip::store::layout::Layout;
+use stickslip::store::manifest::Directory;
+use stickslip::store::storage::Disk;
+
+/// Reduce the tables of a results directory to Fig. 3-style data
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  stickslip reduce results/fig3 --json")]
+pub struct ReduceArguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Draw the figures of a results directory from its reduced data, as SVG and PNG
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  stickslip plot results/fig3")]
+pub struct PlotArguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+}
+
+pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
+    let directory = Directory::read(&Disk, &arguments.directory)?;
+    let summary = reduce_directory(&directory)?;
+    if arguments.json {
+        output::json(&summary)?;
+    } else {
+        output::pairs(&described(&summary, directory.layout()));
+    }
+    Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
+}
+
+pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
+    let directory = Directory::read(&Disk, &arguments.directory)?;
+    for path in draw_all(&Disk, directory.layout())? {
+        println!("{}", path.display());
+    }
+    Ok(Exit::Done)
+}
+
+/// Reduces a directory, with its current sweep in the footers.
+pub fn reduce_directory(directory: &Directory) -> Result<ReductionSummary> {
+    let sweep = &directory.sweeps()[directory.current()];
+    Ok(reduce::reduce(&Disk, directory.layout(), &Footer::default().with_sweep(sweep))?)
+}
+
+/// A reduction in brief.
+pub fn described(summary: &ReductionSummary, layout: &Layout) -> Vec<(&'static str, String)> {
+    let shown = |path: &Path| path.display().to_string();
+    vec![
+        ("jobs", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
+        ("parameter sets", format!("{}, {} locked", summary.sets, summary.locked_sets)),
+        ("slips", summary.slips.to_string()),
+        ("reduced data", shown(&layout.reduced())),
+    ]
+}

@@ -1,0 +1,46 @@
+//! `stickslip status`: how far a results directory is.
+
+use super::exit::Exit;
+use super::output;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+use stickslip::store::manifest::Directory;
+use stickslip::store::storage::Disk;
+
+/// Show what of a results directory is done, failed, missing and running, and the predicted time left
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  stickslip status results/fig3")]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn status(arguments: &Arguments) -> Result<Exit> {
+    let directory = Directory::read(&Disk, &arguments.directory)?;
+    let status = stickslip::run::status(&Disk, &directory)?;
+    if arguments.json {
+        output::json(&status)?;
+    } else {
+        let left = match (status.jobs_missing, status.time_left) {
+            (0, _) => "nothing left to run".to_owned(),
+            (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
+            (_, None) => format!("{} of CPU time predicted", output::duration(status.predicted_cost_missing)),
+        };
+        let running = if status.running.is_empty() { "nothing".to_owned() } else { status.running.join(", ") };
+        output::pairs(&[
+            ("sweep", status.name.clone()),
+            ("jobs done", status.jobs_done.to_string()),
+            ("jobs failed", status.jobs_failed.to_string()),
+            ("jobs missing", status.jobs_missing.to_string()),
+            ("parts", format!("{} done, {} missing", status.parts_done, status.parts_missing)),
+            ("running", running),
+            ("time left", left),
+        ]);
+    }
+    Ok(if status.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
+}

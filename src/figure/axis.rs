@@ -1,0 +1,251 @@
+//! Axes: range, scale, and where ticks go.
+
+use std::f64::consts::{FRAC_PI_2, LN_10, PI};
+
+/// How values become places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scale {
+    Linear,
+    Logarithmic,
+}
+
+/// One axis of a frame.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) label: String,
+    pub(super) low: f64,
+    pub(super) high: f64,
+    scale: Scale,
+    /// Ticks with a number.
+    pub(super) ticks: Vec<(f64, String)>,
+    /// Ticks without.
+    pub(super) minor: Vec<f64>,
+}
+
+/// Ticks with a number that an axis bears.
+const MOST_TICKS: f64 = 6.0;
+
+impl Axis {
+    /// Linear from `low` to `high`.
+    pub(super) fn linear(label: &str, low: f64, high: f64) -> Self {
+        Self::stepped(label, low, high, MOST_TICKS)
+    }
+
+    /// Linear from `low` to `high` with few ticks, for low frames.
+    pub(super) fn few(label: &str, low: f64, high: f64) -> Self {
+        Self::stepped(label, low, high, 0.5 * MOST_TICKS)
+    }
+
+    fn stepped(label: &str, low: f64, high: f64, most: f64) -> Self {
+        let high = if high > low { high } else { low + low.abs().max(1.0) };
+        let step = nice_step((high - low) / most);
+        let decimals = usize::try_from(-exponent(step)).unwrap_or(0);
+        let ticks = multiples(step, low, high).map(|tick| (tick, number(tick, decimals))).collect();
+        // A step of 2 is halved, others are cut in five.
+        let parts = if (step / libm::exp10(f64::from(exponent(step)))).round() == 2.0 { 2.0 } else { 5.0 };
+        let minor = multiples(step / parts, low, high).collect();
+        Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
+    }
+
+    /// Linear over round numbers that hold `low` and `high`.
+    pub(super) fn around(label: &str, low: f64, high: f64) -> Self {
+        let high = if high > low { high } else { low + low.abs().max(1.0) };
+        let step = nice_step((high - low) / MOST_TICKS);
+        Self::linear(label, (low / step).floor() * step, (high / step).ceil() * step)
+    }
+
+    /// Logarithmic from `low` to `high`, both > 0.
+    pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
+        let (first, last) = (exponent(low), exponent(high));
+        let decades = libm::log10(high / low);
+        let mantissas: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        // Every decade up to 7 of them, then every second, third, ...
+        #[expect(clippy::cast_possible_truncation, reason = "at most some hundred decades")]
+        let every = ((decades / 7.0).ceil() as i32).max(1);
+        let is_inside = |value: f64| value >= low * (1.0 - 1e-9) && value <= high * (1.0 + 1e-9);
+        let plain = low >= 9e-4 && high <= 1.1e4;
+        let (mut ticks, mut minor) = (Vec::new(), Vec::new());
+        for power in first..=last {
+            let decade = libm::exp10(f64::from(power));
+            for mantissa in (1..10).map(f64::from) {
+                let value = mantissa * decade;
+                if !is_inside(value) {
+                } else if mantissas.contains(&mantissa) && power.rem_euclid(every) == 0 {
+                    ticks.push((
+                        value,
+                        if plain { plain_power(mantissa, power) } else { power_of_ten(mantissa, power) },
+                    ));
+                } else if every == 1 || mantissa == 1.0 {
+                    minor.push(value);
+                }
+            }
+        }
+        Self { label: label.to_owned(), low, high, scale: Scale::Logarithmic, ticks, minor }
+    }
+
+    /// Angles in rad between multiples of π/2.
+    pub(super) fn angle(label: &str, low: f64, high: f64) -> Self {
+        let ticks = multiples(FRAC_PI_2, low, high).map(|tick| (tick, halves_of_pi(tick))).collect();
+        let minor = multiples(FRAC_PI_2 / 3.0, low, high).collect();
+        Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
+    }
+
+    /// Place of a value, 0 at the low end and 1 at the high end.
+    pub(super) fn place(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Logarithmic => libm::log(value / self.low) / libm::log(self.high / self.low),
+        }
+    }
+
+    /// Whether a value lies on the axis.
+    pub(super) fn holds(&self, value: f64) -> bool {
+        value >= self.low && value <= self.high
+    }
+
+    /// `count` >= 2 values from end to end, evenly placed.
+    pub(super) fn even(&self, count: u32) -> impl Iterator<Item = f64> + use<> {
+        let (low, high, scale) = (self.low, self.high, self.scale);
+        (0..count).map(move |step| {
+            let place = f64::from(step) / f64::from(count - 1);
+            match scale {
+                Scale::Linear => low + place * (high - low),
+                Scale::Logarithmic => low * libm::exp(place * libm::log(high / low)),
+            }
+        })
+    }
+}
+
+/// Bounds of a logarithmic axis for data: a little further than the data, as `None` for none at all.
+pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    const MARGIN: f64 = 0.08;
+    let (low, high) = bounds(values.filter(|&value| value > 0.0))?;
+    // At least half a decade, or there would be no tick.
+    let margin = (MARGIN * libm::log(high / low)).max(0.5 * (0.5 * LN_10 - libm::log(high / low)));
+    Some((low * libm::exp(-margin), high * libm::exp(margin)))
+}
+
+/// Least and largest of some finite values.
+pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    values.filter(|value| value.is_finite()).fold(None, |bounds, value| {
+        let (low, high) = bounds.unwrap_or((value, value));
+        Some((value.min(low), value.max(high)))
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the decimal exponent of a double")]
+fn exponent(value: f64) -> i32 {
+    // The logarithm of a power of ten may fall a hair short.
+    (libm::log10(value) + 1e-9).floor() as i32
+}
+
+/// The least of 1, 2, 5 times a power of ten that is not below `step`.
+fn nice_step(step: f64) -> f64 {
+    let decade = libm::exp10(f64::from(exponent(step)));
+    let nice = [1.0, 2.0, 5.0].into_iter().find(|mantissa| mantissa * decade >= step * (1.0 - 1e-9)).unwrap_or(10.0);
+    nice * decade
+}
+
+fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
+    let slack = 1e-6;
+    #[expect(clippy::cast_possible_truncation, reason = "a few dozen multiples")]
+    let (first, last) = ((low / step - slack).ceil() as i64, (high / step + slack).floor() as i64);
+    (first..=last).map(move |multiple| multiple as f64 * step)
+}
+
+/// With a true minus sign.
+fn number(value: f64, decimals: usize) -> String {
+    // Adding zero turns a rounded -0 into 0.
+    let rounded = format!("{:.decimals$}", value.abs());
+    let is_zero = rounded.chars().all(|digit| digit == '0' || digit == '.');
+    if value < 0.0 && !is_zero { format!("−{rounded}") } else { rounded }
+}
+
+fn plain_power(mantissa: f64, power: i32) -> String {
+    number(mantissa * libm::exp10(f64::from(power)), usize::try_from(-power).unwrap_or(0))
+}
+
+fn power_of_ten(mantissa: f64, power: i32) -> String {
+    let raised = |character| match character {
+        '-' => '⁻',
+        '0' => '⁰',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        _ => '⁹',
+    };
+    let power: String = power.to_string().chars().map(raised).collect();
+    if mantissa == 1.0 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
+}
+
+fn halves_of_pi(angle: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, reason = "a few halves")]
+    let halves = (angle / FRAC_PI_2).round() as i64;
+    let sign = if halves < 0 { "−" } else { "" };
+    match (halves.abs(), halves % 2 == 0) {
+        (0, _) => "0".to_owned(),
+        (1, _) => format!("{sign}π/2"),
+        (2, _) => format!("{sign}π"),
+        (halves, true) => format!("{sign}{}π", halves / 2),
+        (halves, false) => format!("{sign}{halves}π/2"),
+    }
+}
+
+/// The bounds in multiples of π/2 that hold some angles in rad, at least [-π, π].
+pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = bounds(angles).unwrap_or((0.0, 0.0));
+    ((low.min(-PI) / FRAC_PI_2).floor() * FRAC_PI_2, (high.max(PI) / FRAC_PI_2).ceil() * FRAC_PI_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis) -> Vec<&str> {
+        axis.ticks.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_have_no_more_digits_than_they_need() {
+        assert_eq!(labels(&Axis::linear("", 0.0, 0.25)), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]);
+        assert_eq!(labels(&Axis::linear("", -210.0, 480.0)), ["−200", "0", "200", "400"]);
+        assert_eq!(labels(&Axis::logarithmic("", 0.2, 1000.0)), ["1", "10", "100", "1000"]);
+        assert_eq!(labels(&Axis::logarithmic("", 0.05, 0.6)), ["0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(labels(&Axis::logarithmic("", 1e-12, 1e-6))[0..2], ["10⁻¹²", "10⁻¹¹"]);
+        assert_eq!(labels(&Axis::angle("", -1.5 * PI, PI)), ["−3π/2", "−π", "−π/2", "0", "π/2", "π"]);
+    }
+
+    #[test]
+    fn no_axis_is_crowded_or_bare() {
+        for exponent in -12..12 {
+            for span in [0.0, 0.3, 1.0, 7.7, 100.0] {
+                let low = 3.3 * libm::exp10(f64::from(exponent));
+                let linear = Axis::around("", low, low * (1.0 + span));
+                assert!((2..=8).contains(&linear.ticks.len()), "{low} {span}: {:?}", linear.ticks);
+                let (low, high) = logarithmic_bounds([low, low * (1.0 + span)].into_iter()).unwrap();
+                let logarithmic = Axis::logarithmic("", low, high);
+                assert!((1..=9).contains(&logarithmic.ticks.len()), "{low} {high}: {:?}", logarithmic.ticks);
+            }
+        }
+    }
+
+    #[test]
+    fn even_places_go_from_end_to_end() {
+        let axis = Axis::logarithmic("", 0.2, 1000.0);
+        let values: Vec<f64> = axis.even(5).collect();
+        assert!((values[0] - 0.2).abs() < 1e-12 && (values[4] - 1000.0).abs() < 1e-9);
+        assert!((axis.place(values[2]) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn angle_bounds_hold_all_data() {
+        assert_eq!(angle_bounds([].into_iter()), (-PI, PI));
+        let (low, high) = angle_bounds([-4.8, 0.1].into_iter());
+        assert!((low + 2.0 * PI).abs() < 1e-12 && (high - PI).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,217 @@
+//! All figures that fit the reduced data of a sweep, written together.
+
+use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture, backbone, histograms, intervals};
+use crate::model::{Parameters, Symbol, Value};
+use crate::reduce::{HistogramBin, SetLabel, read_backbone, read_few_sets, read_histograms, read_points};
+use crate::store::commit::{Commit, create_folder};
+use crate::store::layout::Layout;
+use crate::store::storage::Storage;
+use std::path::PathBuf;
+
+/// Draws the figures of a results directory into `figures/`, each as SVG and PNG: φ against η and τ against T if the drive
+/// is modulated, histograms of τ if there are few sets.
+///
+/// Returns the files, in the order in which they were written.
+///
+/// # Errors
+/// When the reduced data are not there, are damaged, or a figure cannot be written.
+pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, FigureError> {
+    let points = read_points(storage, layout)?;
+    let mut pictures = Vec::new();
+    if points.iter().any(|point| point.phase.is_some()) {
+        pictures.push(backbone(&points, &read_backbone(storage, layout)?)?);
+    }
+    if points.iter().any(|point| point.period.is_some() && point.interval.is_some()) {
+        pictures.push(intervals(&points)?);
+    }
+    // Each panel may hold a second set, of identical contacts.
+    let sets = read_few_sets(storage, layout, 2 * MOST_PANELS)?;
+    let panels = if sets.is_empty() { Vec::new() } else { panels(&sets, &read_histograms(storage, layout)?) };
+    if (1..=MOST_PANELS).contains(&panels.len()) {
+        pictures.push(histograms(&panels)?);
+    }
+    write(storage, layout, &pictures)
+}
+
+fn write(storage: &dyn Storage, layout: &Layout, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
+    let folder = layout.figures();
+    create_folder(storage, &folder)?;
+    let mut commit = Commit::begin(storage, &layout.staging("figures"))?;
+    let mut files = Vec::new();
+    for picture in pictures {
+        for (extension, bytes) in [("svg", picture.svg().into_bytes()), ("png", picture.png()?)] {
+            let file = folder.join(format!("{}.{extension}", picture.name()));
+            commit.stage_bytes(&file, &bytes)?;
+            files.push(file);
+        }
+    }
+    commit.publish()?;
+    Ok(files)
+}
+
+/// A panel per set; one of identical contacts goes onto the panel of the set that it otherwise equals.
+fn panels(sets: &[SetLabel], bins: &[HistogramBin]) -> Vec<HistogramPanel> {
+    let bars = |set: &SetLabel| -> Vec<Bar> {
+        bins.iter().filter(|bin| bin.set_id == set.set_id).map(|bin| (bin.low, bin.high, bin.density)).collect()
+    };
+    let identical = |parameters: &Parameters| Parameters { threshold_deviation: 0.0, ..parameters.clone() };
+    let is_identical = |set: &SetLabel| set.parameters.threshold_deviation == 0.0;
+    let twin = |set: &SetLabel| {
+        sets.iter().find(|other| is_identical(other) && other.parameters == identical(&set.parameters))
+    };
+    let is_overlaid = |set: &SetLabel| {
+        is_identical(set)
+            && sets.iter().any(|other| !is_identical(other) && identical(&other.parameters) == set.parameters)
+    };
+    // By rising frequency, as in Fig. 2; sets come in the order of Δ and then T.
+    let mut shown: Vec<&SetLabel> = sets.iter().filter(|set| !is_overlaid(set)).collect();
+    shown.sort_by(|left, right| {
+        left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
+    });
+    let swept: Vec<Symbol> = Symbol::ALL
+        .into_iter()
+        .filter(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed))
+        .filter(|&symbol| shown.iter().any(|set| set.parameters.get(symbol) != shown[0].parameters.get(symbol)))
+        .collect();
+    let panel = |set: &SetLabel| HistogramPanel {
+        title: title(&set.parameters, &swept),
+        bars: bars(set),
+        overlay: twin(set).filter(|_| !is_identical(set)).map(|twin| ("identical contacts".to_owned(), bars(twin))),
+        period: set.parameters.modulation_period,
+    };
+    shown.into_iter().map(panel).collect()
+}
+
+/// Modulation and whatever else differs between the sets.
+fn title(parameters: &Parameters, swept: &[Symbol]) -> String {
+    const MICROMETRES: f64 = 1e6;
+    let mut parts = match parameters.modulation_period {
+        Some(period) => vec![
+            format!("Δ = {} µm", three_digits(MICROMETRES * parameters.modulation_amplitude)),
+            format!("1/T = {} Hz", three_digits(1.0 / period)),
+        ],
+        None => vec!["Δ = 0".to_owned()],
+    };
+    parts.extend(swept.iter().map(|&symbol| {
+        let description = symbol.description();
+        let value = match parameters.get(symbol) {
+            Value::Real(real) => three_digits(real),
+            value => value.to_string(),
+        };
+        format!("{} = {value} {}", description.key, description.unit).trim_end().to_owned()
+    }));
+    parts.join(", ")
+}
+
+fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Through the decimal form, so that 29.000000000000004 is 29.
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reduce::{BackboneBin, Point, reduced_file};
+    use crate::store::dataset::{Footer, TableWriter};
+    use crate::store::storage::Disk;
+    use std::fs;
+
+    fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetLabel {
+        let parameters = Parameters {
+            threshold_deviation: deviation,
+            modulation_amplitude: frequency.map_or(0.0, |_| 1e-6),
+            modulation_period: frequency.map(|frequency| 1.0 / frequency),
+            ..Parameters::default()
+        };
+        SetLabel { set_id: id.to_owned(), parameters }
+    }
+
+    fn bin(id: &str, low: f64) -> HistogramBin {
+        HistogramBin { set_id: id.to_owned(), low, high: low + 0.01, count: 1, density: 100.0 }
+    }
+
+    #[test]
+    fn sets_become_the_panels_of_fig_2() {
+        let sets = [
+            set("identical", 0.0, None),
+            set("still", 6.9e-3, None),
+            set("58", 6.9e-3, Some(58.0)),
+            set("29", 6.9e-3, Some(29.0)),
+        ];
+        let panels = panels(&sets, &[bin("identical", 0.1), bin("still", 0.2), bin("29", 0.3), bin("58", 0.4)]);
+        assert_eq!(panels.len(), 3);
+        assert_eq!(panels[0].bars, [(0.2, 0.2 + 0.01, 100.0)]);
+        assert_eq!(panels[0].overlay.as_ref().unwrap().1, [(0.1, 0.1 + 0.01, 100.0)]);
+        assert_eq!(panels[1].title, "Δ = 1 µm, 1/T = 29 Hz");
+        assert_eq!((panels[2].period, panels[2].overlay.as_ref()), (Some(1.0 / 58.0), None));
+    }
+
+    fn reduced(points: &[Point]) -> (tempfile::TempDir, Layout) {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(root.path());
+        fs::create_dir_all(layout.reduced()).unwrap();
+        let footer = Footer::default();
+        let path = |name: &str| reduced_file(&layout, name);
+        let mut writer = TableWriter::create(&Disk, &path("points"), crate::reduce::points(), &footer).unwrap();
+        for point in points {
+            writer.push(point).unwrap();
+        }
+        writer.finish().unwrap();
+        TableWriter::<BackboneBin>::create(&Disk, &path("backbone"), crate::reduce::backbone(), &footer)
+            .unwrap()
+            .finish()
+            .unwrap();
+        TableWriter::create(&Disk, &path("sets"), crate::reduce::sets(), &footer).unwrap().finish().unwrap();
+        TableWriter::create(&Disk, &path("histograms"), crate::reduce::histograms(), &footer)
+            .unwrap()
+            .finish()
+            .unwrap();
+        (root, layout)
+    }
+
+    fn modulated(step: u32) -> Point {
+        let period = 0.01 * f64::from(1 + step % 5);
+        Point {
+            drive_velocity: 1e-4,
+            amplitude: 1e-6,
+            period: Some(period),
+            eta: 0.5 + f64::from(step),
+            interval: Some(4.0 * period),
+            periods: Some(4),
+            phase: Some(-0.01 * f64::from(step)),
+            is_locked: step.is_multiple_of(2),
+        }
+    }
+
+    #[test]
+    fn figures_are_byte_identical_when_drawn_again() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let files = draw_all(&Disk, &layout).unwrap();
+        let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]);
+        let bytes = || files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>();
+        let before = bytes();
+        assert_eq!(draw_all(&Disk, &layout).unwrap(), files);
+        assert!(bytes() == before);
+        let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
+        assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
+        assert!(png.starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn without_modulation_no_phase_is_drawn() {
+        let still = Point { period: None, periods: None, phase: None, ..modulated(1) };
+        let (_root, layout) = reduced(&[still]);
+        assert!(draw_all(&Disk, &layout).unwrap().is_empty());
+    }
+
+    #[test]
+    fn numbers_in_titles_are_short() {
+        let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
+        assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
+    }
+}

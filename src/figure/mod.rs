@@ -1,0 +1,49 @@
+//! Figures: reduced data -> pictures in the paper's layout, as SVG and PNG bytes; [`draw_all`] alone writes.
+
+mod axis;
+mod backbone;
+mod draw;
+mod frame;
+mod histograms;
+mod intervals;
+mod picture;
+mod simulation;
+mod work_precision;
+
+pub use backbone::backbone;
+pub use draw::draw_all;
+pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
+pub use intervals::intervals;
+pub use picture::Picture;
+pub use simulation::{AttachedMap, simulation};
+pub use work_precision::{WorkPrecision, work_precision};
+
+use crate::store::dataset::DatasetError;
+use crate::store::storage::StorageError;
+
+/// A figure that cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// There is nothing to draw.
+    #[error("figure {figure}: there are no {what} to draw")]
+    Empty {
+        /// Name of the figure.
+        figure: &'static str,
+        /// What is missing.
+        what: &'static str,
+    },
+    /// The PNG cannot be made.
+    #[error("figure {figure}: cannot be turned into a PNG: {reason}")]
+    Raster {
+        /// Name of the figure.
+        figure: &'static str,
+        /// The reason.
+        reason: String,
+    },
+    /// The reduced data cannot be read.
+    #[error("{0}; if it is missing or damaged, reduce the tables again")]
+    Reduced(#[from] DatasetError),
+    /// A figure cannot be put in its place.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+}

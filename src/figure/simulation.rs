@@ -1,0 +1,185 @@
+//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b, d).
+
+use super::FigureError;
+use super::axis::{Axis, bounds};
+use super::frame::{ABOVE, Frame, LEFT, LEGEND_TEXT, TICK_TEXT, UNDER};
+use super::picture::{Anchor, BLACK, Picture, Sheet, Stroke};
+use kuva::plot::ColorMap;
+use kuva::render::color::Color;
+
+const WIDTH: f64 = 760.0;
+const TRACE_HEIGHT: f64 = 230.0;
+const MAP_HEIGHT: f64 = 260.0;
+/// Between the trace and the map, whose label stands there.
+const GAP: f64 = 52.0;
+/// Right of the frames, for the colour bar and its numbers.
+const BESIDE: f64 = 92.0;
+const MILLIMETRES: f64 = 1e3;
+const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
+/// A PNG has two pixels per unit; more columns would not be seen.
+const COLUMNS_PER_UNIT: f64 = 1.0;
+/// Colours that an eye tells apart.
+const LEVELS: f64 = 100.0;
+
+/// Fractions of attached contacts over time and blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct AttachedMap<'a> {
+    /// Instants in s, evenly spaced, ascending.
+    pub times: &'a [f64],
+    /// Blocks.
+    pub blocks: usize,
+    /// Attached contacts over contacts, for every block at the first instant, then at the second, ...
+    pub fractions: &'a [f64],
+    /// Length of the slider, in m.
+    pub length: f64,
+}
+
+/// Draws shear force in N against time in s, and the map if there is one.
+///
+/// # Errors
+/// When the trace has fewer than two samples, or the map does not have one fraction per instant and block.
+pub fn simulation(trace: &[(f64, f64)], map: Option<AttachedMap<'_>>) -> Result<Picture, FigureError> {
+    const NAME: &str = "simulation";
+    let map = map.filter(|map| map.times.len() > 1);
+    if map.is_some_and(|map| map.fractions.len() != map.times.len() * map.blocks) {
+        return Err(FigureError::Empty { figure: NAME, what: "fractions for every instant and block" });
+    }
+    let empty = FigureError::Empty { figure: NAME, what: "samples of the shear force" };
+    let (first, last) =
+        bounds(trace.iter().map(|sample| sample.0)).filter(|(first, last)| last > first).ok_or(empty)?;
+    let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
+    let map_height = map.map_or(0.0, |_| GAP + MAP_HEIGHT);
+    let mut sheet = Sheet::new(NAME, (WIDTH, ABOVE + TRACE_HEIGHT + map_height + UNDER));
+    let frame = Frame {
+        left: LEFT,
+        top: ABOVE,
+        width: WIDTH - LEFT - BESIDE,
+        height: TRACE_HEIGHT,
+        x: Axis::linear("Time t (s)", first, last),
+        y: Axis::around("Shear force Fₛ (N)", least.min(0.0), most),
+    };
+    frame.clipped(&mut sheet, |sheet| frame.curve(sheet, thinned(trace, frame.width), TRACE));
+    frame.axes(&mut sheet, map.is_none());
+    frame.y_label(&mut sheet);
+    let Some(map) = map else {
+        frame.x_label(&mut sheet);
+        return Ok(sheet.finish());
+    };
+
+    let below = Frame {
+        top: ABOVE + TRACE_HEIGHT + GAP,
+        height: MAP_HEIGHT,
+        y: Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES),
+        ..frame
+    };
+    below.clipped(&mut sheet, |sheet| sheet.rectangles(cells(&below, &map)));
+    below.axes(&mut sheet, true);
+    below.x_label(&mut sheet);
+    below.y_label(&mut sheet);
+    colour_bar(&mut sheet, &below);
+    Ok(sheet.finish())
+}
+
+fn colour(fraction: f64) -> Color {
+    Color::from(ColorMap::Viridis.map(fraction.clamp(0.0, 1.0)))
+}
+
+/// The least and the largest of the samples of each column of a figure: no peak is lost.
+fn thinned(trace: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
+    let columns = (2.0 * width) as usize;
+    let samples = trace.len().div_ceil(columns).max(1);
+    if samples <= 4 {
+        return trace.to_vec();
+    }
+    let extremes = |column: &[(f64, f64)]| {
+        let by_force = |left: &&(f64, f64), right: &&(f64, f64)| left.1.total_cmp(&right.1);
+        let (least, most) = (column.iter().min_by(by_force).copied(), column.iter().max_by(by_force).copied());
+        let mut pair: Vec<(f64, f64)> = least.into_iter().chain(most).collect();
+        pair.sort_by(|left, right| left.0.total_cmp(&right.0));
+        pair
+    };
+    trace.chunks(samples).flat_map(extremes).collect()
+}
+
+/// Rectangles of the map: averages over the instants of a column, equal neighbours joined.
+fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
+    let columns = ((frame.width * COLUMNS_PER_UNIT) as usize).min(map.times.len());
+    let instants = map.times.len();
+    // Half a spacing on both sides of an instant belongs to it.
+    let spacing = (map.times[instants - 1] - map.times[0]) / (instants - 1) as f64;
+    let start_of = |column: usize| column * instants / columns;
+    // On whole pixels of the PNG, so that no seams appear.
+    let snapped = |place: f64| (2.0 * place).round() / 2.0;
+    let left_of =
+        |column: usize| snapped(frame.x_of(map.times[0] + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
+    let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / map.blocks as f64));
+    let level = |block: usize, column: usize| {
+        let span = start_of(column)..start_of(column + 1);
+        let count = span.len() as f64;
+        let sum: f64 = span.map(|instant| map.fractions[instant * map.blocks + block]).sum();
+        (sum / count * LEVELS).round()
+    };
+    let mut cells = Vec::new();
+    for block in 0..map.blocks {
+        let levels: Vec<f64> = (0..columns).map(|column| level(block, column)).collect();
+        let (top, bottom) = (top_of(block + 1), top_of(block));
+        let mut column = 0;
+        for run in levels.chunk_by(|left, right| left == right) {
+            let (left, right) = (left_of(column), left_of(column + run.len()));
+            // A hair over the next cell, which covers it: viewers that scale show no seams.
+            cells.push(([left, top, right - left + 0.5, bottom - top + 0.5], colour(run[0] / LEVELS)));
+            column += run.len();
+        }
+    }
+    cells
+}
+
+/// The colours beside a frame, in percent.
+fn colour_bar(sheet: &mut Sheet, frame: &Frame) {
+    const STEPS: u32 = 64;
+    const BAR_WIDTH: f64 = 18.0;
+    let left = frame.left + frame.width + 20.0;
+    let height = frame.height / f64::from(STEPS);
+    let bar = (0..STEPS).map(|step| {
+        let top = frame.top + frame.height - f64::from(step + 1) * height;
+        ([left, top, BAR_WIDTH, height + 0.5], colour(f64::from(step) / f64::from(STEPS - 1)))
+    });
+    sheet.clipped((left, frame.top), (BAR_WIDTH, frame.height), |sheet| sheet.rectangles(bar));
+    let (right, bottom) = (left + BAR_WIDTH, frame.top + frame.height);
+    let border = Stroke::solid(BLACK, 1.2);
+    sheet.line(vec![(left, frame.top), (right, frame.top), (right, bottom), (left, bottom), (left, frame.top)], border);
+    for percent in [0.0, 25.0, 50.0, 75.0, 100.0] {
+        let y = bottom - percent / 100.0 * frame.height;
+        sheet.line(vec![(right, y), (right + 5.0, y)], border);
+        let place = (right + 9.0, y + 0.36 * f64::from(TICK_TEXT));
+        sheet.text(place, &percent.to_string(), TICK_TEXT, Anchor::Start);
+    }
+    sheet.text((WIDTH - 14.0, frame.top - 13.0), "attached contacts (%)", LEGEND_TEXT, Anchor::End);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_trace_keeps_every_peak() {
+        let mut trace: Vec<(f64, f64)> = (0..1_000_000).map(|step| (f64::from(step), 1.0)).collect();
+        trace[123_456].1 = 9.0;
+        trace[654_321].1 = -9.0;
+        let thin = thinned(&trace, 600.0);
+        assert!(thin.len() < 5000);
+        assert!(thin.contains(&(123_456.0, 9.0)) && thin.contains(&(654_321.0, -9.0)));
+        assert!(thin.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+
+    #[test]
+    fn a_map_of_the_wrong_size_is_refused() {
+        let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 5], length: 0.15 };
+        let trace = [(0.0, 1.0), (1.0, 2.0)];
+        assert!(simulation(&trace, Some(map)).is_err());
+        assert!(simulation(&trace, Some(AttachedMap { fractions: &[1.0; 6], ..map })).is_ok());
+        assert!(simulation(&trace[..1], None).is_err());
+    }
+}

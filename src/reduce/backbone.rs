@@ -1,0 +1,178 @@
+//! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
+
+use super::PhaseLimits;
+use super::circular::Directions;
+use super::set::FinishedSet;
+use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
+use crate::store::columns::{Column, Getter, Table};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Bins per decade. Their edges are 10^(k/4), so that one lies on η = 1, where locking begins.
+pub const BINS_PER_DECADE: i32 = 4;
+
+/// A bin of η that holds at least one slip. `None` where there is nothing to average.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "each is described in `backbone`, the table of these rows")]
+pub struct BackboneBin {
+    pub eta_low: f64,
+    pub eta_high: f64,
+    pub eta_centre: f64,
+    pub sets: u64,
+    pub locked_sets: u64,
+    pub slips: u64,
+    pub phase_mean: Option<f64>,
+    pub resultant_length: Option<f64>,
+    pub rayleigh_p: Option<f64>,
+    pub share_below: Option<f64>,
+    pub locked_phase_mean: Option<f64>,
+    pub phase_minimum: Option<f64>,
+    pub asymptote: f64,
+}
+
+/// Pools the sets of each bin.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Backbone {
+    bins: BTreeMap<i32, Bin>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Bin {
+    sets: u64,
+    phases: Directions,
+    below: u64,
+    locked: Directions,
+}
+
+fn edge(bin: i32) -> f64 {
+    libm::exp10(f64::from(bin) / f64::from(BINS_PER_DECADE))
+}
+
+/// The bin that holds an η > 0.
+fn bin_of(eta: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "the logarithm of a double is small")]
+    let bin = (libm::log10(eta) * f64::from(BINS_PER_DECADE)).floor() as i32;
+    // The logarithm rounds; the edges decide.
+    if eta < edge(bin) {
+        bin - 1
+    } else if eta >= edge(bin + 1) {
+        bin + 1
+    } else {
+        bin
+    }
+}
+
+impl Backbone {
+    /// Adds a set; one without modulation has no phase and is left out.
+    pub(super) fn push(&mut self, set: &FinishedSet) {
+        let Some(phase) = set.row.phase_mean else { return };
+        let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
+        bin.sets += 1;
+        bin.phases.add(&set.phases);
+        bin.below += set.below;
+        if set.row.is_locked {
+            bin.locked.push(phase);
+        }
+    }
+
+    pub(super) fn finish(self) -> Vec<BackboneBin> {
+        let row = |(index, bin): (i32, Bin)| {
+            let (eta_low, eta_high) = (edge(index), edge(index + 1));
+            let eta_centre = (eta_low * eta_high).sqrt();
+            let limits = PhaseLimits::at(eta_centre);
+            BackboneBin {
+                eta_low,
+                eta_high,
+                eta_centre,
+                sets: bin.sets,
+                locked_sets: bin.locked.count(),
+                slips: bin.phases.count(),
+                phase_mean: bin.phases.mean(limits.top),
+                resultant_length: bin.phases.resultant_length(),
+                rayleigh_p: bin.phases.rayleigh(),
+                share_below: limits.minimum.map(|_| bin.below as f64 / bin.phases.count() as f64),
+                locked_phase_mean: bin.locked.mean(limits.top),
+                phase_minimum: minimum_phase(eta_centre),
+                asymptote: minimum_phase_asymptote(eta_centre),
+            }
+        };
+        self.bins.into_iter().map(row).collect()
+    }
+}
+
+/// The table of bins.
+#[must_use]
+pub fn backbone() -> Table<BackboneBin> {
+    use Getter::{Count, OptionalReal, Real};
+    let columns = vec![
+        Column::new("eta_low", "", "lower edge of the bin, included", Real(|row: &BackboneBin| row.eta_low)),
+        Column::new("eta_high", "", "upper edge, excluded", Real(|row| row.eta_high)),
+        Column::new("eta_centre", "", "geometric centre", Real(|row| row.eta_centre)),
+        Column::new("sets", "", "parameter sets", Count(|row| row.sets)),
+        Column::new("locked_sets", "", "locked parameter sets", Count(|row| row.locked_sets)),
+        Column::new("slips", "", "slips of all sets", Count(|row| row.slips)),
+        Column::new("phase_mean", "rad", "circular mean of the phase of all slips", OptionalReal(|row| row.phase_mean)),
+        Column::new("resultant_length", "", "|<exp(i phi)>| of all slips", OptionalReal(|row| row.resultant_length)),
+        Column::new("rayleigh_p", "", "p-value of the Rayleigh test of all slips", OptionalReal(|row| row.rayleigh_p)),
+        Column::new(
+            "share_below",
+            "",
+            "share of slips under phi_min(eta of their set) - 0.15 rad; null for eta < 1",
+            OptionalReal(|row| row.share_below),
+        ),
+        Column::new(
+            "locked_phase_mean",
+            "rad",
+            "circular mean over locked sets of their mean phase",
+            OptionalReal(|row| row.locked_phase_mean),
+        ),
+        Column::new(
+            "phi_min",
+            "rad",
+            "least phase of Eq. 2 at the centre; null for eta < 1",
+            OptionalReal(|row| row.phase_minimum),
+        ),
+        Column::new("asymptote", "rad", "-2 sqrt(pi / eta) at the centre", Real(|row| row.asymptote)),
+    ];
+    Table { name: "backbone", meaning: "One row per bin of eta that holds slips, four bins per decade", columns }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::set::SetSlips;
+    use super::super::set::tests::{jobs, slip};
+    use super::*;
+
+    #[test]
+    fn eta_of_one_begins_a_bin() {
+        assert_eq!((bin_of(1.0), bin_of(1.0_f64.next_down())), (0, -1));
+        for bin in -20..20 {
+            assert_eq!(bin_of(edge(bin)), bin);
+            assert_eq!(bin_of(edge(bin).next_down()), bin - 1);
+        }
+    }
+
+    #[test]
+    fn blue_dots_average_locked_sets_and_each_set_counts_once() {
+        let mut backbone = Backbone::default();
+        let mut push = |period: f64, phases: &[f64]| {
+            let jobs = jobs(1e-6, period);
+            let (limits, mut set) = (PhaseLimits::at(jobs.parameters.eta()), SetSlips::default());
+            for &phase in phases {
+                set.push(&slip(None, Some(phase)), &limits);
+            }
+            backbone.push(&set.finish(jobs));
+        };
+        // All in the bin 5.6 to 10; the third is all over the circle.
+        push(0.01, &[-1.0; 20]);
+        push(0.009, &[-0.6; 60]);
+        push(0.0095, &[-4.0, -2.0, 0.0, 2.0]);
+        let bins = backbone.finish();
+        assert_eq!(bins.len(), 1);
+        assert_eq!((bins[0].sets, bins[0].locked_sets, bins[0].slips), (3, 2, 84));
+        assert!((bins[0].locked_phase_mean.unwrap() + 0.8).abs() < 1e-12);
+        assert!(bins[0].phase_mean.unwrap() > -0.8);
+        assert_eq!(bins[0].share_below, Some(2.0 / 84.0));
+        assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
+    }
+}

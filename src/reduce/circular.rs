@@ -1,0 +1,242 @@
+//! Circular statistics: mean direction, resultant length, and the Rayleigh (Schuster) test against a uniform phase.
+//!
+//! p-value: Wilkie's approximation, exp(√(1 + 4n + 4(n² - R²)) - (1 + 2n)) with the resultant R (Wilkie, Appl. Stat. 32,
+//! 311 (1983); Zar, Biostatistical Analysis), is right to some percent except where few angles lie close together: it then
+//! overestimates, by 400 times for n = 3. There the saddle-point density of R (Daniels, Ann. Math. Stat. 25, 631 (1954)),
+//! normalised to one, is right to 10 %. Both fall with R and err upwards where they fail, so the smaller of the two is taken;
+//! for n = 2 the exact value. Checked against importance sampling down to p = 3e-5: within 10 %, but 15 % for n = 3 near
+//! p = 0.16.
+
+use std::f64::consts::{PI, TAU};
+
+/// Sum of unit vectors, one per angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Directions {
+    cosines: f64,
+    sines: f64,
+    count: u64,
+}
+
+impl Directions {
+    /// Adds an angle in rad.
+    pub fn push(&mut self, angle: f64) {
+        self.cosines += libm::cos(angle);
+        self.sines += libm::sin(angle);
+        self.count += 1;
+    }
+
+    /// Adds all angles of another sum.
+    pub fn add(&mut self, other: &Self) {
+        self.cosines += other.cosines;
+        self.sines += other.sines;
+        self.count += other.count;
+    }
+
+    /// Number of angles.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Resultant length |<exp(iφ)>|, 0 to 1; `None` without angles.
+    #[must_use]
+    pub fn resultant_length(&self) -> Option<f64> {
+        (self.count > 0).then(|| (libm::hypot(self.cosines, self.sines) / self.count as f64).min(1.0))
+    }
+
+    /// Mean direction, in rad, as the representative in (`top` - 2π, `top`]; `None` without angles.
+    #[must_use]
+    pub fn mean(&self, top: f64) -> Option<f64> {
+        (self.count > 0).then(|| wrap(libm::atan2(self.sines, self.cosines), top))
+    }
+
+    /// p-value of the Rayleigh test: the probability of so long a resultant if the angles were uniform; `None` without
+    /// angles.
+    #[must_use]
+    pub fn rayleigh(&self) -> Option<f64> {
+        self.resultant_length().map(|length| rayleigh_probability(self.count, length))
+    }
+}
+
+/// The representative of an angle in (`top` - 2π, `top`], in rad.
+#[must_use]
+pub fn wrap(angle: f64, top: f64) -> f64 {
+    let wrapped = angle - TAU * ((angle - top) / TAU).ceil();
+    // Rounding may end a hair outside.
+    if wrapped <= top - TAU { wrapped + TAU } else { wrapped.min(top) }
+}
+
+/// Above this number of angles Wilkie's approximation is right to 5 % down to p = 1e-4 and is taken alone.
+const MANY: u64 = 50;
+
+/// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Right to 10 % down to 1e-4 (15 %
+/// for three angles near p = 0.16).
+#[must_use]
+pub fn rayleigh_probability(count: u64, length: f64) -> f64 {
+    let n = count as f64;
+    match count {
+        0 | 1 => 1.0,
+        2 => 2.0 / PI * libm::acos(length.clamp(0.0, 1.0)),
+        _ if count > MANY => wilkie(n, length),
+        _ => wilkie(n, length).min(saddle_point(n, length)),
+    }
+}
+
+fn wilkie(n: f64, length: f64) -> f64 {
+    let outside = (1.0 - length * length).max(0.0);
+    libm::exp((1.0 + 4.0 * n + 4.0 * n * n * outside).sqrt() - (1.0 + 2.0 * n)).min(1.0)
+}
+
+/// Tail of the normalised saddle-point density of the resultant, n >= 3.
+fn saddle_point(n: f64, length: f64) -> f64 {
+    // In terms of the logarithm of the concentration κ at which a von Mises distribution has this resultant length.
+    const LOWEST: f64 = -8.0;
+    let (mut low, mut high) = (LOWEST, 40.0);
+    while high - low > 1e-9 {
+        let middle = 0.5 * (low + high);
+        if VonMises::at(libm::exp(middle)).length < length { low = middle } else { high = middle }
+    }
+    let whole = saddle_tail(n, LOWEST);
+    (saddle_tail(n, low) / whole).min(1.0)
+}
+
+/// Integral of the saddle-point density over ln κ from `from` on, by Simpson's rule.
+fn saddle_tail(n: f64, from: f64) -> f64 {
+    // For large κ the density falls as κ^(-(n-1)/2), n >= 3: after 30 e-folds nothing is left. Steps of 0.03 resolve n = 50.
+    const STEPS: u32 = 1200;
+    const STEP: f64 = 0.03;
+    let density = |step: u32| {
+        let concentration = libm::exp(from + f64::from(step) * STEP);
+        let VonMises { length, slope, log_normal } = VonMises::at(concentration);
+        concentration * libm::exp(n * log_normal) * (length * slope * concentration).sqrt()
+    };
+    let weighted = |step| density(step) * if step == 0 || step == STEPS { 1.0 } else { f64::from(2 + 2 * (step % 2)) };
+    STEP / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
+}
+
+/// What the saddle point needs of a von Mises distribution of concentration κ.
+struct VonMises {
+    /// Its mean resultant length A = I1/I0.
+    length: f64,
+    /// dA/dκ.
+    slope: f64,
+    /// ln I0(κ) - κ A.
+    log_normal: f64,
+}
+
+impl VonMises {
+    fn at(concentration: f64) -> Self {
+        // From here the asymptotic series is good to 1e-6, and the power series has not lost digits in dA/dκ.
+        const LARGE: f64 = 30.0;
+        if concentration > LARGE {
+            let u = 1.0 / concentration;
+            let length = 1.0 - u * (0.5 + u * (0.125 + u * (0.125 + u * 25.0 / 128.0)));
+            let slope = u * u * (0.5 + u * (0.25 + u * (0.375 + u * 25.0 / 32.0)));
+            let series = 1.0 + u * (0.125 + u * (9.0 / 128.0 + u * 225.0 / 3072.0));
+            // κ - κA, without cancellation.
+            let rest = 0.5 + u * (0.125 + u * (0.125 + u * 25.0 / 128.0));
+            return Self { length, slope, log_normal: rest - 0.5 * libm::log(TAU * concentration) + libm::log(series) };
+        }
+        let quarter = 0.25 * concentration * concentration;
+        let (mut term, mut zeroth, mut first) = (1.0, 0.0, 0.0);
+        // Terms peak near k = κ/2 and fall faster than exponentially; 100 are more than enough for κ = 30.
+        for k in 1..100 {
+            let k = f64::from(k);
+            zeroth += term;
+            first += term / k;
+            term *= quarter / (k * k);
+        }
+        first *= 0.5 * concentration;
+        let length = first / zeroth;
+        // A/κ -> 1/2 without dividing 0 by 0.
+        let ratio = if concentration > 0.0 { length / concentration } else { 0.5 };
+        Self { length, slope: 1.0 - ratio - length * length, log_normal: libm::log(zeroth) - concentration * length }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(angles: &[f64]) -> Directions {
+        let mut directions = Directions::default();
+        for &angle in angles {
+            directions.push(angle);
+        }
+        directions
+    }
+
+    #[test]
+    fn opposite_angles_cancel_and_equal_angles_add() {
+        assert!(of(&[0.0, PI]).resultant_length().unwrap() < 1e-15);
+        let equal = of(&[-3.0; 7]);
+        assert!((equal.resultant_length().unwrap() - 1.0).abs() < 1e-15);
+        assert!((equal.mean(PI).unwrap() + 3.0).abs() < 1e-15);
+        assert!((equal.mean(-4.0).unwrap() + 3.0 + TAU).abs() < 1e-14);
+        assert_eq!(of(&[]).rayleigh(), None);
+    }
+
+    #[test]
+    fn mean_direction_does_not_jump_at_the_seam() {
+        let seam = of(&[PI - 0.1, -PI + 0.1, PI - 0.2, -PI + 0.2]);
+        assert!((seam.mean(1.5 * PI).unwrap() - PI).abs() < 1e-14);
+    }
+
+    #[test]
+    fn wrapped_angles_lie_in_the_half_open_window() {
+        for top in [PI, 0.1, -2.0] {
+            for step in -1000..1000 {
+                let angle = f64::from(step) * 0.1 * PI;
+                let wrapped = wrap(angle, top);
+                assert!(wrapped > top - TAU && wrapped <= top, "{angle} -> {wrapped}");
+                assert!((libm::sin(angle) - libm::sin(wrapped)).abs() < 1e-12);
+            }
+        }
+        assert_eq!(wrap(PI, PI), PI);
+        assert_eq!(wrap(-PI, PI), PI);
+    }
+
+    /// Values of importance sampling (2e6 resultants of von Mises angles, reweighted to uniform ones; standard errors below
+    /// 0.5 %), except n = 100: the large-sample series of Greenwood and Durand, Ann. Math. Stat. 26, 233 (1955).
+    #[test]
+    fn rayleigh_probability_is_right_to_ten_percent() {
+        for (count, length, expected) in RAYLEIGH {
+            let probability = rayleigh_probability(count, length);
+            assert!(
+                (probability / expected - 1.0).abs() < 0.1,
+                "n = {count}, r = {length}: {probability} for {expected}"
+            );
+        }
+    }
+
+    const RAYLEIGH: [(u64, f64, f64); 19] = [
+        (2, 0.7509, 4.594e-1),
+        (2, 0.9895, 9.238e-2),
+        (3, 0.5438, 4.362e-1),
+        (3, 0.9890, 9.149e-3),
+        (4, 0.4489, 4.816e-1),
+        (4, 0.7750, 9.143e-2),
+        (4, 0.9976, 9.218e-5),
+        (5, 0.6872, 8.980e-2),
+        (5, 0.9886, 9.309e-5),
+        (6, 0.8293, 9.376e-3),
+        (6, 0.9713, 9.408e-5),
+        (8, 0.3023, 4.956e-1),
+        (8, 0.8490, 9.523e-4),
+        (8, 0.9192, 9.507e-5),
+        (10, 0.4798, 9.830e-2),
+        (10, 0.6575, 9.609e-3),
+        (10, 0.8592, 9.592e-5),
+        (100, 0.1517, 1.0e-1),
+        (100, 0.3013, 1.0e-4),
+    ];
+
+    #[test]
+    fn rayleigh_probability_never_rises_with_the_resultant() {
+        for count in [2, 3, 5, 12, 49, 50, 51, 1000] {
+            let values: Vec<f64> = (0..=100).map(|step| rayleigh_probability(count, f64::from(step) / 100.0)).collect();
+            assert!(values.windows(2).all(|pair| pair[1] <= pair[0]), "n = {count}");
+            assert!(values[0] > 0.99 && values[0] <= 1.0);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone, histograms
+//! of τ, and a sample of slips for scatter figures.
+
+mod backbone;
+pub mod circular;
+mod histogram;
+mod moments;
+mod point;
+mod read;
+mod reduction;
+mod rows;
+mod set;
+
+pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
+pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
+pub use moments::{Moments, quantile};
+pub use point::{MOST_POINTS, Point, points};
+pub use read::{SetLabel, read_backbone, read_few_sets, read_histograms, read_points};
+pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
+pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow, sets};
+
+use crate::model::theory::{load_maximum_phase, minimum_phase};
+use std::f64::consts::{PI, TAU};
+
+/// How far under φ_min a phase must lie to count as under the back-bone, in rad. Inertia and the finite duration of the
+/// rupture shift onsets by some hundredths of a radian; this is well past them and well inside the empty region.
+pub const BELOW_MARGIN: f64 = 0.15;
+
+/// What a reduction takes from a row of the slips table, in the table's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SlipSample {
+    interval: Option<f64>,
+    periods: Option<u64>,
+    phase: Option<f64>,
+    peak_force: f64,
+    drop: f64,
+    duration: f64,
+    precursors: f64,
+    front_speed: Option<f64>,
+    slow_front_speed: Option<f64>,
+}
+
+/// Where phases can lie at some η.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PhaseLimits {
+    /// φ_min, in rad; `None` for η < 1.
+    minimum: Option<f64>,
+    /// Upper end of the turn in which a mean phase is told, in rad. For η >= 1 the seam is in the middle of the gap between
+    /// Φ_max - 2π and φ_min, where no slip begins.
+    top: f64,
+}
+
+impl PhaseLimits {
+    fn at(eta: f64) -> Self {
+        let minimum = minimum_phase(eta);
+        let seam = minimum.zip(load_maximum_phase(eta)).map(|(low, high)| 0.5 * (low + high - TAU));
+        Self { minimum, top: seam.map_or(PI, |seam| seam + TAU) }
+    }
+
+    fn is_below(&self, phase: f64) -> bool {
+        self.minimum.is_some_and(|minimum| phase < minimum - BELOW_MARGIN)
+    }
+}

@@ -1,0 +1,369 @@
+//! The reduction of a results directory: jobs once, slips as often as memory asks for, four files committed together.
+//!
+//! Sets are told in the order of their parameters and rows are summed in table order (file names, then rows), so the same
+//! tables give the same bytes. Memory: a few hundred bytes per set, and the intervals of [`MOST_SLIPS`] slips; where the
+//! tables hold more, the slips are read again for the next sets.
+
+use super::backbone::{Backbone, BackboneBin, backbone};
+use super::histogram::{histogram, histograms};
+use super::point::{Point, points, spacing};
+use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
+use super::set::{SetSlips, sets};
+use super::{PhaseLimits, SetJobs};
+use crate::model::{Symbol, Value};
+use crate::store::commit::{Commit, create_folder};
+use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
+use crate::store::layout::Layout;
+use crate::store::storage::{Storage, StorageError};
+use crate::store::tables::{jobs, slips};
+use serde::Serialize;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::PathBuf;
+
+/// Slips whose intervals are held at once: 256 MB of doubles.
+const MOST_SLIPS: u64 = 1 << 25;
+/// Version of [`ReductionSummary`] as JSON.
+pub const SUMMARY_FORMAT: u32 = 1;
+
+/// A directory that cannot be reduced.
+#[derive(Debug, thiserror::Error)]
+pub enum ReduceError {
+    /// A table cannot be read, or reduced data cannot be written.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A folder or file cannot be prepared or put in its place.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// There is nothing to reduce.
+    #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", .tables.display())]
+    NoJobs {
+        /// Folder of the jobs table.
+        tables: PathBuf,
+    },
+}
+
+/// What a reduction found, in brief.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReductionSummary {
+    /// [`SUMMARY_FORMAT`].
+    pub format: u32,
+    /// Jobs run to an end.
+    pub jobs: u64,
+    /// Jobs that failed.
+    pub failed_jobs: u64,
+    /// Parameter sets.
+    pub sets: u64,
+    /// Sets with modulation whose phases are locked.
+    pub locked_sets: u64,
+    /// Slips.
+    pub slips: u64,
+    /// Points kept for scatter figures.
+    pub points: u64,
+    /// Bins of η.
+    pub backbone: Vec<BackboneBin>,
+}
+
+/// Reduces the tables of a results directory to `reduced/{sets,histograms,backbone,points}.parquet`, over those of an
+/// earlier reduction.
+///
+/// # Errors
+/// When there is no job, a table is damaged, or the reduced data cannot be written; earlier reduced files stay whole.
+pub fn reduce(storage: &dyn Storage, layout: &Layout, footer: &Footer) -> Result<ReductionSummary, ReduceError> {
+    reduce_by(storage, layout, footer, MOST_SLIPS)
+}
+
+fn reduce_by(
+    storage: &dyn Storage,
+    layout: &Layout,
+    footer: &Footer,
+    most_slips: u64,
+) -> Result<ReductionSummary, ReduceError> {
+    let all_jobs = read_jobs(storage, layout)?;
+    let slip_files = committed_slips(storage, layout)?;
+    let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
+    let mut summary = ReductionSummary {
+        format: SUMMARY_FORMAT,
+        jobs: all_jobs.iter().map(|set| set.finished).sum(),
+        failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
+        sets: all_jobs.len() as u64,
+        locked_sets: 0,
+        slips: 0,
+        points: 0,
+        backbone: Vec::new(),
+    };
+
+    create_folder(storage, &layout.reduced())?;
+    let mut commit = Commit::begin(storage, &layout.staging("reduce"))?;
+    let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
+    let (sets, histograms, backbone, points) = (sets(), histograms(), backbone(), points());
+    let mut set_writer = TableWriter::create(storage, &stage(sets.name), sets, footer)?;
+    let mut histogram_writer = TableWriter::create(storage, &stage(histograms.name), histograms, footer)?;
+    let mut backbone_writer = TableWriter::create(storage, &stage(backbone.name), backbone, footer)?;
+    let mut point_writer = TableWriter::create(storage, &stage(points.name), points, footer)?;
+
+    let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
+    for chunk in chunks(all_jobs, most_slips) {
+        let gathered = gather(storage, &slip_files, chunk, spacing(total))?;
+        for (jobs, slips, set_points) in gathered {
+            let set = slips.finish(jobs);
+            let row = &set.row;
+            set_writer.push(row)?;
+            for bin in histogram(row, &set.intervals) {
+                histogram_writer.push(&bin)?;
+            }
+            pooled.push(&set);
+            summary.slips += row.slips;
+            summary.locked_sets += u64::from(row.is_locked);
+            kept.extend(
+                set_points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })),
+            );
+        }
+    }
+    kept.sort_by_key(|(place, _)| *place);
+    summary.points = kept.len() as u64;
+    for (_, point) in &kept {
+        point_writer.push(point)?;
+    }
+    summary.backbone = pooled.finish();
+    for bin in &summary.backbone {
+        backbone_writer.push(bin)?;
+    }
+    set_writer.finish()?;
+    histogram_writer.finish()?;
+    backbone_writer.finish()?;
+    point_writer.finish()?;
+    commit.publish()?;
+    Ok(summary)
+}
+
+/// Path of a reduced table.
+#[must_use]
+pub fn reduced_file(layout: &Layout, table: &str) -> PathBuf {
+    layout.reduced().join(format!("{table}.parquet"))
+}
+
+/// The sets of all jobs, in the order of their parameters.
+fn read_jobs(storage: &dyn Storage, layout: &Layout) -> Result<Vec<SetJobs>, ReduceError> {
+    let folder = layout.table(jobs().name);
+    let mut sets = BTreeMap::new();
+    for batch in Reader::of_folder(storage, &folder, None)? {
+        gather_jobs(&batch?, &mut sets)?;
+    }
+    if sets.is_empty() {
+        return Err(ReduceError::NoJobs { tables: folder });
+    }
+    let mut sets: Vec<SetJobs> = sets.into_values().collect();
+    sets.sort_by(by_parameters);
+    Ok(sets)
+}
+
+fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
+    let others = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed);
+    others
+        .map(|symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
+            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
+            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
+            (left, right) => left.to_string().cmp(&right.to_string()),
+        })
+        .find(|order| order.is_ne())
+        .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
+}
+
+/// Files of slips that belong to committed jobs: a run killed in between leaves the slips of a part without its jobs.
+fn committed_slips(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, ReduceError> {
+    let jobs = files(storage, &layout.table(jobs().name))?;
+    let names: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
+    let slips = files(storage, &layout.table(slips().name))?;
+    Ok(slips.into_iter().filter(|path| path.file_name().is_some_and(|name| names.contains(name))).collect())
+}
+
+/// Cuts the sets where their slips would exceed the most.
+fn chunks(sets: Vec<SetJobs>, most_slips: u64) -> Vec<Vec<SetJobs>> {
+    let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
+    let mut slips = 0;
+    for set in sets {
+        slips += set.slips;
+        match chunks.last_mut() {
+            Some(chunk) if slips <= most_slips => chunk.push(set),
+            _ => {
+                slips = set.slips;
+                chunks.push(vec![set]);
+            }
+        }
+    }
+    chunks
+}
+
+/// A set, its slips, and the points among them with their place in table order.
+type Gathered = (SetJobs, SetSlips, Vec<(u64, Point)>);
+
+/// Reads all slips and keeps those of these sets.
+fn gather(
+    storage: &dyn Storage,
+    slip_files: &[PathBuf],
+    sets: Vec<SetJobs>,
+    spacing: u64,
+) -> Result<Vec<Gathered>, ReduceError> {
+    let index: HashMap<String, usize> =
+        sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
+    let limits: Vec<PhaseLimits> = sets.iter().map(|set| PhaseLimits::at(set.parameters.eta())).collect();
+    let mut gathered: Vec<Gathered> = sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
+    let mut place = 0;
+    for batch in Reader::new(storage, slip_files.to_vec(), Some(&SLIP_COLUMNS)) {
+        for_each_slip(&batch?, |set_id, slip| {
+            let here = place;
+            place += 1;
+            let Some(&index) = index.get(set_id) else { return };
+            let (set, slips, points) = &mut gathered[index];
+            let parameters = &set.parameters;
+            let eta = parameters.eta();
+            slips.push(slip, &limits[index]);
+            if here % spacing == 0 {
+                let point = Point {
+                    drive_velocity: parameters.drive_velocity,
+                    amplitude: parameters.modulation_amplitude,
+                    period: parameters.modulation_period,
+                    eta,
+                    interval: slip.interval,
+                    periods: slip.periods,
+                    phase: slip.phase,
+                    is_locked: false,
+                };
+                points.push((here, point));
+            }
+        })?;
+    }
+    Ok(gathered)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Parameters;
+    use crate::observe::Slip;
+    use crate::solver::Summary;
+    use crate::store::storage::Disk;
+    use crate::store::tables::{JobLabel, JobRecord, JobResult, JobRow, SlipRow};
+    use std::fs;
+
+    const PERIOD: f64 = 0.01;
+
+    fn label(set: u32, seed: u64, amplitude: f64) -> JobLabel {
+        let parameters = Parameters {
+            seed,
+            modulation_amplitude: amplitude,
+            modulation_period: Some(PERIOD),
+            ..Parameters::default()
+        };
+        JobLabel {
+            job_id: format!("{set:016x}{seed:016x}"),
+            // Not in the order of the parameters.
+            set_id: format!("{:032x}", 100 - set),
+            parameters: parameters.validated().unwrap(),
+        }
+    }
+
+    fn job_result(job: &JobLabel, slips: u32) -> JobResult {
+        let slip = |number: u32| Slip {
+            number: u64::from(number),
+            onset: f64::from(number) * 12.0 * PERIOD,
+            interval: (number > 0).then_some(12.0 * PERIOD + 1e-5 * f64::from(number % 3)),
+            phase: job.parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
+            peak_force: 480.0,
+            drop: 100.0 + f64::from(number),
+            nucleation: 0.0,
+            nucleation_block: 1,
+            duration: 0.005,
+            size: 1400,
+            front_speed: None,
+            precursors: 2,
+            slow_front_speed: None,
+        };
+        let summary = Summary { satisfied: true, ..Summary::default() };
+        JobResult {
+            slips: (0..slips).map(slip).collect(),
+            precursors: Vec::new(),
+            record: JobRecord { ruptures: 0, mean_friction: Some(430.0), summary },
+        }
+    }
+
+    /// Two parts, three sets of two seeds, one failed job; the slips of a third part are without their jobs.
+    fn directory(slips: u32) -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(root.path());
+        fs::create_dir_all(layout.table("slips")).unwrap();
+        fs::create_dir_all(layout.table("jobs")).unwrap();
+        for part in 0..3 {
+            let name = format!("part-000-{part:06}.parquet");
+            let path = layout.table("slips").join(&name);
+            let mut slip_writer =
+                TableWriter::create(&Disk, &path, crate::store::tables::slips(), &Footer::default()).unwrap();
+            let labels: Vec<JobLabel> = (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
+            let results: Vec<JobResult> = labels.iter().map(|label| job_result(label, slips)).collect();
+            for (job, result) in labels.iter().zip(&results) {
+                result.slips.iter().for_each(|slip| slip_writer.push(&SlipRow { job, slip }).unwrap());
+            }
+            slip_writer.finish().unwrap();
+            if part < 2 {
+                let path = layout.table("jobs").join(&name);
+                let mut job_writer =
+                    TableWriter::create(&Disk, &path, crate::store::tables::jobs(), &Footer::default()).unwrap();
+                for (job, result) in labels.iter().zip(&results) {
+                    job_writer.push(&JobRow { job, result: Ok(result) }).unwrap();
+                }
+                let failed = label(2, 77, 2e-6);
+                job_writer.push(&JobRow { job: &failed, result: Err("out of budget") }).unwrap();
+                job_writer.finish().unwrap();
+            }
+        }
+        root
+    }
+
+    fn reduced_bytes(root: &tempfile::TempDir) -> Vec<Vec<u8>> {
+        let layout = Layout::new(root.path());
+        ["sets", "histograms", "backbone", "points"].map(|name| fs::read(reduced_file(&layout, name)).unwrap()).to_vec()
+    }
+
+    #[test]
+    fn every_committed_slip_is_counted_once_and_no_other() {
+        let root = directory(20);
+        let summary = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap();
+        assert_eq!((summary.jobs, summary.failed_jobs, summary.sets), (6, 2, 3));
+        assert_eq!((summary.slips, summary.points, summary.locked_sets), (120, 120, 2));
+        assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
+        let path = reduced_file(&Layout::new(root.path()), "sets");
+        let batch = Reader::new(&Disk, vec![path], None).next().unwrap().unwrap();
+        assert_eq!(batch.reals("Delta").unwrap().values().to_vec(), [0.0, 1e-6, 2e-6]);
+        assert_eq!(batch.counts("intervals").unwrap().values().to_vec(), [38, 38, 38]);
+        assert_eq!(batch.counts("failed_jobs").unwrap().values().to_vec(), [0, 0, 2]);
+        assert!((batch.reals("mean_friction").unwrap().value(1) - 430.0).abs() < 1e-9);
+        assert!((batch.reals("periods_mean").unwrap().value(1) - 12.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn reading_in_several_passes_changes_nothing() {
+        let root = directory(50);
+        let layout = Layout::new(root.path());
+        let whole = reduce(&Disk, &layout, &Footer::default()).unwrap();
+        let bytes = reduced_bytes(&root);
+        let passes = reduce_by(&Disk, &layout, &Footer::default(), 1).unwrap();
+        assert_eq!(passes, whole);
+        assert!(reduced_bytes(&root) == bytes);
+        assert!(Disk.list(&layout.staging("reduce")).unwrap().is_empty());
+    }
+
+    #[test]
+    fn of_many_slips_every_kth_becomes_a_point() {
+        let root = directory(5000);
+        let summary = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap();
+        assert_eq!((summary.slips, summary.points), (30_000, 15_000));
+    }
+
+    #[test]
+    fn a_directory_without_jobs_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let error = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap_err();
+        assert!(error.to_string().contains("holds no jobs"), "{error}");
+    }
+}

@@ -1,0 +1,443 @@
+//! Whole runs with a fake kernel: quick, and a function of the parameters alone, as the real one.
+
+use super::*;
+use crate::model::Parameters;
+use crate::observe::{Precursor, Slip};
+use crate::solver::{SimulationError, Summary};
+use crate::store::columns::Table;
+use crate::store::dataset::Reader;
+use crate::store::layout::Layout;
+use crate::store::storage::{Disk, StoredFile};
+use crate::store::tables::{self, JobRecord, JobResult};
+use crate::sweep::{Job, PART_COST};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
+use std::fs;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+const SEEDS: u64 = 60;
+
+/// Some parts of several jobs each.
+fn sweep(seeds: u64, model: &str) -> Sweep {
+    let text = format!(
+        "name = \"test\"\n[model]\n{model}\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
+         [record]\nslips = 3\nprecursors = true\n"
+    );
+    Sweep::parse(&text, Path::new("test.toml")).unwrap()
+}
+
+fn measure(parameters: &Parameters) -> JobResult {
+    let count = parameters.seed % 4;
+    let onset = |number: u64| parameters.seed as f64 + parameters.drive_velocity + number as f64;
+    let slips = (0..count).map(|number| Slip {
+        number,
+        onset: onset(number),
+        interval: (number > 0).then_some(1.0),
+        phase: None,
+        peak_force: 477.0,
+        drop: 100.0,
+        nucleation: onset(number),
+        nucleation_block: 1,
+        duration: 0.005,
+        size: 1400,
+        front_speed: None,
+        precursors: 1,
+        slow_front_speed: None,
+    });
+    let precursors = (0..count).map(|slip| Precursor {
+        slip,
+        precursor: 0,
+        onset: onset(slip) - 0.1,
+        interval: None,
+        nucleation: onset(slip),
+        nucleation_block: 1,
+        duration: 0.001,
+        size: 30,
+        extent: 5,
+        reach: 6,
+        front_speed: None,
+    });
+    let summary = Summary { end_time: onset(count), satisfied: true, ..Summary::default() };
+    let record = JobRecord { ruptures: 9, mean_friction: Some(300.0), summary };
+    JobResult { slips: slips.collect(), precursors: precursors.collect(), record }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "a kernel")]
+fn fine(job: &Job, _: &AtomicBool) -> Result<JobResult, SimulationError> {
+    Ok(measure(&job.parameters))
+}
+
+fn options(stop: &AtomicBool, threads: usize) -> Options<'_> {
+    Options { threads: NonZeroUsize::new(threads), stop, retry_failed: false, shard: Shard::default() }
+}
+
+fn run_all(root: &Path, sweep: &Sweep, kernel: &Kernel<'_>) -> RunReport {
+    run(&Disk, sweep, root, options(&AtomicBool::new(false), 2), kernel, &mut |_| ()).unwrap()
+}
+
+fn retry(root: &Path, sweep: &Sweep, kernel: &Kernel<'_>) -> RunReport {
+    let stop = AtomicBool::new(false);
+    let options = Options { retry_failed: true, ..options(&stop, 2) };
+    run(&Disk, sweep, root, options, kernel, &mut |_| ()).unwrap()
+}
+
+/// All files of the tables with their bytes.
+fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for table in ["slips", "precursors", "jobs"] {
+        for entry in fs::read_dir(root.join("tables").join(table)).unwrap() {
+            let path = entry.unwrap().path();
+            files.insert(path.strip_prefix(root).unwrap().to_owned(), fs::read(&path).unwrap());
+        }
+    }
+    files
+}
+
+fn texts(root: &Path, table: &str, column: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    for batch in Reader::of_folder(&Disk, &Layout::new(root).table(table), None).unwrap() {
+        let batch = batch.unwrap();
+        texts.extend(batch.texts(column).unwrap().iter().map(|text| text.unwrap_or_default().to_owned()));
+    }
+    texts
+}
+
+fn expected_tables() -> BTreeMap<PathBuf, Vec<u8>> {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    tables_of(root.path())
+}
+
+#[test]
+fn bytes_do_not_depend_on_threads_or_shards() {
+    let expected = expected_tables();
+    assert!(expected.len() >= 9, "several parts are needed to see anything, not {}", expected.len() / 3);
+    let (one, sharded) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let stop = AtomicBool::new(false);
+    run(&Disk, &sweep(SEEDS, ""), one.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap();
+    assert!(tables_of(one.path()) == expected);
+    for shard in ["2/2", "1/2"] {
+        let options = Options { shard: shard.parse().unwrap(), ..options(&stop, 2) };
+        run(&Disk, &sweep(SEEDS, ""), sharded.path(), options, &fine, &mut |_| ()).unwrap();
+    }
+    assert!(tables_of(sharded.path()) == expected);
+}
+
+#[test]
+fn a_stopped_run_resumes_byte_identical_and_runs_no_committed_job_again() {
+    let root = tempfile::tempdir().unwrap();
+    let (runs, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let kernel = |job: &Job, interrupt: &AtomicBool| {
+        if runs.fetch_add(1, Ordering::Relaxed) >= SEEDS {
+            stop.store(true, Ordering::Relaxed);
+            while !interrupt.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            return Err(SimulationError::Interrupted { time: 0.0 });
+        }
+        Ok(measure(&job.parameters))
+    };
+    let mut stopping = 0;
+    let report = run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &kernel, &mut |event| {
+        stopping += u32::from(event == RunEvent::Stopping);
+    })
+    .unwrap();
+    assert!(report.stopped && stopping == 1);
+    assert!(report.jobs_run > 0 && report.jobs_failed == 0, "{report:?}");
+    assert_eq!(report.jobs_run + report.jobs_left, 2 * SEEDS);
+    let again = AtomicU64::new(0);
+    let resumed = run_all(root.path(), &sweep(SEEDS, ""), &|job, interrupt| {
+        again.fetch_add(1, Ordering::Relaxed);
+        fine(job, interrupt)
+    });
+    assert!(!resumed.stopped);
+    assert_eq!(again.into_inner(), report.jobs_left);
+    assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
+fn a_second_run_does_nothing() {
+    let root = tempfile::tempdir().unwrap();
+    let first = run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    assert_eq!((first.jobs_run, first.jobs_left, first.stopped), (2 * SEEDS, 0, false));
+    let (before, logs) = (tables_of(root.path()), fs::read_dir(root.path().join("run/log")).unwrap().count());
+    let second = run_all(root.path(), &sweep(SEEDS, ""), &|_, _| panic!("nothing is to be run"));
+    assert_eq!((second.jobs_run, second.jobs_left, second.jobs_failed), (0, 0, 0));
+    assert!(tables_of(root.path()) == before);
+    assert_eq!(fs::read_dir(root.path().join("run/log")).unwrap().count(), logs);
+}
+
+/// Fails for one seed and panics for another, as long as told.
+fn faulty(job: &Job, faults: bool) -> Result<JobResult, SimulationError> {
+    match job.parameters.seed {
+        7 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
+        11 if faults => panic!("index {} out of bounds", 99),
+        _ => Ok(measure(&job.parameters)),
+    }
+}
+
+#[test]
+fn failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them() {
+    let root = tempfile::tempdir().unwrap();
+    let report = run_all(root.path(), &sweep(SEEDS, ""), &|job, _| faulty(job, true));
+    assert_eq!((report.jobs_run, report.jobs_failed, report.jobs_left), (2 * SEEDS, 4, 0));
+    let reasons: BTreeSet<String> = texts(root.path(), "jobs", "reason").into_iter().collect();
+    assert!(reasons.contains("panic: index 99 out of bounds"), "{reasons:?}");
+    assert!(reasons.iter().any(|reason| reason.contains("record.max_events")), "{reasons:?}");
+    assert_eq!(run_all(root.path(), &sweep(SEEDS, ""), &fine).jobs_failed, 4);
+
+    let before = tables_of(root.path());
+    let runs = AtomicU64::new(0);
+    let still = retry(root.path(), &sweep(SEEDS, ""), &|job, _| {
+        runs.fetch_add(1, Ordering::Relaxed);
+        faulty(job, true)
+    });
+    assert_eq!((runs.into_inner(), still.jobs_failed, still.jobs_left), (4, 4, 0));
+    assert!(tables_of(root.path()) == before);
+
+    let mended = retry(root.path(), &sweep(SEEDS, ""), &fine);
+    assert_eq!((mended.jobs_run, mended.jobs_failed), (4, 0));
+    assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
+fn an_extension_runs_the_new_jobs_alone_and_every_job_is_there_once() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    let before = tables_of(root.path());
+    let report = run_all(root.path(), &sweep(SEEDS + 5, ""), &|job, interrupt| {
+        assert!(job.parameters.seed >= SEEDS, "{job:?}");
+        fine(job, interrupt)
+    });
+    assert_eq!(report.jobs_run, 10);
+    assert_eq!(report.jobs_failed, 0);
+    let after = tables_of(root.path());
+    assert!(before.iter().all(|(path, bytes)| after[path] == *bytes));
+    let ids = texts(root.path(), "jobs", "job_id");
+    assert_eq!((ids.len() as u64, ids.iter().collect::<BTreeSet<_>>().len() as u64), (2 * SEEDS + 10, 2 * SEEDS + 10));
+    let narrowed = run_all(root.path(), &sweep(2, ""), &|_, _| panic!("nothing is to be run"));
+    assert_eq!(narrowed.jobs_run, 0);
+    assert!(tables_of(root.path()) == after);
+}
+
+#[test]
+fn missing_parts_that_are_no_longer_asked_for_are_not_run() {
+    let root = tempfile::tempdir().unwrap();
+    let stop = AtomicBool::new(true);
+    run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap();
+    let narrowed = run_all(root.path(), &sweep(1, ""), &fine);
+    assert!(narrowed.jobs_run >= 2 && narrowed.jobs_run < SEEDS, "{narrowed:?}");
+    let whole = run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    assert_eq!(narrowed.jobs_run + whole.jobs_run, 2 * SEEDS);
+    assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
+fn a_changed_model_is_refused_and_nothing_is_written() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(2, ""), &fine);
+    let all = |folder: &Path| {
+        let mut names = vec![];
+        let mut folders = vec![folder.to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let (path, metadata) = entry.map(|entry| (entry.path(), entry.metadata().unwrap())).unwrap();
+                names.push((path.clone(), metadata.modified().unwrap()));
+                folders.extend(metadata.is_dir().then_some(path));
+            }
+        }
+        names.sort();
+        names
+    };
+    let before = all(root.path());
+    let stop = AtomicBool::new(false);
+    let changed = run(&Disk, &sweep(2, "K = 2e8"), root.path(), options(&stop, 1), &fine, &mut |_| ());
+    assert!(changed.unwrap_err().to_string().contains("model.K"));
+    assert_eq!(all(root.path()), before);
+}
+
+#[test]
+fn a_damaged_part_is_named_with_the_way_out_which_works() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    let name = "part-000-000001.parquet";
+    let path = root.path().join("tables/jobs").join(name);
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
+    let stop = AtomicBool::new(false);
+    let error = run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap_err();
+    assert!(error.to_string().contains("jobs/part-000-000001.parquet: damaged"), "{error}");
+    for table in ["slips", "precursors", "jobs"] {
+        fs::remove_file(root.path().join("tables").join(table).join(name)).unwrap();
+    }
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
+fn the_same_shard_twice_is_refused_while_it_runs() {
+    let root = tempfile::tempdir().unwrap();
+    let second = Mutex::new(None);
+    run_all(root.path(), &sweep(1, ""), &|job, interrupt| {
+        let stop = AtomicBool::new(false);
+        let mut second = second.lock().unwrap();
+        if second.is_none() {
+            *second = run(&Disk, &sweep(1, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).err();
+        }
+        fine(job, interrupt)
+    });
+    let error = second.into_inner().unwrap().unwrap();
+    assert!(matches!(error, RunError::Locked { .. }), "{error}");
+    assert_eq!(run_all(root.path(), &sweep(1, ""), &fine).jobs_left, 0);
+}
+
+/// A disk of which the n-th change fails, and all after it: what a kill at that instant leaves.
+struct FailingDisk {
+    changes_left: Arc<AtomicU64>,
+}
+
+fn change(left: &AtomicU64) -> io::Result<()> {
+    let left = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+    left.map(|_| ()).map_err(|_| io::Error::from(io::ErrorKind::StorageFull))
+}
+
+impl FailingDisk {
+    fn change(&self) -> io::Result<()> {
+        change(&self.changes_left)
+    }
+}
+
+struct FailingFile {
+    file: Box<dyn StoredFile>,
+    changes_left: Arc<AtomicU64>,
+}
+
+impl io::Write for FailingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        change(&self.changes_left).and_then(|()| self.file.write(bytes))
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl StoredFile for FailingFile {
+    fn sync(&mut self) -> io::Result<()> {
+        change(&self.changes_left).and_then(|()| self.file.sync())
+    }
+}
+
+impl Storage for FailingDisk {
+    fn create_folder(&self, folder: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.create_folder(folder))
+    }
+    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
+        self.change()?;
+        Ok(Box::new(FailingFile { file: Disk.create(file)?, changes_left: Arc::clone(&self.changes_left) }))
+    }
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.rename(from, to))
+    }
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.sync_folder(folder))
+    }
+    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
+        Disk.list(folder)
+    }
+    fn open(&self, file: &Path) -> io::Result<File> {
+        Disk.open(file)
+    }
+    fn exists(&self, file: &Path) -> io::Result<bool> {
+        Disk.exists(file)
+    }
+    fn remove(&self, file: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.remove(file))
+    }
+    fn lock(&self, file: &Path) -> io::Result<Option<File>> {
+        self.change().and_then(|()| Disk.lock(file))
+    }
+}
+
+#[test]
+fn a_disk_that_fails_at_any_change_ends_the_run_with_an_error_and_the_next_run_completes_it() {
+    let expected = expected_tables();
+    let stop = AtomicBool::new(false);
+    // In steps that meet every kind of change at some part.
+    for changes in (0..).step_by(3) {
+        let root = tempfile::tempdir().unwrap();
+        let disk = FailingDisk { changes_left: Arc::new(AtomicU64::new(changes)) };
+        let ended = run(&disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &fine, &mut |_| ());
+        if root.path().join("tables/jobs").exists() {
+            // Every file that is there is whole, and a part has all its files.
+            let done = texts(root.path(), "jobs", "job_id");
+            for (path, bytes) in tables_of(root.path()) {
+                assert!(expected[&path] == bytes, "{} after {changes} changes", path.display());
+            }
+            assert!(done.len() as u64 <= 2 * SEEDS);
+        }
+        if ended.is_ok() {
+            assert!(changes > 40, "the disk was hardly used");
+            break;
+        }
+        run_all(root.path(), &sweep(SEEDS, ""), &fine);
+        assert!(tables_of(root.path()) == expected, "after {changes} changes");
+    }
+}
+
+#[test]
+fn the_status_tells_what_is_there_and_what_is_missing() {
+    let root = tempfile::tempdir().unwrap();
+    let stop = AtomicBool::new(false);
+    let half = Options { shard: "1/2".parse().unwrap(), ..options(&stop, 2) };
+    run(&Disk, &sweep(SEEDS, ""), root.path(), half, &|job, _| faulty(job, true), &mut |_| ()).unwrap();
+    let directory = Directory::read(&Disk, root.path()).unwrap();
+    let status = status(&Disk, &directory).unwrap();
+    let rows = texts(root.path(), "jobs", "outcome");
+    let failed = rows.iter().filter(|outcome| *outcome == tables::FAILED).count() as u64;
+    assert_eq!((status.jobs_failed, status.jobs_done), (failed, rows.len() as u64 - failed));
+    assert_eq!(status.jobs_missing, 2 * SEEDS - rows.len() as u64);
+    assert!(status.parts_done > 0 && status.parts_missing > 0 && status.running.is_empty());
+    assert!(status.pace.is_some_and(|pace| pace > 0.0) && status.time_left.is_some());
+    let total = status.predicted_cost_done + status.predicted_cost_missing;
+    assert!(total > PART_COST * (status.parts_done + status.parts_missing - 1) as f64);
+}
+
+#[test]
+fn events_account_for_every_job() {
+    let root = tempfile::tempdir().unwrap();
+    let stop = AtomicBool::new(false);
+    let (mut started, mut done, mut failed, mut committed, mut finished) = (0, 0, 0, 0, 0);
+    let kernel = |job: &Job, _: &AtomicBool| faulty(job, true);
+    run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &kernel, &mut |event| match event {
+        RunEvent::Started { jobs, .. } => started += jobs,
+        RunEvent::JobDone { .. } => done += 1,
+        RunEvent::JobFailed { job_id, .. } => {
+            assert_eq!(job_id.len(), 32);
+            failed += 1;
+        }
+        RunEvent::PartCommitted { jobs, .. } => committed += jobs as u64,
+        RunEvent::Stopping => panic!("nobody asked"),
+        RunEvent::Finished(report) => finished += report.jobs_run,
+    })
+    .unwrap();
+    assert_eq!((started, done, failed), (2 * SEEDS, 2 * SEEDS - 4, 4));
+    assert_eq!((committed, finished), (2 * SEEDS, 2 * SEEDS));
+}
+
+#[test]
+fn all_tables_have_the_described_columns() {
+    fn columns<Row>(table: &Table<Row>) -> Vec<String> {
+        table.schema().fields().iter().map(|field| field.name().clone()).collect()
+    }
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(3, ""), &fine);
+    let expected = [columns(&tables::slips()), columns(&tables::precursors()), columns(&tables::jobs())];
+    for (table, expected) in ["slips", "precursors", "jobs"].into_iter().zip(expected) {
+        let folder = Layout::new(root.path()).table(table);
+        let batch = Reader::of_folder(&Disk, &folder, None).unwrap().next().unwrap().unwrap();
+        let names: Vec<_> = batch.rows.schema().fields().iter().map(|field| field.name().clone()).collect();
+        assert_eq!(names, expected);
+    }
+}

@@ -1,0 +1,428 @@
+//! The manifest: what the tables of a directory belong to, and which sweeps were run in it.
+//!
+//! Opening a directory with a sweep is where mismatches are refused, before anything is written: a directory of something
+//! else, another model, solver or recording, other versions. A sweep that differs in its axes or conditions alone is added
+//! as a further *epoch*; results of values that it no longer has are kept.
+
+use crate::model::{MODEL_VERSION, RNG_SCHEME};
+use crate::store::commit::{Commit, clear, create_folder};
+use crate::store::dataset::PROGRAM;
+use crate::store::layout::{Layout, MANIFEST, RUN, RUN_FOLDERS};
+use crate::store::storage::{Storage, StorageError, wait_for_lock};
+use crate::store::tables;
+use crate::sweep::{PLAN_VERSION, Part, Sweep, SweepError};
+use arrow_schema::Schema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Version of the manifest and of the layout around it.
+const FORMAT: u32 = 1;
+/// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
+const WRITER: &str = "manifest";
+/// How long to wait for others that write the manifest: shards that begin together do so one after the other.
+const LONGEST_WAIT: Duration = Duration::from_secs(30);
+
+/// The file `run/manifest.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    format: u32,
+    /// The program that began the directory; any with the same versions below may go on.
+    program: String,
+    name: String,
+    model_version: u32,
+    rng_scheme: String,
+    plan_version: u32,
+    /// Names of the columns of each table that is recorded.
+    tables: BTreeMap<String, Vec<String>>,
+    /// Hashes of the sweep files, one for each epoch.
+    sweeps: Vec<String>,
+    /// The epoch whose sweep was asked for last.
+    current: usize,
+}
+
+/// The format alone, read first: a newer manifest may have keys that are not known here.
+#[derive(Deserialize)]
+struct Format {
+    format: u32,
+}
+
+impl Manifest {
+    fn new(sweep: &Sweep) -> Self {
+        let columns = |schema: &Schema| schema.fields().iter().map(|field| field.name().clone()).collect();
+        let mut recorded = vec![
+            (tables::slips().name, columns(&tables::slips().schema())),
+            (tables::jobs().name, columns(&tables::jobs().schema())),
+        ];
+        if sweep.recording().precursors {
+            recorded.push((tables::precursors().name, columns(&tables::precursors().schema())));
+        }
+        Self {
+            format: FORMAT,
+            program: PROGRAM.to_owned(),
+            name: sweep.name().to_owned(),
+            model_version: MODEL_VERSION,
+            rng_scheme: RNG_SCHEME.to_owned(),
+            plan_version: PLAN_VERSION,
+            tables: recorded.into_iter().map(|(name, columns)| (name.to_owned(), columns)).collect(),
+            sweeps: vec![hash(sweep.text())],
+            current: 0,
+        }
+    }
+
+    /// In what a manifest of this program would differ, sweeps aside.
+    fn difference(&self, ours: &Self) -> Vec<String> {
+        let versions = |manifest: &Self| {
+            [
+                ("model version", manifest.model_version.to_string()),
+                ("random numbers", manifest.rng_scheme.clone()),
+                ("plan version", manifest.plan_version.to_string()),
+            ]
+        };
+        let mut differences: Vec<String> = versions(self)
+            .into_iter()
+            .zip(versions(ours))
+            .filter(|(before, after)| before != after)
+            .map(|((key, before), (_, after))| format!("{key}: {before} -> {after}"))
+            .collect();
+        for (name, after) in &ours.tables {
+            let Some(before) = self.tables.get(name) else { continue };
+            let missing = |of: &[String], from: &[String]| -> Vec<String> {
+                of.iter().filter(|column| !from.contains(column)).cloned().collect()
+            };
+            let (gone, new) = (missing(before, after), missing(after, before));
+            if before != after {
+                differences.push(format!("columns of {name}: without {gone:?}, with {new:?}, or in another order"));
+            }
+        }
+        differences
+    }
+}
+
+fn hash(text: &str) -> String {
+    Sha256::digest(text).iter().fold(String::new(), |mut hexadecimal, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(hexadecimal, "{byte:02x}");
+        hexadecimal
+    })
+}
+
+/// Why a directory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DirectoryError {
+    /// A file operation failed.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// A sweep file of the directory is no longer understood.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    /// There is something, but no results.
+    #[error("{}: is not empty and no results directory (there is no run/manifest.json); choose another with --out", .0.display())]
+    NotOurs(PathBuf),
+    /// There are no results.
+    #[error("{}: is no results directory (there is no run/manifest.json)", .0.display())]
+    NoResults(PathBuf),
+    /// The results belong to something else.
+    #[error(
+        "{}: holds other results, nothing was changed:\n  {}\nchoose another directory with --out, or undo the change",
+        .path.display(), .differences.join("\n  ")
+    )]
+    Changed {
+        /// The directory.
+        path: PathBuf,
+        /// What differs, as `key: before -> after`.
+        differences: Vec<String>,
+    },
+    /// The manifest or a sweep file beside it does not read.
+    #[error("{}: damaged: {problem}; restore it from a copy, or begin in another directory with --out", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Written by a program that is newer than this one.
+    #[error("{}: has format {format}, this program knows {FORMAT}; use the program that wrote it", .path.display())]
+    Newer {
+        /// The manifest.
+        path: PathBuf,
+        /// Its format.
+        format: u32,
+    },
+    /// Another program is opening the same directory.
+    #[error("{}: is being opened by another run; try again in a moment", .0.display())]
+    Busy(PathBuf),
+}
+
+/// A results directory that fits this program.
+#[derive(Clone, Debug)]
+pub struct Directory {
+    layout: Layout,
+    sweeps: Vec<Sweep>,
+    current: usize,
+}
+
+impl Directory {
+    /// Opens the directory of a sweep: begins it, goes on with it, or adds an epoch.
+    ///
+    /// # Errors
+    /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
+    pub fn open(storage: &dyn Storage, root: &Path, sweep: &Sweep) -> Result<Self, DirectoryError> {
+        let layout = Layout::new(root);
+        if let Opened::Ready(directory) = Self::compare(storage, &layout, sweep)? {
+            return Ok(directory);
+        }
+        create_folder(storage, &layout.locks())?;
+        let lock = layout.locks().join(WRITER);
+        let _held =
+            wait_for_lock(storage, &lock, LONGEST_WAIT)?.ok_or_else(|| DirectoryError::Busy(root.to_owned()))?;
+        // Another run may have written the manifest before the lock was ours.
+        match Self::compare(storage, &layout, sweep)? {
+            Opened::Ready(directory) => Ok(directory),
+            Opened::ToWrite(manifest, sweeps) => {
+                let directory = Self { layout, sweeps, current: manifest.current };
+                directory.write(storage, &manifest)?;
+                Ok(directory)
+            }
+        }
+    }
+
+    /// Reads a directory as it is.
+    ///
+    /// # Errors
+    /// When it is no results directory, belongs to other versions, or is damaged.
+    pub fn read(storage: &dyn Storage, root: &Path) -> Result<Self, DirectoryError> {
+        let layout = Layout::new(root);
+        let (manifest, sweeps) =
+            read_manifest(storage, &layout)?.ok_or_else(|| DirectoryError::NoResults(root.to_owned()))?;
+        Ok(Self { layout, sweeps, current: manifest.current })
+    }
+
+    /// Where everything lies.
+    #[must_use]
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The sweeps that were run here, one for each epoch.
+    #[must_use]
+    pub fn sweeps(&self) -> &[Sweep] {
+        &self.sweeps
+    }
+
+    /// The epoch whose sweep was asked for last.
+    #[must_use]
+    pub const fn current(&self) -> usize {
+        self.current
+    }
+
+    /// Whether a part is to be there: it holds a job of the sweep that was asked for last.
+    #[must_use]
+    pub fn wants(&self, part: &Part) -> bool {
+        let current = &self.sweeps[self.current];
+        part.epoch == self.current || part.jobs.iter().any(|job| current.contains(&job.parameters))
+    }
+
+    fn compare(storage: &dyn Storage, layout: &Layout, sweep: &Sweep) -> Result<Opened, DirectoryError> {
+        let ours = Manifest::new(sweep);
+        let Some((mut manifest, mut sweeps)) = read_manifest(storage, layout)? else {
+            return if is_fresh(storage, layout)? {
+                Ok(Opened::ToWrite(ours, vec![sweep.clone()]))
+            } else {
+                Err(DirectoryError::NotOurs(layout.root().to_owned()))
+            };
+        };
+        let last = &sweeps[manifest.current];
+        let mut differences = manifest.difference(&ours);
+        differences.extend(last.difference(sweep).iter().map(ToString::to_string));
+        if !differences.is_empty() {
+            return Err(DirectoryError::Changed { path: layout.root().to_owned(), differences });
+        }
+        let epoch = sweeps.iter().position(|known| known.text() == sweep.text());
+        if epoch == Some(manifest.current) {
+            return Ok(Opened::Ready(Self { layout: layout.clone(), sweeps, current: manifest.current }));
+        }
+        manifest.current = epoch.unwrap_or_else(|| {
+            sweeps.push(sweep.clone());
+            manifest.sweeps.push(hash(sweep.text()));
+            sweeps.len() - 1
+        });
+        Ok(Opened::ToWrite(manifest, sweeps))
+    }
+
+    fn write(&self, storage: &dyn Storage, manifest: &Manifest) -> Result<(), DirectoryError> {
+        let staging = self.layout.staging(WRITER);
+        clear(storage, &staging)?;
+        let mut commit = Commit::begin(storage, &staging)?;
+        for (epoch, sweep) in self.sweeps.iter().enumerate() {
+            commit.stage_bytes(&self.layout.sweep(epoch), sweep.text().as_bytes())?;
+        }
+        let path = self.layout.manifest();
+        let mut text = serde_json::to_string_pretty(manifest)
+            .map_err(|error| DirectoryError::Damaged { path: path.clone(), problem: error.to_string() })?;
+        text.push('\n');
+        // Last, so that a manifest never names a sweep that is not there.
+        commit.stage_bytes(&path, text.as_bytes())?;
+        Ok(commit.publish()?)
+    }
+}
+
+/// What comparing a sweep with a directory says.
+enum Opened {
+    /// The directory is as it should be.
+    Ready(Directory),
+    /// It will be with this manifest and these sweeps.
+    ToWrite(Manifest, Vec<Sweep>),
+}
+
+/// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.
+fn is_fresh(storage: &dyn Storage, layout: &Layout) -> Result<bool, StorageError> {
+    let list = |folder: &Path| storage.list(folder).map_err(StorageError::at("list", folder));
+    let first_sweep = layout.sweep(0);
+    let ours = |name: &std::ffi::OsString| {
+        RUN_FOLDERS.iter().any(|folder| name == folder) || Some(name.as_os_str()) == first_sweep.file_name()
+    };
+    Ok(list(layout.root())?.iter().all(|name| name == RUN) && list(&layout.run())?.iter().all(ours))
+}
+
+fn read_text(storage: &dyn Storage, path: &Path) -> Result<String, DirectoryError> {
+    let mut bytes = Vec::new();
+    let read = storage.open(path).and_then(|mut file| file.read_to_end(&mut bytes));
+    read.map_err(StorageError::at("read", path))?;
+    String::from_utf8(bytes)
+        .map_err(|error| DirectoryError::Damaged { path: path.to_owned(), problem: error.to_string() })
+}
+
+/// The manifest and its sweeps, verified; `None` if there is no manifest.
+fn read_manifest(storage: &dyn Storage, layout: &Layout) -> Result<Option<(Manifest, Vec<Sweep>)>, DirectoryError> {
+    let path = layout.run().join(MANIFEST);
+    if !storage.exists(&path).map_err(StorageError::at("look up", &path))? {
+        return Ok(None);
+    }
+    let damaged = |path: &Path, problem: String| DirectoryError::Damaged { path: path.to_owned(), problem };
+    let text = read_text(storage, &path)?;
+    let Format { format } = serde_json::from_str(&text).map_err(|error| damaged(&path, error.to_string()))?;
+    if format > FORMAT {
+        return Err(DirectoryError::Newer { path, format });
+    }
+    let manifest: Manifest = serde_json::from_str(&text).map_err(|error| damaged(&path, error.to_string()))?;
+    if manifest.current >= manifest.sweeps.len() {
+        return Err(damaged(&path, format!("there is no sweep {}", manifest.current)));
+    }
+    let mut sweeps = Vec::with_capacity(manifest.sweeps.len());
+    for (epoch, expected) in manifest.sweeps.iter().enumerate() {
+        let path = layout.sweep(epoch);
+        let text = read_text(storage, &path)?;
+        if hash(&text) != *expected {
+            return Err(damaged(&path, "it was changed; edit the original sweep file instead".to_owned()));
+        }
+        sweeps.push(Sweep::parse(&text, &path)?);
+    }
+    Ok(Some((manifest, sweeps)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::storage::Disk;
+    use std::collections::BTreeSet;
+    use std::fs;
+
+    fn sweep(text: &str) -> Sweep {
+        Sweep::parse(&format!("name = \"test\"\n{text}"), Path::new("test.toml")).unwrap()
+    }
+
+    /// Every file below a folder with its bytes.
+    fn contents(folder: &Path) -> BTreeSet<(PathBuf, Vec<u8>)> {
+        let mut all = BTreeSet::new();
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                all.extend(contents(&path));
+            } else {
+                all.insert((path.clone(), fs::read(&path).unwrap()));
+            }
+        }
+        all
+    }
+
+    const TWO_SEEDS: &str = "[axes]\nseed = [0, 1]\n";
+    const THREE_SEEDS: &str = "[axes]\nseed = [0, 1, 2]\n";
+
+    #[test]
+    fn a_directory_is_begun_resumed_extended_and_narrowed() {
+        let root = tempfile::tempdir().unwrap();
+        let open = |text| Directory::open(&Disk, root.path(), &sweep(text)).unwrap();
+        assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (1, 0));
+        let before = contents(root.path());
+        open(TWO_SEEDS);
+        assert_eq!(contents(root.path()), before);
+        assert_eq!((open(THREE_SEEDS).sweeps().len(), open(THREE_SEEDS).current()), (2, 1));
+        assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (2, 0));
+        let read = Directory::read(&Disk, root.path()).unwrap();
+        assert_eq!((read.sweeps()[1].text(), read.current()), (sweep(THREE_SEEDS).text(), 0));
+    }
+
+    #[test]
+    fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing_is_written() {
+        let root = tempfile::tempdir().unwrap();
+        Directory::open(&Disk, root.path(), &sweep("[model]\nK = 1e8\n[record]\nslips = 3")).unwrap();
+        let refused = |text: &str, differences: &[&str]| {
+            let before = contents(root.path());
+            let error = Directory::open(&Disk, root.path(), &sweep(text)).unwrap_err().to_string();
+            assert!(differences.iter().all(|difference| error.contains(difference)), "{error}");
+            assert!(error.contains("--out"), "{error}");
+            assert_eq!(contents(root.path()), before);
+        };
+        refused("[model]\nK = 2e8\n[record]\nslips = 4", &["model.K", "record.slips: 3 -> 4"]);
+        let path = root.path().join("run/manifest.json");
+        let text = fs::read_to_string(&path).unwrap();
+        let other = text.replace(RNG_SCHEME, "dice").replace("\"onset\"", "\"start\"");
+        assert_ne!(text, other);
+        fs::write(&path, other).unwrap();
+        refused("[model]\nK = 1e8\n[record]\nslips = 3", &["random numbers: dice -> ", "without [\"start\"]"]);
+        fs::write(&path, text.replace("\"format\": 1", "\"format\": 2, \"new\": 0")).unwrap();
+        let error = Directory::read(&Disk, root.path()).unwrap_err().to_string();
+        assert!(error.contains("has format 2"), "{error}");
+    }
+
+    #[test]
+    fn a_directory_of_something_else_is_refused_and_an_unfinished_beginning_is_not() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir_all(root.path().join("run/staging/manifest")).unwrap();
+        fs::write(root.path().join("run/sweep-000.toml"), "half a sw").unwrap();
+        fs::write(root.path().join("thesis.tex"), "").unwrap();
+        let before = contents(root.path());
+        let error = Directory::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap_err();
+        assert!(matches!(error, DirectoryError::NotOurs(_)), "{error}");
+        assert_eq!(contents(root.path()), before);
+        fs::remove_file(root.path().join("thesis.tex")).unwrap();
+        Directory::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap();
+    }
+
+    #[test]
+    fn a_changed_or_cut_file_of_the_directory_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        Directory::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap();
+        for name in ["run/sweep-000.toml", "run/manifest.json"] {
+            let path = root.path().join(name);
+            let bytes = fs::read(&path).unwrap();
+            fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            let error = Directory::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap_err();
+            assert!(error.to_string().contains(&format!("{name}: damaged")), "{error}");
+            fs::write(&path, bytes).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_missing_directory_is_no_results() {
+        let root = tempfile::tempdir().unwrap();
+        let error = Directory::read(&Disk, &root.path().join("missing")).unwrap_err();
+        assert!(matches!(error, DirectoryError::NoResults(_)), "{error}");
+    }
+}

@@ -1,0 +1,20 @@
+//! Store: tables as Parquet files, committed so that a folder holds whole files only, whatever happens.
+//!
+//! ```text
+//! columns.rs -> tables.rs     what is written: each column described once
+//!               records.rs    what one simulation writes on request
+//! dataset.rs                  one table as files: same rows, same bytes
+//! storage.rs -> commit.rs     files that appear whole or not at all
+//! layout.rs, manifest.rs      a directory, and which sweeps it belongs to
+//! part.rs                     the rows of some jobs, in all tables at once
+//! ```
+
+pub mod columns;
+pub mod commit;
+pub mod dataset;
+pub mod layout;
+pub mod manifest;
+pub mod part;
+pub mod records;
+pub mod storage;
+pub mod tables;

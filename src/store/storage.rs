@@ -1,0 +1,151 @@
+//! Storage: the few file operations that results go through, so that a faulty disk can be put underneath.
+
+use std::ffi::OsString;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How often to look whether a lock is free.
+const LOCK_POLL: Duration = Duration::from_millis(20);
+
+/// A file that is being written.
+pub trait StoredFile: Write + Send {
+    /// Returns when all that was written is on the disk.
+    ///
+    /// # Errors
+    /// When it cannot be brought there.
+    fn sync(&mut self) -> io::Result<()>;
+}
+
+/// The file operations. Every error is that of the operating system.
+#[allow(clippy::missing_errors_doc, reason = "said once for all")]
+pub trait Storage: Sync {
+    /// Creates a folder and its parents; nothing happens if it is there.
+    fn create_folder(&self, folder: &Path) -> io::Result<()>;
+    /// Creates a file, or empties it.
+    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>>;
+    /// Renames a file within the file system, over another if there is one.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Returns when the names in a folder are on the disk.
+    fn sync_folder(&self, folder: &Path) -> io::Result<()>;
+    /// Names in a folder, sorted; none if there is no such folder.
+    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>>;
+    /// Opens a file for reading.
+    fn open(&self, file: &Path) -> io::Result<File>;
+    /// Whether a file is there.
+    fn exists(&self, file: &Path) -> io::Result<bool>;
+    /// Removes a file.
+    fn remove(&self, file: &Path) -> io::Result<()>;
+    /// Locks a file, created if needed, until the handle is dropped or the process ends. `None`: another holds it.
+    fn lock(&self, file: &Path) -> io::Result<Option<File>>;
+}
+
+/// A file operation that failed.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot {action}: {source}; all that was committed before is kept", .path.display())]
+pub struct StorageError {
+    /// What was tried.
+    pub action: &'static str,
+    /// On what.
+    pub path: PathBuf,
+    /// The operating system's reason.
+    pub source: io::Error,
+}
+
+impl StorageError {
+    /// For `map_err`: the failed action and its path.
+    pub fn at(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self { action, path: path.to_owned(), source }
+    }
+}
+
+/// Takes a lock as soon as it is free; `None` if it was not after the longest wait.
+///
+/// # Errors
+/// When the file cannot be locked at all.
+pub fn wait_for_lock(storage: &dyn Storage, file: &Path, longest_wait: Duration) -> Result<Option<File>, StorageError> {
+    let begin = Instant::now();
+    loop {
+        let held = storage.lock(file).map_err(StorageError::at("lock", file))?;
+        if held.is_some() || begin.elapsed() >= longest_wait {
+            return Ok(held);
+        }
+        std::thread::sleep(LOCK_POLL);
+    }
+}
+
+/// The file system of the operating system.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Disk;
+
+impl StoredFile for File {
+    fn sync(&mut self) -> io::Result<()> {
+        self.sync_all()
+    }
+}
+
+impl Storage for Disk {
+    fn create_folder(&self, folder: &Path) -> io::Result<()> {
+        fs::create_dir_all(folder)
+    }
+
+    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
+        Ok(Box::new(File::create(file)?))
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        File::open(folder)?.sync_all()
+    }
+
+    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
+        let entries = match fs::read_dir(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            entries => entries?,
+        };
+        let mut names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>()?;
+        names.sort();
+        Ok(names)
+    }
+
+    fn open(&self, file: &Path) -> io::Result<File> {
+        File::open(file)
+    }
+
+    fn exists(&self, file: &Path) -> io::Result<bool> {
+        file.try_exists()
+    }
+
+    fn remove(&self, file: &Path) -> io::Result<()> {
+        fs::remove_file(file)
+    }
+
+    fn lock(&self, file: &Path) -> io::Result<Option<File>> {
+        let handle = File::options().create(true).truncate(false).write(true).open(file)?;
+        match handle.try_lock() {
+            Ok(()) => Ok(Some(handle)),
+            Err(TryLockError::WouldBlock) => Ok(None),
+            Err(TryLockError::Error(error)) => Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lock_is_refused_while_held_and_free_afterwards() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("lock");
+        let held = Disk.lock(&file).unwrap();
+        assert!(held.is_some());
+        assert!(Disk.lock(&file).unwrap().is_none());
+        drop(held);
+        assert!(Disk.lock(&file).unwrap().is_some());
+    }
+}

@@ -1,0 +1,169 @@
+//! Checks of a sweep as a whole: nothing is set twice, nothing is without effect, every job is valid.
+//!
+//! Single values were checked where they were read. What is left are bounds on combinations (`N N_s`, `dfs <= fs`, the
+//! period behind η), each monotonic in its quantities: if the two worst corners of the grid are valid, all points are. If
+//! not, the points are walked through, since a corner may be no point, or dropped by a condition.
+
+use super::axes::Axis;
+use super::plan::Sweep;
+use super::quantity::{Point, Quantity};
+use super::read_axes::PlacedAxis;
+use super::source::{Section, Source, SweepError};
+use crate::model::{Shortest, Symbol, Value};
+
+/// Where each quantity is set.
+pub(super) struct Places<'a> {
+    source: Source<'a>,
+    set: Vec<Place>,
+}
+
+struct Place {
+    quantity: Quantity,
+    /// Byte of the text.
+    at: usize,
+    in_model: bool,
+}
+
+impl<'a> Places<'a> {
+    pub const fn new(source: Source<'a>) -> Self {
+        Self { source, set: Vec::new() }
+    }
+
+    /// A parameter is set in `[model]`.
+    pub fn model(&mut self, symbol: Symbol, at: usize) {
+        self.set.push(Place { quantity: Quantity::Parameter(symbol), at, in_model: true });
+    }
+
+    /// A quantity is set on an axis; refused if something else sets it, or the period, already.
+    fn axis(&mut self, quantity: Quantity, at: usize) -> Result<(), SweepError> {
+        let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
+        if let Some(place) = self.set.iter().find(clash) {
+            let (key, other) = (quantity.key(), place.quantity.key());
+            let section = if place.in_model { "[model]" } else { "[axes]" };
+            let line = self.source.line(place.at);
+            let problem = if place.quantity == quantity {
+                format!("{key}: is set in {section}, too (line {line}); keep one")
+            } else {
+                format!("{key}: fixes the period, as does {other} in {section} (line {line}); keep one")
+            };
+            return Err(self.source.error(at, problem));
+        }
+        self.set.push(Place { quantity, at, in_model: false });
+        Ok(())
+    }
+
+    /// An error where a quantity is set, or the one that bounds it, or at the head of the file.
+    fn error(&self, quantity: Quantity, problem: String) -> SweepError {
+        let bound = match quantity {
+            Quantity::Parameter(Symbol::Dfs) => Quantity::Parameter(Symbol::Fs),
+            Quantity::Parameter(Symbol::Ns) => Quantity::Parameter(Symbol::N),
+            other => other,
+        };
+        let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
+        self.source.error(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
+    }
+}
+
+/// Refuses axes that set what is set elsewhere.
+pub(super) fn without_conflicts(axes: Vec<PlacedAxis>, places: &mut Places<'_>) -> Result<Vec<Axis>, SweepError> {
+    axes.into_iter()
+        .map(|placed| {
+            placed.places.into_iter().try_for_each(|(quantity, at)| places.axis(quantity, at))?;
+            Ok(placed.axis)
+        })
+        .collect()
+}
+
+/// All checks of a sweep that is read.
+pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), SweepError> {
+    let place_of = |key: &str| file.entry(key).map_or(0, |entry| entry.at);
+    if sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len())).is_none() {
+        let problem = "[axes]: 2^64 points or more; take fewer, or a sample ([axes.sobol])";
+        return Err(file.source.error(place_of("axes"), problem));
+    }
+    period(sweep, places)?;
+    if !corners_are_valid(sweep)
+        && let Some((quantity, problem)) = sweep.walk().find_map(|point| invalid(sweep, &point))
+    {
+        return Err(places.error(quantity, problem));
+    }
+    if sweep.walk().next().is_none() {
+        return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
+    }
+    Ok(())
+}
+
+/// A period without modulation has no effect, and a modulation without period no meaning.
+fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), SweepError> {
+    let is_modulated = values(sweep, Symbol::Delta).iter().any(|amplitude| *amplitude > 0.0);
+    match places.set.iter().find(|place| place.quantity.is_period()) {
+        Some(place) if !is_modulated => {
+            let key = place.quantity.key();
+            let problem = format!(
+                "{key}: has no effect while Delta = 0; set Delta > 0 in [model] or on an axis, or remove {key}"
+            );
+            Err(places.source.error(place.at, problem))
+        }
+        None if is_modulated => {
+            let problem = "Delta > 0: needs a period; set T in [model], or T, eta or frequency on an axis";
+            Err(places.error(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The values of a parameter over all points, or the ends of a long range.
+fn values(sweep: &Sweep, symbol: Symbol) -> Vec<f64> {
+    let quantity = Quantity::Parameter(symbol);
+    let on_axis: Vec<f64> = sweep.axes.iter().flat_map(|axis| axis.numbers(quantity)).collect();
+    if on_axis.is_empty() { vec![sweep.point(&[]).number(quantity)] } else { on_axis }
+}
+
+/// Whether the points with the most contacts, the least threshold, the largest deviation and the shortest or the longest
+/// period would be valid.
+fn corners_are_valid(sweep: &Sweep) -> bool {
+    let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let amplitudes: Vec<f64> = values(sweep, Symbol::Delta).into_iter().filter(|amplitude| *amplitude > 0.0).collect();
+    let etas: Vec<f64> = sweep.axes.iter().flat_map(|axis| axis.numbers(Quantity::Eta)).collect();
+    [false, true].into_iter().all(|longest| {
+        let pick = |values: &[f64], largest: bool| if largest { most(values) } else { least(values) };
+        let mut corner = sweep.point(&vec![0; sweep.axes.len()]);
+        for (symbol, largest) in
+            [(Symbol::N, true), (Symbol::Ns, true), (Symbol::Fs, false), (Symbol::Dfs, true), (Symbol::V0, !longest)]
+        {
+            corner.set(Quantity::Parameter(symbol), Value::Real(pick(&values(sweep, symbol), largest)));
+        }
+        if !amplitudes.is_empty() {
+            corner.set(Quantity::Parameter(Symbol::Delta), Value::Real(pick(&amplitudes, longest)));
+        }
+        if !etas.is_empty() {
+            corner.set(Quantity::Eta, Value::Real(pick(&etas, !longest)));
+        }
+        invalid(sweep, &corner.canonical()).is_none()
+    })
+}
+
+/// What is wrong with a canonical point, and the quantity to blame.
+fn invalid(sweep: &Sweep, point: &Point) -> Option<(Quantity, String)> {
+    let (quantity, problem) = if point.period_is_derivable() {
+        let error = point.parameters.clone().validated().err()?;
+        (Quantity::Parameter(error.symbol), error.to_string())
+    } else {
+        let period = Shortest(point.number(Quantity::Parameter(Symbol::T)));
+        (Quantity::Eta, format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100"))
+    };
+    let moved: Vec<String> = sweep
+        .axes
+        .iter()
+        .flat_map(Axis::quantities)
+        .filter(|quantity| *quantity != Quantity::Parameter(Symbol::BreakOn))
+        .map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity))))
+        .collect();
+    let place = if moved.is_empty() {
+        String::new()
+    } else {
+        format!(", at the point {}; change the axes, or drop it by a where", moved.join(", "))
+    };
+    Some((quantity, format!("{problem}{place}")))
+}

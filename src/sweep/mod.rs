@@ -1,0 +1,31 @@
+//! Sweeps: a file that says what to run, and the jobs and parts that follow from it.
+//!
+//! ```text
+//! sweep file -> axes, filter -> points -> jobs -> parts
+//!   file.rs     axes.rs filter.rs  plan.rs  job.rs   parts.rs
+//! ```
+//!
+//! Nothing here runs or writes anything. A plan is a function of the file's text alone: the same jobs in the same order,
+//! the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks one up
+//! without walking.
+
+mod axes;
+mod check;
+mod cost;
+mod file;
+mod filter;
+mod job;
+mod parts;
+mod plan;
+mod quantity;
+mod read_axes;
+mod samples;
+mod source;
+#[cfg(test)]
+mod tests;
+
+pub use cost::{predicted_cost, predicted_interval};
+pub use job::{Identity, Job, JobId, SetId};
+pub use parts::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Parts, Plan, Totals};
+pub use plan::{Difference, Jobs, Sweep};
+pub use source::SweepError;

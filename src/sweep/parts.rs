@@ -1,0 +1,129 @@
+//! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
+//!
+//! Each sweep that is run in a directory opens an *epoch*, which owns the jobs that are in no earlier sweep. A *part* is a
+//! run of consecutive jobs of an epoch, committed together: it ends with the job that brings its predicted cost to
+//! [`PART_COST`], or its jobs to [`PART_JOBS`]. Contract: parts are a function of the texts of the sweeps and of
+//! [`PLAN_VERSION`] alone. Memory: one part.
+
+use super::job::Job;
+use super::plan::{Jobs, Sweep};
+
+/// Predicted CPU time after which a part is full, in s: little is lost with an unfinished part, and files stay few.
+pub const PART_COST: f64 = 5.0;
+/// Most jobs of a part, so that a part of cheap jobs fits in memory.
+pub const PART_JOBS: usize = 4096;
+/// Version of the way from sweeps to parts: order, cost and limits. A directory keeps the one that it was begun with.
+pub const PLAN_VERSION: u32 = 1;
+
+/// The sweeps of a directory in the order in which they were run.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan<'a> {
+    epochs: &'a [Sweep],
+}
+
+/// Consecutive jobs of an epoch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Number of the epoch, from 0.
+    pub epoch: usize,
+    /// Number of the part within its epoch, from 0.
+    pub index: u64,
+    /// Its jobs, in plan order. At least one.
+    pub jobs: Vec<Job>,
+    /// Sum of their predicted CPU times, in s.
+    pub cost: f64,
+}
+
+/// What a plan adds up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Number of jobs.
+    pub jobs: u64,
+    /// Number of parts.
+    pub parts: u64,
+    /// Predicted CPU time, in s.
+    pub cost: f64,
+}
+
+impl<'a> Plan<'a> {
+    /// The plan of these sweeps. Sweeps of one directory differ in axes and conditions only, see [`Sweep::difference`].
+    #[must_use]
+    pub const fn new(epochs: &'a [Sweep]) -> Self {
+        Self { epochs }
+    }
+
+    /// The jobs that an epoch owns, in grid order. Empty for an epoch that is not there.
+    pub fn jobs(&self, epoch: usize) -> impl Iterator<Item = Job> + Send + use<'a> {
+        self.owned(epoch).into_iter().flatten()
+    }
+
+    /// The parts of an epoch, in order. Empty for an epoch that is not there.
+    #[must_use]
+    pub fn parts_of(&self, epoch: usize) -> Parts<'a> {
+        Parts { epoch, next: 0, jobs: self.owned(epoch) }
+    }
+
+    /// The parts of all epochs, in order.
+    pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
+        (0..self.epochs.len()).flat_map(move |epoch| self.parts_of(epoch))
+    }
+
+    /// Walks through the plan and adds up.
+    #[must_use]
+    pub fn totals(self) -> Totals {
+        self.parts().fold(Totals::default(), |totals, part| Totals {
+            jobs: totals.jobs + part.jobs.len() as u64,
+            parts: totals.parts + 1,
+            cost: totals.cost + part.cost,
+        })
+    }
+
+    fn owned(&self, epoch: usize) -> Option<Owned<'a>> {
+        let sweep = self.epochs.get(epoch)?;
+        Some(Owned { jobs: sweep.jobs(), earlier: &self.epochs[..epoch] })
+    }
+}
+
+/// The jobs of an epoch that are in no earlier sweep.
+#[derive(Clone, Debug)]
+struct Owned<'a> {
+    jobs: Jobs<'a>,
+    earlier: &'a [Sweep],
+}
+
+impl Iterator for Owned<'_> {
+    type Item = Job;
+
+    fn next(&mut self) -> Option<Job> {
+        self.jobs.find(|job| !self.earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
+    }
+}
+
+/// The parts of an epoch, lazily.
+#[derive(Clone, Debug)]
+pub struct Parts<'a> {
+    epoch: usize,
+    next: u64,
+    jobs: Option<Owned<'a>>,
+}
+
+impl Iterator for Parts<'_> {
+    type Item = Part;
+
+    fn next(&mut self) -> Option<Part> {
+        let source = self.jobs.as_mut()?;
+        let mut jobs = Vec::new();
+        let mut cost = 0.0;
+        while cost < PART_COST && jobs.len() < PART_JOBS {
+            let Some(job) = source.next() else { break };
+            cost += job.cost;
+            jobs.push(job);
+        }
+        if jobs.is_empty() {
+            return None;
+        }
+        let index = self.next;
+        self.next += 1;
+        Some(Part { epoch: self.epoch, index, jobs, cost })
+    }
+}

@@ -1,0 +1,238 @@
+//! A sweep: the points of its axes in grid order, those that are jobs, and the look-up of a job without walking.
+//!
+//! Grid order: axes as in the file, the last moves fastest. A point is a job if the condition holds and no earlier point
+//! has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing: there the
+//! first row of the axis that fixes the period counts (see [`Axis`]). Conditions see canonical values, so they judge such
+//! points alike. Memory does not grow with the number of points.
+
+use super::axes::Axis;
+use super::cost::predicted_cost;
+use super::filter::Condition;
+use super::job::{Identity, Job, JobId, SetId, settings};
+use super::quantity::{Period, Point, Quantity};
+use crate::model::{Parameters, Symbol};
+use crate::observe::Recording;
+use crate::solver::Solver;
+use std::fmt;
+
+/// A sweep file, parsed.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    pub(super) name: String,
+    pub(super) text: String,
+    /// `[model]` over the defaults; what an axis sets is not used.
+    pub(super) base: Parameters,
+    pub(super) axes: Vec<Axis>,
+    /// All must hold.
+    pub(super) conditions: Vec<Condition>,
+    pub(super) recording: Recording,
+    pub(super) solver: Solver,
+    pub(super) identity: Identity,
+}
+
+/// Something besides axes and conditions in which two sweeps differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// Section and key, such as `model.K`.
+    pub key: String,
+    /// The value in the first sweep.
+    pub before: String,
+    /// The value in the other.
+    pub after: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} -> {}", self.key, self.before, self.after)
+    }
+}
+
+impl Sweep {
+    /// The name: letters, digits, `_` and `-`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The text of the file.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What every job records.
+    #[must_use]
+    pub const fn recording(&self) -> &Recording {
+        &self.recording
+    }
+
+    /// The solver of every job.
+    #[must_use]
+    pub const fn solver(&self) -> Solver {
+        self.solver
+    }
+
+    /// Each axis in grid order: the keys that it moves, joined by commas, and its number of rows.
+    pub fn axes(&self) -> impl Iterator<Item = (String, u64)> {
+        self.axes.iter().map(|axis| {
+            let keys: Vec<&str> = axis.quantities().into_iter().map(Quantity::key).collect();
+            (keys.join(", "), axis.len())
+        })
+    }
+
+    /// Number of points of the grid, before the conditions drop some. Fits, as the file was refused otherwise.
+    #[must_use]
+    pub fn point_count(&self) -> u64 {
+        self.axes.iter().map(Axis::len).product()
+    }
+
+    /// The jobs in grid order.
+    #[must_use]
+    pub fn jobs(&self) -> Jobs<'_> {
+        Jobs { walk: self.walk() }
+    }
+
+    /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
+    #[must_use]
+    pub fn contains(&self, parameters: &Parameters) -> bool {
+        let Some(rows) = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<Vec<u64>>>() else {
+            return false;
+        };
+        self.admitted(&rows, self.point(&rows)).is_some_and(|point| point.parameters == *parameters)
+    }
+
+    /// The id of a job.
+    #[must_use]
+    pub fn job_id(&self, parameters: &Parameters) -> JobId {
+        self.identity.job(parameters)
+    }
+
+    /// The id of the set of a job.
+    #[must_use]
+    pub fn set_id(&self, parameters: &Parameters) -> SetId {
+        self.identity.set(parameters)
+    }
+
+    /// In what another sweep differs besides axes and conditions: name, model, recording, solver. Parameters that an axis
+    /// of either sets are left out, as an axis may be added, changed or dropped.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Vec<Difference> {
+        let moved = |symbol| self.moves(symbol) || other.moves(symbol);
+        let values = |sweep: &Self| {
+            let model = Symbol::ALL
+                .into_iter()
+                .filter(|symbol| !moved(*symbol))
+                .map(|symbol| (format!("model.{}", symbol.key()), sweep.base.get(symbol).to_string()));
+            let settings = settings(sweep.solver, &sweep.recording);
+            let settings = settings.into_iter().map(|(key, value)| (key.to_owned(), value));
+            std::iter::once(("name".to_owned(), sweep.name.clone())).chain(model).chain(settings).collect::<Vec<_>>()
+        };
+        let (before, after) = (values(self), values(other));
+        let value = |values: &[(String, String)], key: &str| {
+            values.iter().find(|(other, _)| other == key).map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
+        };
+        let mut keys: Vec<&String> = Vec::new();
+        for (key, _) in before.iter().chain(&after) {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        keys.into_iter()
+            .map(|key| Difference { key: key.clone(), before: value(&before, key), after: value(&after, key) })
+            .filter(|difference| difference.before != difference.after)
+            .collect()
+    }
+
+    /// Whether an axis sets a parameter; T also through η or the frequency.
+    fn moves(&self, symbol: Symbol) -> bool {
+        self.axes
+            .iter()
+            .flat_map(Axis::quantities)
+            .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
+    }
+
+    /// All points, before the conditions.
+    pub(super) fn walk(&self) -> Walk<'_> {
+        let rows = vec![0; self.axes.len()];
+        Walk { sweep: self, point: self.point(&rows), rows, ended: false }
+    }
+
+    /// The point of these rows, as the axes set it.
+    pub(super) fn point(&self, rows: &[u64]) -> Point {
+        let mut point = Point { parameters: self.base.clone(), period: Period::Given };
+        for (axis, &row) in self.axes.iter().zip(rows) {
+            axis.apply(row, &mut point);
+        }
+        point
+    }
+
+    /// The canonical form of a point that is a job.
+    pub(super) fn admitted(&self, rows: &[u64], point: Point) -> Option<Point> {
+        let first = point.is_modulated() || self.axes.iter().zip(rows).all(|(axis, &row)| axis.is_first(row));
+        if !first {
+            return None;
+        }
+        let point = point.canonical();
+        self.conditions.iter().all(|condition| condition.holds(&point)).then_some(point)
+    }
+}
+
+/// A walk through the points of a sweep.
+#[derive(Clone, Debug)]
+pub(super) struct Walk<'a> {
+    sweep: &'a Sweep,
+    /// The point that comes next, as the axes set it.
+    point: Point,
+    rows: Vec<u64>,
+    ended: bool,
+}
+
+impl Walk<'_> {
+    fn advance(&mut self) {
+        for (axis, row) in self.sweep.axes.iter().zip(&mut self.rows).rev() {
+            *row += 1;
+            let carried = *row == axis.len();
+            if carried {
+                *row = 0;
+            }
+            axis.apply(*row, &mut self.point);
+            if !carried {
+                return;
+            }
+        }
+        self.ended = true;
+    }
+}
+
+impl Iterator for Walk<'_> {
+    /// A point that is a job, in canonical form.
+    type Item = Point;
+
+    fn next(&mut self) -> Option<Point> {
+        while !self.ended {
+            let admitted = self.sweep.admitted(&self.rows, self.point.clone());
+            self.advance();
+            if admitted.is_some() {
+                return admitted;
+            }
+        }
+        None
+    }
+}
+
+/// The jobs of a sweep, lazily, in grid order.
+#[derive(Clone, Debug)]
+pub struct Jobs<'a> {
+    walk: Walk<'a>,
+}
+
+impl Iterator for Jobs<'_> {
+    type Item = Job;
+
+    fn next(&mut self) -> Option<Job> {
+        let parameters = self.walk.next()?.parameters;
+        let sweep = self.walk.sweep;
+        let cost = predicted_cost(&parameters, &sweep.recording, sweep.solver);
+        Some(Job { parameters, cost })
+    }
+}

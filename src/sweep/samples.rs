@@ -1,0 +1,132 @@
+//! Ranges and points on them: evenly spaced, and space-filling in several dimensions.
+//!
+//! Sobol: Owen-scrambled (B. Burley, JCGT 9(4), 2020; crate `sobol_burley`); the first points of a longer sample are those
+//! of a shorter one. Latin hypercube: one `ChaCha8` stream a dimension permutes the strata and places a point in each
+//! (M. D. McKay et al., Technometrics 21, 239, 1979). Logarithms and exponentials come from `libm`: the same bits on every
+//! machine.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Most points of a Sobol sample: the length of the sequence.
+pub(super) const MOST_SOBOL_POINTS: u64 = 1 << 16;
+
+/// A range of a quantity, low < high.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    pub low: f64,
+    pub high: f64,
+    /// Even in the logarithm; both ends are > 0.
+    pub logarithmic: bool,
+}
+
+impl Range {
+    /// The value at a fraction of the way, 0 to 1; the ends are exact.
+    pub fn at(&self, fraction: f64) -> f64 {
+        if fraction <= 0.0 {
+            return self.low;
+        }
+        if fraction >= 1.0 {
+            return self.high;
+        }
+        let value = if self.logarithmic {
+            let (low, high) = (libm::log(self.low), libm::log(self.high));
+            libm::exp(low + (high - low) * fraction)
+        } else {
+            // Two terms: the difference of the ends may overflow.
+            self.low * (1.0 - fraction) + self.high * fraction
+        };
+        value.clamp(self.low, self.high)
+    }
+
+    /// Evenly spaced values, ends included. At least two.
+    pub fn spaced(&self, points: u64) -> impl Iterator<Item = f64> {
+        let last = (points - 1) as f64;
+        (0..points).map(move |point| self.at(point as f64 / last))
+    }
+}
+
+/// A space-filling sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sample {
+    Sobol,
+    Latin,
+}
+
+impl Sample {
+    /// The coordinates of all points in one dimension, each in [0, 1).
+    pub fn coordinates(self, dimension: u32, points: u32, seed: u32) -> Vec<f64> {
+        match self {
+            Self::Sobol => (0..points).map(|point| f64::from(sobol_burley::sample(point, dimension, seed))).collect(),
+            Self::Latin => {
+                let mut generator = ChaCha8Rng::seed_from_u64(u64::from(seed));
+                generator.set_stream(u64::from(dimension));
+                let mut strata: Vec<u32> = (0..points).collect();
+                for last in (1..points).rev() {
+                    let other = (u64::from(generator.next_u32()) * (u64::from(last) + 1)) >> 32;
+                    strata.swap(last as usize, usize::try_from(other).unwrap_or_default());
+                }
+                let count = f64::from(points);
+                let inside = 1.0 / (f64::from(u32::MAX) + 1.0);
+                strata
+                    .into_iter()
+                    .map(|stratum| (f64::from(stratum) + f64::from(generator.next_u32()) * inside) / count)
+                    .collect()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ends_of_a_range_are_exact_and_its_steps_even() {
+        for logarithmic in [false, true] {
+            let range = Range { low: 3e-7, high: 1e-4, logarithmic };
+            let values: Vec<f64> = range.spaced(7).collect();
+            assert_eq!((values[0], values[6]), (3e-7, 1e-4));
+            for pair in values.windows(3) {
+                let even = if logarithmic {
+                    pair[1] * pair[1] / (pair[0] * pair[2])
+                } else {
+                    2.0 * pair[1] / (pair[0] + pair[2])
+                };
+                assert!((even - 1.0).abs() < 1e-13, "{values:?}");
+            }
+        }
+        let widest = Range { low: -f64::MAX, high: f64::MAX, logarithmic: false };
+        assert_eq!(widest.at(0.5), 0.0);
+    }
+
+    #[test]
+    fn every_stratum_of_a_latin_sample_holds_one_point() {
+        for dimension in 0..3 {
+            let mut coordinates = Sample::Latin.coordinates(dimension, 97, 5);
+            coordinates.sort_unstable_by(f64::total_cmp);
+            for (stratum, coordinate) in (0_u8..).zip(coordinates) {
+                assert_eq!((97.0 * coordinate).floor(), f64::from(stratum));
+            }
+        }
+    }
+
+    #[test]
+    fn a_longer_sobol_sample_begins_with_the_shorter() {
+        let long = Sample::Sobol.coordinates(2, 64, 1);
+        assert_eq!(Sample::Sobol.coordinates(2, 16, 1), long[..16]);
+    }
+
+    #[test]
+    fn samples_are_pinned() {
+        // Known answers: points of a sample are parameters of jobs, and so part of every id.
+        assert_eq!(
+            Sample::Sobol.coordinates(1, 3, 7),
+            [0.592_596_173_286_438, 0.194_618_463_516_235_35, 0.365_000_367_164_611_8]
+        );
+        assert_eq!(
+            Sample::Latin.coordinates(1, 3, 7),
+            [0.035_778_330_406_174_064, 0.669_683_803_416_167_7, 0.655_623_660_888_522_9]
+        );
+    }
+}

@@ -1,0 +1,245 @@
+//! The text of a sweep file: sections, entries and values that know their place, and errors that name it.
+//!
+//! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written.
+
+use crate::model::Value;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A sweep file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}; check the path and its permissions", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file does not say what to run.
+    #[error("{}:{line}: {problem}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// Key, value, what is allowed and the way out.
+        problem: String,
+    },
+}
+
+/// Longest value that an error message shows, in characters.
+const LONGEST_EXCERPT: usize = 40;
+
+/// A file and its text.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+}
+
+impl<'a> Source<'a> {
+    /// An error at a byte of the text.
+    pub fn error(&self, at: usize, problem: impl Into<String>) -> SweepError {
+        SweepError::Invalid { path: self.path.to_owned(), line: self.line(at), problem: problem.into() }
+    }
+
+    /// The line of a byte of the text, counted from 1.
+    pub fn line(&self, at: usize) -> usize {
+        let before = &self.text.as_bytes()[..at.min(self.text.len())];
+        before.split(|byte| *byte == b'\n').count()
+    }
+
+    /// The tables of the text.
+    pub fn table(&self) -> Result<DeTable<'a>, SweepError> {
+        DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| {
+            let span = error.span().unwrap_or(self.text.len()..self.text.len());
+            // The end of the file lies on its last line, not below it.
+            let at = span.start.min(self.text.trim_end().len());
+            let written = match self.excerpt(span) {
+                nothing if nothing.is_empty() => {
+                    self.text.lines().nth(self.line(at) - 1).unwrap_or_default().to_owned()
+                }
+                written => written,
+            };
+            self.error(at, format!("{written}: {}; the file must be TOML 1.0", error.message()))
+        })
+    }
+
+    /// The first line of a stretch of text, shortened.
+    fn excerpt(&self, span: Range<usize>) -> String {
+        let text = self.text.get(span).unwrap_or_default();
+        let line = text.lines().next().unwrap_or_default().trim_end();
+        if line.chars().count() > LONGEST_EXCERPT || line.len() < text.trim_end().len() {
+            format!("{}...", line.chars().take(LONGEST_EXCERPT).collect::<String>())
+        } else {
+            line.to_owned()
+        }
+    }
+}
+
+/// A table of the file under its name.
+pub(super) struct Section<'a> {
+    pub source: Source<'a>,
+    /// As errors name it: `[model]`, `the file`.
+    pub title: &'static str,
+    /// Byte of its heading.
+    pub at: usize,
+    pub table: &'a DeTable<'a>,
+}
+
+impl<'a> Section<'a> {
+    /// The entries in the order of the file.
+    pub fn entries(&self) -> Vec<Entry<'a>> {
+        let mut entries: Vec<_> = self
+            .table
+            .iter()
+            .map(|(key, node)| Entry { source: self.source, key: key.get_ref(), at: key.span().start, node })
+            .collect();
+        entries.sort_by_key(|entry| entry.at);
+        entries
+    }
+
+    pub fn entry(&self, key: &str) -> Option<Entry<'a>> {
+        self.entries().into_iter().find(|entry| entry.key == key)
+    }
+
+    /// An entry that must be there; `need` says what it is for.
+    pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, SweepError> {
+        self.entry(key).ok_or_else(|| self.source.error(self.at, format!("{key} is missing in {}: {need}", self.title)))
+    }
+
+    /// Refuses keys that are not allowed here.
+    pub fn only(&self, allowed: &[&str]) -> Result<(), SweepError> {
+        match self.entries().into_iter().find(|entry| !allowed.contains(&entry.key)) {
+            None => Ok(()),
+            Some(entry) => Err(entry.unknown(self.title, allowed)),
+        }
+    }
+}
+
+/// A key and its value, or a key and one value of its list.
+#[derive(Clone, Copy)]
+pub(super) struct Entry<'a> {
+    pub source: Source<'a>,
+    pub key: &'a str,
+    /// Byte of the text that errors point to.
+    pub at: usize,
+    pub node: &'a Spanned<DeValue<'a>>,
+}
+
+impl<'a> Entry<'a> {
+    /// An error about this value.
+    pub fn refuse(&self, problem: impl AsRef<str>) -> SweepError {
+        let problem = problem.as_ref();
+        let value = match self.node.get_ref() {
+            DeValue::Table(_) => String::new(),
+            _ => format!(" = {}", self.source.excerpt(self.node.span())),
+        };
+        self.source.error(self.at, format!("{}{value}: {problem}", self.key))
+    }
+
+    /// An error that says what is allowed.
+    pub fn must_be(&self, allowed: &str) -> SweepError {
+        self.refuse(format!("must be {allowed}"))
+    }
+
+    /// An error about a key that means nothing here.
+    pub fn unknown(&self, title: &str, allowed: &[&str]) -> SweepError {
+        let hint = match self.key {
+            "name" | "where" => format!("{} must stand above the first [section]", self.key),
+            "eta" | "frequency" if title == "[model]" => {
+                format!("{0} is not a parameter; write {0} = [..] in [axes], or set T", self.key)
+            }
+            key if title == "the file" && super::quantity::Quantity::from_key(key).is_some() => {
+                "parameters belong in [model] or [axes]".to_owned()
+            }
+            key => nearest(key, allowed),
+        };
+        self.refuse(format!("unknown key in {title}; {hint}"))
+    }
+
+    /// The values of a list, each at its own place.
+    pub fn list(&self) -> Option<Vec<Self>> {
+        let array = self.node.get_ref().as_array()?;
+        Some(array.iter().map(|node| Self { at: node.span().start, node, ..*self }).collect())
+    }
+
+    pub fn section(&self, title: &'static str) -> Option<Section<'a>> {
+        let table = self.node.get_ref().as_table()?;
+        Some(Section { source: self.source, title, at: self.at, table })
+    }
+
+    pub fn word(&self) -> Option<&'a str> {
+        self.node.get_ref().as_str()
+    }
+
+    pub fn flag(&self) -> Result<bool, SweepError> {
+        self.node.get_ref().as_bool().ok_or_else(|| self.must_be("true or false"))
+    }
+
+    /// A number as written: a count where it is one.
+    pub fn number(&self) -> Option<Value> {
+        match self.node.get_ref() {
+            DeValue::Integer(integer) => {
+                let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(Value::Count);
+                let real = || integer.as_str().parse().ok().filter(|_| integer.radix() == 10).map(Value::Real);
+                count.or_else(real)
+            }
+            DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
+            _ => None,
+        }
+    }
+
+    pub fn positive(&self, unit: &str) -> Result<f64, SweepError> {
+        let number = match self.number() {
+            Some(Value::Real(real)) => real,
+            Some(Value::Count(count)) => count as f64,
+            _ => f64::NAN,
+        };
+        if number > 0.0 && number.is_finite() {
+            Ok(number)
+        } else {
+            Err(self.must_be(&format!("a finite number > 0, in {unit}")))
+        }
+    }
+
+    /// A whole number within bounds.
+    pub fn count(&self, least: u64, most: u64) -> Result<u64, SweepError> {
+        match self.number() {
+            Some(Value::Count(count)) if (least..=most).contains(&count) => Ok(count),
+            _ => Err(self.must_be(&format!("a whole number from {least} to {most}"))),
+        }
+    }
+}
+
+/// The hint for an unknown word: the nearest known one, or all.
+pub(super) fn nearest(word: &str, known: &[&str]) -> String {
+    let best = known.iter().map(|candidate| (edit_distance(word, candidate), candidate)).min_by_key(|(d, _)| *d);
+    match best {
+        // Half of a short word, two letters of a long one.
+        Some((distance, candidate)) if distance <= (word.chars().count() / 2).min(2) => {
+            format!("did you mean {candidate}?")
+        }
+        _ => format!("allowed are {}", known.join(", ")),
+    }
+}
+
+/// Levenshtein distance, blind to case.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let [a, b]: [Vec<char>; 2] = [a, b].map(|word| word.to_lowercase().chars().collect());
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, left) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, right) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(left != right);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}

@@ -1,0 +1,144 @@
+//! Sweep files that are refused: the line, the key with its value, and words of the way out.
+
+use super::super::{Sweep, SweepError};
+use std::path::Path;
+
+fn refusal(text: &str) -> (usize, String) {
+    match Sweep::parse(text, Path::new("bad.toml")) {
+        Err(SweepError::Invalid { line, problem, .. }) => (line, problem),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("must be refused:\n{text}"),
+    }
+}
+
+fn assert_refused(table: &[(&str, usize, &[&str])]) {
+    for (text, line, words) in table {
+        let (found, problem) = refusal(text);
+        assert_eq!(found, *line, "{text}\n{problem}");
+        for word in *words {
+            assert!(problem.contains(word), "{word:?} is missing in: {problem}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_toml_is_refused_with_its_line() {
+    assert_refused(&[
+        ("name = \"a\"\n[model\nN = 3", 2, &["TOML"]),
+        ("name = \"a\"\n\n[model]\nN = ", 4, &["TOML"]),
+        ("name = \"a\"\n[model]\nN = 3\nN = 4", 4, &["N: ", "duplicate key"]),
+        ("name = \"a\"\n[model]\n[axes]\n[model]", 4, &["model", "duplicate key"]),
+        ("name = \"a\"\n[model]\nV0 = 1e", 3, &["V0 = 1e", "exponent", "TOML"]),
+        ("name = \"a\"\r\n[model]\r\nV0 = 'x", 3, &["TOML"]),
+    ]);
+}
+
+#[test]
+fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
+    assert_refused(&[
+        ("", 1, &["name is missing", "name = \"fig3\""]),
+        ("name = \"a\"\n[modle]\nN = 3", 2, &["modle", "unknown key", "did you mean model?"]),
+        ("name = \"a\"\nV0 = 1e-4", 2, &["V0 = 1e-4", "[model] or [axes]"]),
+        ("name = \"a\"\nfriction = 1", 2, &["friction = 1", "allowed are name, where, model"]),
+        ("name = \"a\"\n[model]\nv0 = 1e-4", 3, &["v0 = 1e-4", "[model]", "did you mean V0?"]),
+        ("name = \"a\"\n[model]\ngama = 3", 3, &["did you mean gamma?"]),
+        ("name = \"a\"\n[model]\nmass = 3", 3, &["allowed are N, Ns, M"]),
+        ("name = \"a\"\n[model]\neta = 3", 3, &["eta = 3", "[axes]"]),
+        ("name = \"a\"\n[axes]\nwhere = \"V0 > 1\"", 3, &["where must stand above"]),
+        ("name = \"a\"\n[axes]\nfrequenzy = [3]", 3, &["frequenzy = [3]", "did you mean frequency?"]),
+        ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], point = 3 }", 3, &["point = 3", "did you mean points?"]),
+        ("name = \"a\"\n[axes]\nV0 = { log = [1, 2] }", 3, &["points is missing"]),
+        ("name = \"a\"\n[record]\nslip = 3", 3, &["slip = 3", "did you mean slips?"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"", 2, &["dt is missing", "dt = 1e-6"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed\"\ndt = 1", 3, &["\"fixed\"", "fixed-step"]),
+        ("name = \"a\"\n[solver]\ndt = 1e-6", 3, &["dt = 1e-6", "allowed are method, tolerance"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ntolerance = 1", 4, &["tolerance = 1", "method, dt"]),
+        ("name = \"a\"\n[axes.sobol]\nV0 = { log = [1, 2] }", 2, &["points is missing", "[axes.sobol]"]),
+        ("name = \"a\"\n[axes.sobol]\npoints = 4\nseeds = 1", 4, &["seeds = 1", "did you mean seed?"]),
+    ]);
+}
+
+#[test]
+fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
+    assert_refused(&[
+        ("name = 3", 1, &["name = 3", "letters"]),
+        ("name = \"a/b\"", 1, &["name = \"a/b\"", "letters"]),
+        ("name = \"-a\"", 1, &["not with - in front"]),
+        ("name = \"a\"\nmodel = 3", 2, &["model = 3", "a table [model]"]),
+        ("name = \"a\"\n[model]\nDelta = 1\nT = -0.01", 4, &["T = -0.01", "must be a finite number > 0"]),
+        ("name = \"a\"\n[model]\nN = \"70\"", 3, &["N = \"70\"", "a whole number from 1"]),
+        ("name = \"a\"\n[model]\nN = 1.5", 3, &["N = 1.5", "a whole number"]),
+        ("name = \"a\"\n[model]\nV0 = [1, 2]", 3, &["V0 = [1, 2]", "belong in [axes]"]),
+        ("name = \"a\"\n[model]\nV0 = nan", 3, &["V0 = nan", "finite"]),
+        ("name = \"a\"\n[model]\nseed = 99999999999999999999", 3, &["seed = 99999999999999999999", "2^53"]),
+        ("name = \"a\"\n[model]\nV0 = 0x99999999999999999999", 3, &["V0 = 0x99999999999999999999", "finite"]),
+        ("name = \"a\"\n[model]\nseed = 9007199254740992", 3, &["seed = 9007199254740992", "2^53"]),
+        ("name = \"a\"\n[model]\nbreak_on = \"force\"", 3, &["break_on = \"force\"", "\"tension\""]),
+        ("name = \"a\"\n[axes]\nV0 = 1e-4", 3, &["V0 = 1e-4", "a list [..]", "belongs in [model]"]),
+        ("name = \"a\"\n[axes]\nV0 = []", 3, &["V0 = []", "at least one value"]),
+        ("name = \"a\"\n[axes]\nV0 = [\n1e-4,\n0,\n]", 5, &["V0 = 0", "must be a finite number > 0"]),
+        ("name = \"a\"\n[axes]\nV0 = [1, 2.0, 2]", 3, &["V0 = 2", "repeats value 2", "keep one"]),
+        ("name = \"a\"\n[axes]\nV0 = { log = [0, 1], points = 3 }", 3, &["log = 0", "> 0"]),
+        ("name = \"a\"\n[axes]\nDelta = { log = [0, 1], points = 3 }", 3, &["log = [0, 1]", "0 has no logarithm"]),
+        ("name = \"a\"\n[axes]\nV0 = { linear = [2, 1], points = 3 }", 3, &["linear = [2, 1]", "low < high"]),
+        ("name = \"a\"\n[axes]\nV0 = { linear = [2], points = 3 }", 3, &["linear = [2]", "[low, high]"]),
+        ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], points = 0 }", 3, &["points = 0", "a whole number from 2"]),
+        ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], linear = [1, 2], points = 4 }", 3, &["keep one"]),
+        ("name = \"a\"\n[axes]\nN = { linear = [1, 3], points = 4 }", 3, &["N = 2", "repeats", "fewer points"]),
+        ("name = \"a\"\n[axes]\nV0 = { count = 3 }", 3, &["V0", "fits N, Ns and seed"]),
+        ("name = \"a\"\n[axes]\nN = { count = 3 }", 3, &["N = 0", "first"]),
+        ("name = \"a\"\n[axes]\nseed = { count = 0 }", 3, &["count = 0", "a whole number from 1"]),
+        ("name = \"a\"\n[axes]\nbreak_on = { linear = [1, 2], points = 2 }", 3, &["list its values"]),
+        ("name = \"a\"\n[axes]\nzip = 3", 3, &["zip = 3", "[axes.zip]"]),
+        ("name = \"a\"\n[axes.zip]\nV0 = [1, 2]\nN = [1]", 4, &["N = [1]", "equal length", "V0 has 2"]),
+        ("name = \"a\"\n[axes.zip]\nV0 = [1, 2]", 2, &["at least two columns"]),
+        ("name = \"a\"\n\n[[axes.zip]]\nV0 = [1, 1]\nN = [1, 1]", 3, &["row 2 repeats row 1"]),
+        ("name = \"a\"\n[axes.sobol]\npoints = 65537\nV0 = { log = [1, 2] }", 3, &["points = 65537", "65536"]),
+        ("name = \"a\"\n[axes.latin]\npoints = 4", 2, &["at least one quantity"]),
+        ("name = \"a\"\n[axes.latin]\npoints = 4\nV0 = [1, 2]", 4, &["V0 = [1, 2]", "in a sample"]),
+        ("name = \"a\"\n[axes.latin]\npoints = 9\nN = { linear = [1, 2] }", 2, &["falls on point", "fewer points"]),
+        ("name = \"a\"\nwhere = \"V0 < \"", 2, &["where = \"V0 < \"", "character 6"]),
+        ("name = \"a\"\nwhere = [\"V0 < 1\",\n\"v < 1\"]", 3, &["\"v < 1\"", "character 1", "not a known quantity"]),
+        ("name = \"a\"\nwhere = true", 2, &["where = true", "a condition in quotes"]),
+        ("name = \"a\"\n[record]\nslips = 0", 3, &["slips = 0", "a whole number from 1"]),
+        ("name = \"a\"\n[record]\nmax_time = -1", 3, &["max_time = -1", "finite number > 0, in s"]),
+        ("name = \"a\"\n[record]\nprecursors = 1", 3, &["precursors = 1", "true or false"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ndt = 0", 4, &["dt = 0", "in s"]),
+        ("name = \"a\"\n[solver]\ntolerance = 1", 3, &["tolerance = 1", "from 1e-12 to 1e-2"]),
+        ("name = \"a\"\n[solver]\ntolerance = 0.5", 3, &["tolerance = 0.5", "relative to fs/k"]),
+    ]);
+}
+
+#[test]
+fn what_contradicts_itself_or_has_no_effect_is_refused_with_the_other_place() {
+    assert_refused(&[
+        ("name = \"a\"\n[model]\nV0 = 1e-4\n[axes]\nV0 = [1]", 5, &["V0", "[model]", "line 3", "keep one"]),
+        ("name = \"a\"\n[axes]\nV0 = [1]\n[axes.zip]\nV0 = [2]\nN = [1]", 5, &["V0", "[axes]", "line 3"]),
+        ("name = \"a\"\n[model]\nT = 1\nDelta = 1\n[axes]\neta = [1]", 6, &["eta", "T in [model]", "line 3"]),
+        ("name = \"a\"\n[axes]\nDelta = [1]\neta = [1]\nfrequency = [1]", 5, &["frequency", "eta in [axes]"]),
+        ("name = \"a\"\n[axes]\neta = [1, 2]", 3, &["eta", "no effect while Delta = 0"]),
+        ("name = \"a\"\n[model]\nT = 1", 3, &["T", "no effect while Delta = 0"]),
+        ("name = \"a\"\n[model]\nDelta = 1", 3, &["Delta > 0", "needs a period"]),
+        ("name = \"a\"\n[axes]\nDelta = [0, 1]", 3, &["Delta > 0", "eta or frequency"]),
+        ("name = \"a\"\n[axes]\nDelta = [1]\neta = [1, 1.00000000000001]", 4, &["eta", "repeats value 1"]),
+        ("name = \"a\"\n[model]\ndfs = 2", 3, &["dfs = 2", "dfs <= fs"]),
+        ("name = \"a\"\n[model]\ndfs = 1\n[axes]\nfs = [2, 0.5]", 3, &["dfs = 1", "at the point fs = 0.5", "where"]),
+        ("name = \"a\"\n[axes]\nV0 = [1]\nfs = [1, 1e-3]", 4, &["dfs = 0.0069", "fs = 0.001"]),
+        ("name = \"a\"\n[axes]\nN = [100, 10000]\nNs = [10, 10000]", 4, &["Ns = 10000", "N = 10000"]),
+        ("name = \"a\"\n[axes]\nDelta = [1]\nV0 = [1e-200]\neta = [1]", 5, &["eta", "between 1e-100 and 1e100"]),
+        ("name = \"a\"\nwhere = \"V0 > 1\"\n[axes]\nN = [1, 2]", 2, &["drops every point"]),
+        ("name = \"a\"\n[axes]\nseed = { count = 9007199254740992 }\nN = { count = 10000, first = 1 }", 2, &["2^64"]),
+    ]);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let error = Sweep::from_file(Path::new("no/such/file.toml")).unwrap_err();
+    assert!(error.to_string().starts_with("no/such/file.toml: cannot be read: "), "{error}");
+}
+
+#[test]
+fn an_error_reads_file_line_key_value_and_what_is_allowed() {
+    let error = Sweep::parse("name = \"fig3\"\n[model]\nDelta = 1e-6\nT = -0.01", Path::new("sweeps/fig3.toml"));
+    assert_eq!(error.unwrap_err().to_string(), "sweeps/fig3.toml:4: T = -0.01: must be a finite number > 0");
+}

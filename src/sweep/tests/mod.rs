@@ -1,0 +1,195 @@
+//! Sweeps from the text of a file to jobs and parts.
+
+mod bad_files;
+mod properties;
+
+use super::*;
+use crate::model::{BreakOn, Parameters, Symbol, Value};
+use crate::solver::Solver;
+use std::collections::HashSet;
+use std::path::Path;
+
+fn sweep(text: &str) -> Sweep {
+    let text = if text.contains("name =") { text.to_owned() } else { format!("name = \"test\"\n{text}") };
+    Sweep::parse(&text, Path::new("test.toml")).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+fn values(sweep: &Sweep, symbol: Symbol) -> Vec<Value> {
+    sweep.jobs().map(|job| job.parameters.get(symbol)).collect()
+}
+
+fn counts(sweep: &Sweep, symbol: Symbol) -> Vec<u64> {
+    let count = |value| if let Value::Count(count) = value { count } else { panic!("{value} is no count") };
+    values(sweep, symbol).into_iter().map(count).collect()
+}
+
+#[test]
+fn a_file_with_a_name_alone_is_one_job_of_the_defaults() {
+    let sweep = sweep("");
+    let jobs: Vec<Job> = sweep.jobs().collect();
+    assert_eq!((sweep.name(), sweep.point_count(), sweep.text()), ("test", 1, "name = \"test\"\n"));
+    assert_eq!(jobs.len(), 1);
+    assert_eq!(jobs[0].parameters, Parameters::default());
+}
+
+#[test]
+fn all_sections_are_read() {
+    let sweep = sweep(
+        "[model]\nN = 0x14\nK = 2e8\nbreak_on = \"tension\"\nDelta = 1e-6\nT = 1\n\
+         [record]\nslips = 7\ndiscard = 0\nmax_time = 2\nmax_events = 1_000\nprecursor_size = 3\nprecursors = true\n\
+         [solver]\nmethod = \"fixed-step\"\ndt = 2e-6",
+    );
+    let parameters = sweep.jobs().next().unwrap().parameters;
+    assert_eq!((parameters.blocks, parameters.slider_stiffness), (20, 2e8));
+    assert_eq!((parameters.break_on, parameters.modulation_period), (BreakOn::Tension, Some(1.0)));
+    let recording = sweep.recording();
+    assert_eq!((recording.slips, recording.discard, recording.max_time), (7, 0, Some(2.0)));
+    assert_eq!((recording.max_events, recording.precursor_size, recording.precursors), (1000, Some(3), true));
+    assert_eq!(sweep.solver(), Solver::FixedStep { time_step: 2e-6 });
+}
+
+#[test]
+fn the_last_axis_of_the_file_moves_fastest() {
+    let sweep = sweep("[axes]\nseed = { count = 2, first = 5 }\nN = [2, 1]\nbreak_on = [\"tension\", \"magnitude\"]");
+    assert_eq!(counts(&sweep, Symbol::Seed), [5, 5, 5, 5, 6, 6, 6, 6]);
+    assert_eq!(counts(&sweep, Symbol::N), [2, 2, 1, 1, 2, 2, 1, 1]);
+    let axes: Vec<_> = sweep.axes().collect();
+    assert_eq!(axes, [("seed".to_owned(), 2), ("N".to_owned(), 2), ("break_on".to_owned(), 2)]);
+}
+
+#[test]
+fn eta_and_frequency_fix_the_period() {
+    let by_eta = sweep("[axes]\nDelta = [1e-6]\nV0 = [2e-4]\neta = [0.5, 4]");
+    for (job, eta) in by_eta.jobs().zip([0.5, 4.0]) {
+        assert!((job.parameters.eta() / eta - 1.0).abs() < 1e-15);
+    }
+    let by_frequency = sweep("[model]\nDelta = 1e-6\n[axes]\nfrequency = [29, 58]");
+    assert_eq!(values(&by_frequency, Symbol::T), [Value::Real(1.0 / 29.0), Value::Real(1.0 / 58.0)]);
+}
+
+#[test]
+fn whole_quantities_take_rounded_values_of_a_range() {
+    assert_eq!(counts(&sweep("[axes]\nN = { log = [1, 1000], points = 5 }"), Symbol::N), [1, 6, 32, 178, 1000]);
+}
+
+#[test]
+fn without_modulation_one_point_stands_for_all_periods() {
+    let sweep = sweep("[axes]\nDelta = [0, 1e-6]\neta = [1, 2, 3]\nseed = { count = 2 }");
+    let seen: Vec<(f64, u64)> =
+        sweep.jobs().map(|job| (job.parameters.modulation_amplitude, job.parameters.seed)).collect();
+    assert_eq!(sweep.point_count(), 12);
+    assert_eq!(seen.len(), 2 + 6);
+    assert_eq!(seen[..2], [(0.0, 0), (0.0, 1)]);
+}
+
+#[test]
+fn without_modulation_rows_of_a_zip_are_told_apart_by_their_other_columns() {
+    let sweep = sweep("[axes.zip]\ndfs = [0, 0, 0.1, 0]\nDelta = [0, 0, 0, 1]\nT = [1, 2, 3, 1]");
+    let deviations = [0.0, 0.1, 0.0].map(Value::Real);
+    assert_eq!(values(&sweep, Symbol::Dfs), deviations);
+}
+
+#[test]
+fn conditions_drop_points_that_would_not_be_valid() {
+    let sweep = sweep("where = [\"dfs <= fs\", \"fs < 3\"]\n[axes]\ndfs = [1, 2]\nfs = [1, 2, 3]");
+    assert_eq!(sweep.jobs().count(), 3);
+    assert!(sweep.jobs().all(|job| job.parameters.validated().is_ok()));
+}
+
+#[test]
+fn samples_fill_their_ranges() {
+    for kind in ["sobol", "latin"] {
+        let text = format!(
+            "[axes]\nseed = {{ count = 2 }}\n[axes.{kind}]\npoints = 64\nseed = 3\n\
+             V0 = {{ log = [1e-5, 1e-3] }}\nN = {{ linear = [2, 40] }}"
+        );
+        let sweep = sweep(&text);
+        let below = sweep.jobs().filter(|job| job.parameters.drive_velocity < 1e-4).count();
+        assert_eq!((sweep.jobs().count(), below), (128, 64), "{kind}");
+        assert!(sweep.jobs().all(|job| (2..=40).contains(&job.parameters.blocks)));
+    }
+}
+
+#[test]
+fn differences_are_told_but_for_axes_and_conditions() {
+    let before = sweep("[model]\nK = 1e8\n[axes]\nV0 = [1e-4]");
+    let same = sweep("where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]");
+    assert_eq!(before.difference(&same), []);
+    let other =
+        sweep("name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\n[solver]\ntolerance = 1e-7");
+    let told: Vec<String> = before.difference(&other).iter().map(ToString::to_string).collect();
+    assert_eq!(
+        told,
+        [
+            "name: test -> b",
+            "model.K: 1e8 -> 2e8",
+            "model.Delta: 0 -> 1",
+            "model.T: none -> 2",
+            "solver.tolerance: 1e-6 -> 1e-7",
+            "record.max_time: none -> 1",
+        ]
+    );
+}
+
+#[test]
+fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
+    // 0.6 s each: nine reach 5 s.
+    let dear = [sweep(
+        "[record]\nmax_time = 2.5e-6\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = { count = 20 }",
+    )];
+    let sizes: Vec<usize> = Plan::new(&dear).parts().map(|part| part.jobs.len()).collect();
+    assert_eq!(sizes, [9, 9, 2]);
+    let cheap = [sweep("[record]\nmax_time = 1e-9\n[axes]\nseed = { count = 10_000 }")];
+    let parts: Vec<(u64, usize)> = Plan::new(&cheap).parts().map(|part| (part.index, part.jobs.len())).collect();
+    assert_eq!(parts, [(0, PART_JOBS), (1, PART_JOBS), (2, 10_000 - 2 * PART_JOBS)]);
+}
+
+#[test]
+fn an_extended_sweep_owns_its_new_jobs_alone() {
+    let epochs = [
+        sweep("[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 2 }"),
+        sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
+        sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
+    ];
+    let plan = Plan::new(&epochs);
+    let new: Vec<u64> = plan.jobs(1).map(|job| job.parameters.seed).collect();
+    assert_eq!(new, [2, 2]);
+    assert_eq!((plan.jobs(0).count(), plan.jobs(2).count(), plan.jobs(3).count()), (4, 0, 0));
+    let totals = plan.totals();
+    assert_eq!((totals.jobs, totals.parts), (6, 2));
+    assert_eq!(plan.parts().map(|part| part.epoch).collect::<Vec<_>>(), [0, 1]);
+}
+
+#[test]
+fn the_sweeps_of_the_figures_are_read_and_take_minutes() {
+    for (text, name) in
+        [(include_str!("../../../sweeps/fig2.toml"), "fig2"), (include_str!("../../../sweeps/fig3.toml"), "fig3")]
+    {
+        let sweep = [sweep(text)];
+        let totals = Plan::new(&sweep).totals();
+        assert_eq!(sweep[0].name(), name);
+        assert!((150.0..250.0).contains(&totals.cost), "{name}: {totals:?}");
+        let jobs: HashSet<JobId> = sweep[0].jobs().map(|job| sweep[0].job_id(&job.parameters)).collect();
+        assert_eq!(jobs.len() as u64, totals.jobs);
+    }
+}
+
+/// The promise of the plan, measured: run with `--ignored --nocapture`.
+#[test]
+#[ignore = "a measurement"]
+fn ten_million_jobs_are_planned_in_seconds() {
+    let text = "where = \"frequency < 1e9\"\n[axes]\nV0 = { log = [3e-5, 2e-4], points = 100 }\n\
+                Delta = { log = [3e-7, 1e-6], points = 10 }\neta = { log = [0.2, 1000], points = 100 }\n\
+                seed = { count = 100 }";
+    let epochs = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
+    let start = std::time::Instant::now();
+    let totals = Plan::new(&epochs[..1]).totals();
+    println!("{totals:?} in {:?}", start.elapsed());
+    let start = std::time::Instant::now();
+    let new = Plan::new(&epochs).jobs(1).count();
+    println!("{new} new jobs found in {:?}", start.elapsed());
+    let start = std::time::Instant::now();
+    let hashed = epochs[0].jobs().take(1_000_000).filter(|job| epochs[0].job_id(&job.parameters).as_bytes()[0] > 0);
+    println!("{} of 1e6 ids in {:?}", hashed.count(), start.elapsed());
+    assert_eq!((totals.jobs, new), (10_000_000, 100_000));
+}
