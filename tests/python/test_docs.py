@@ -1,5 +1,6 @@
 """The documentation names every parameter and every column, its sweep files run, and its links lead somewhere."""
 
+import json
 import re
 from pathlib import Path
 
@@ -46,6 +47,33 @@ def test_every_column_is_documented(results):
         for field in pq.read_schema(file):
             assert field.metadata[b"description"], f"{table}.{field.name} has no meaning in its metadata"
             assert f"`{field.name}`" in text, f"{table}.{field.name} is not in docs/"
+
+
+def test_every_column_of_a_simulation_is_documented(stickslip, tmp_path):
+    files = {flag: tmp_path / f"{flag}.parquet" for flag in ("trace", "map", "contacts")}
+    flags = [argument for flag, file in files.items() for argument in (f"--{flag}", file)]
+    stickslip("simulate", "--set", "N=9", "--time", 0.01, *flags)
+    text = (ROOT / "docs" / "results.md").read_text()
+    for flag, file in files.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `--{flag}` |"))
+        for field in pq.read_schema(file):
+            assert f"`{field.name}`" in row, f"{flag}.{field.name}"
+
+
+def test_every_field_of_json_output_is_documented(stickslip, results):
+    sweep = results.parent / "tiny.toml"
+    outputs = {
+        "plan": ("plan", sweep),
+        "run": ("run", sweep, "--out", results, "--no-reduce"),
+        "status": ("status", results),
+        "reduce": ("reduce", results),
+        "simulate": ("simulate", "--set", "N=9", "--time", 0.01),
+    }
+    text = (ROOT / "docs" / "results.md").read_text()
+    for command, arguments in outputs.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{command}` |"))
+        for field in json.loads(stickslip(*arguments, "--json").stdout):
+            assert f"`{field}`" in row, f"{command} --json: {field}"
 
 
 @pytest.mark.parametrize("text", list(examples()))
