@@ -336,14 +336,14 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
         return output::json(&report);
     }
     if !slips.is_empty() {
-        println!("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors");
+        output::print("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors\n")?;
     }
     for slip in slips {
         let optional = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
-        println!(
-            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}",
+        output::print(&format!(
+            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}\n",
             slip.number,
             slip.onset,
             optional(slip.interval, 6),
@@ -351,7 +351,7 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
             slip.peak_force,
             slip.drop,
             slip.precursors
-        );
+        ))?;
     }
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
@@ -364,6 +364,5 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
         ("contacts", format!("{} breaks, {} reattachments", report.breaks, report.reattachments)),
         ("steps", format!("{}, of which {} leaps", report.steps, report.leaps)),
         ("wall time", output::duration(report.wall_seconds)),
-    ]);
-    Ok(())
+    ])
 }
