@@ -70,9 +70,9 @@ impl Progress {
     /// A line that stays.
     fn say(&self, line: &str) {
         if self.is_terminal {
-            self.bar.suspend(|| eprintln!("{line}"));
+            self.bar.suspend(|| output::tell(line));
         } else {
-            eprintln!("{line}");
+            output::tell(line);
         }
     }
 
@@ -88,7 +88,7 @@ impl Progress {
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            eprintln!("{:.0} %: {text}", 100.0 * share);
+            output::tell(&format!("{:.0} %: {text}", 100.0 * share));
         }
     }
 }
