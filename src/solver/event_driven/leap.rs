@@ -15,6 +15,7 @@
 
 use super::crossing::Driven;
 use super::taylor::{Chain, State};
+use crate::solver::ledger::Audit;
 use crate::solver::segment::{ForcePath, Segment};
 
 /// The drive as it is at the start of a leap.
@@ -41,6 +42,17 @@ pub(super) enum Attempt {
     Leapt { elapsed: f64, reached: Option<usize> },
     /// Not yet: try again after so many seconds.
     Wait { seconds: f64 },
+}
+
+/// The driven solution from the start of a leap, x_p(t) = p0 + p1 t + Re(q e^{iωt}): one entry a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Driving<'a> {
+    /// p0, in m.
+    pub start: &'a [f64],
+    /// p1, in m/s.
+    pub rate: &'a [f64],
+    /// q, in m; zero without modulation.
+    pub wave: &'a [[f64; 2]],
 }
 
 /// Work space of leaps: one entry a block.
@@ -75,7 +87,8 @@ impl Leap {
     }
 
     /// Tries to leap by at most `horizon` s, leaving out no displacement above `error` m, and writes the state at its end.
-    /// `emit` receives the shear force on the way.
+    /// `emit` receives the shear force on the way, `audit` the energies.
+    #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it tells")]
     pub fn attempt(
         &mut self,
         chain: &Chain,
@@ -84,6 +97,7 @@ impl Leap {
         error: f64,
         state: &mut State,
         emit: impl FnOnce(Segment<'_>),
+        audit: Option<&mut Audit>,
     ) -> Attempt {
         let damping = chain.damping_rate;
         let wait = |folds: f64| Attempt::Wait { seconds: 2.0 * folds / damping };
@@ -117,6 +131,10 @@ impl Leap {
             }
         }
         emit(segment);
+        if let Some(audit) = audit {
+            let driven = Driving { start: &self.start, rate: &self.rate, wave: &self.wave };
+            audit.follow_leap(chain, drive, driven, state, elapsed);
+        }
         self.follow(chain, drive, elapsed, state);
         Attempt::Leapt { elapsed, reached }
     }

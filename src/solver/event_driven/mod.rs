@@ -7,6 +7,7 @@
 //!
 //! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
 
+mod audit;
 mod crossing;
 mod lanes;
 mod leap;
@@ -16,6 +17,7 @@ use self::crossing::first_reach;
 use self::lanes::Layout;
 use self::leap::{Attempt, DriveNow, Leap};
 use self::taylor::{Chain, Kernels, Series, State, StepInput};
+use super::ledger::Audit;
 use super::polynomial::MOST_COEFFICIENTS;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
@@ -50,9 +52,11 @@ pub(super) fn run(
     tolerance: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
+    audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let kernels = Kernels::available().pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
-    Run::new(parameters, tolerance, limits, kernels).finished(observer)
+    let run = Run::new(parameters, tolerance, limits, kernels);
+    Run { audit, ..run }.finished(observer)
 }
 
 /// One simulation in progress. Times and displacements are local to the frame but where said otherwise.
@@ -80,6 +84,7 @@ struct Run<'a> {
     typical_advance: f64,
     next_leap: f64,
     summary: Summary,
+    audit: Option<&'a mut Audit>,
 }
 
 impl<'a> Run<'a> {
@@ -112,6 +117,7 @@ impl<'a> Run<'a> {
             typical_advance: longest_step,
             next_leap: 0.0,
             summary: Summary::default(),
+            audit: None,
         };
         for block in 0..parameters.blocks {
             run.chain.update(block, &run.interface);
@@ -154,6 +160,11 @@ impl<'a> Run<'a> {
     fn summary(mut self, satisfied: bool) -> Summary {
         self.summary.end_time = self.epoch + self.time;
         self.summary.satisfied = satisfied;
+        if let Some(audit) = self.audit.take() {
+            let driven =
+                self.ramp_at_epoch + self.drive.velocity * self.time + self.drive.amplitude * libm::cos(self.phase());
+            audit.settle(&self.chain, &self.interface, &self.state, self.drive.stiffness, driven);
+        }
         self.summary
     }
 
@@ -173,9 +184,9 @@ impl<'a> Run<'a> {
             angular_frequency: self.drive.angular_frequency,
         };
         let start = self.epoch + self.time;
-        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, &mut self.state, |segment| {
-            observer.advance(&Segment { start, ..segment });
-        });
+        let emit = |segment: Segment<'_>| observer.advance(&Segment { start, ..segment });
+        let (state, audit) = (&mut self.state, self.audit.as_deref_mut());
+        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, state, emit, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.time + seconds.max(self.longest_step);
@@ -208,6 +219,9 @@ impl<'a> Run<'a> {
             duration,
             path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
         });
+        if let Some(audit) = &mut self.audit {
+            audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
+        }
         self.kernels.evaluate(&self.series, s, length, &mut self.state);
         let is_attachment = reached.is_none() && s == end && end < 1.0;
         self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
