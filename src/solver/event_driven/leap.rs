@@ -1,14 +1,15 @@
 //! Leaps over quiet time along the driven solution.
 //!
 //! Between events the driven solution x_p(t) = p0 + p1 t + Re(q e^{iωt}) needs one real and, with modulation, one complex
-//! tridiagonal solve. The rest y = x - x_p is a free damped motion: in every mode the amplitude of e^{γt/2} y is constant
-//! if S' = S - m γ²/4 is positive definite, so that with w = y' and
+//! tridiagonal solve. The rest y = x - x_p is a free damped motion. With w = y', a rate a <= γ/2 and S' = S - m a (γ - a),
 //!
 //! ```text
-//! E = ½ m |w + γ y/2|² + ½ yᵀ S' y,    |y_j(t)| <= sqrt(2 E (S'⁻¹)_jj) e^{-γ t/2}
+//! E = ½ m |w + a y|² + ½ yᵀ S' y,    E' = -(γ - a) m |w + a y|² - a yᵀ S' y <= -2 a E,
+//! |y_j(t)| <= sqrt(2 E (S'⁻¹)_jj) e^{-a t}
 //! ```
 //!
-//! holds exactly: a bound for each block, and its decay. A leap may therefore start while y is still large, if the bound
+//! hold if S' is positive definite: a bound for each block, and its decay. With a = γ/2 it is sharp unless a mode is
+//! overdamped; then a is halved until S' is positive definite. A leap may therefore start while y is still large, if the bound
 //! shows that meanwhile no block reaches a break position, that y has fallen under the tolerance when the next event
 //! comes, and that the force passes its largest possible value of that time later on. Contract: a leap leaves out at most
 //! `tolerance` · f_s/k of any block's displacement at its end, and no event on its way.
@@ -17,6 +18,9 @@ use super::crossing::Driven;
 use super::taylor::{Chain, State};
 use crate::solver::ledger::Audit;
 use crate::solver::segment::{ForcePath, Segment};
+
+/// Halvings of the decay rate after which free motion counts as undamped.
+const MOST_HALVINGS: i32 = 40;
 
 /// The drive as it is at the start of a leap.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +62,8 @@ pub(super) struct Driving<'a> {
 /// Work space of leaps: one entry a block.
 #[derive(Clone, Debug)]
 pub(super) struct Leap {
+    /// The rate a at which the free motion surely decays, in 1/s.
+    decay_rate: f64,
     /// Inverse pivots of S/m, eliminated from the leading edge.
     inverse_pivot: Vec<f64>,
     /// The same of S'/m, and pivots of S'/m eliminated from the trailing edge.
@@ -75,6 +81,7 @@ impl Leap {
     pub fn new(blocks: usize) -> Self {
         let zeros = vec![0.0; blocks];
         Self {
+            decay_rate: f64::INFINITY,
             inverse_pivot: zeros.clone(),
             inverse_shifted: zeros.clone(),
             shifted_before: zeros.clone(),
@@ -99,15 +106,15 @@ impl Leap {
         emit: impl FnOnce(Segment<'_>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
-        let damping = chain.damping_rate;
-        let wait = |folds: f64| Attempt::Wait { seconds: 2.0 * folds / damping };
-        if !self.eliminate(chain) {
-            return wait(1.0);
+        if !self.find_decay(chain) {
+            return Attempt::Wait { seconds: 2.0 / chain.damping_rate };
         }
+        let decay_rate = self.decay_rate;
+        let wait = |folds: f64| Attempt::Wait { seconds: folds / decay_rate };
         self.solve_driven(chain, drive);
         let energy = self.free_energy(chain, drive, state);
         let largest = self.bound_free_motion(chain, energy);
-        let decay = if largest <= error { 0.0 } else { 2.0 * libm::log(largest / error) / damping };
+        let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
         if decay >= horizon {
             return Attempt::Wait { seconds: horizon };
         }
@@ -139,10 +146,29 @@ impl Leap {
         Attempt::Leapt { elapsed, reached }
     }
 
+    /// Finds the decay rate, from that of the last time, and eliminates; false if there is none.
+    fn find_decay(&mut self, chain: &Chain) -> bool {
+        let fastest = 0.5 * chain.damping_rate;
+        self.decay_rate = fastest.min(4.0 * self.decay_rate);
+        for _ in 0..MOST_HALVINGS {
+            if self.eliminate(chain) {
+                return true;
+            }
+            self.decay_rate *= 0.5;
+        }
+        self.decay_rate = fastest;
+        false
+    }
+
+    /// a (γ - a), by which S/m is shifted, in 1/s².
+    fn shift(&self, chain: &Chain) -> f64 {
+        self.decay_rate * (chain.damping_rate - self.decay_rate)
+    }
+
     /// Pivots of S/m and of S'/m from both ends; false if S' is not positive definite.
     fn eliminate(&mut self, chain: &Chain) -> bool {
         let blocks = chain.layout.blocks;
-        let shift = 0.25 * chain.damping_rate * chain.damping_rate;
+        let shift = self.shift(chain);
         let coupling_squared = chain.coupling[0][0] * chain.coupling[0][0];
         let (mut ahead, mut ahead_shifted, mut before_shifted) = (0.0, 0.0, 0.0);
         let mut least = f64::INFINITY;
@@ -216,14 +242,13 @@ impl Leap {
     fn free_energy(&self, chain: &Chain, drive: &DriveNow, state: &State) -> f64 {
         let blocks = chain.layout.blocks;
         let coupling = chain.coupling[0][0];
-        let damping = chain.damping_rate;
-        let shift = 0.25 * damping * damping;
+        let shift = self.shift(chain);
         let (mut energy, mut before) = (0.0, 0.0);
         for j in 0..blocks {
             let y = chain.at(&state.displacement, j) - self.start[j] - self.wave[j][0];
             // d/dt Re(q e^{iωt}) = -ω Im q at the start.
             let w = chain.at(&state.velocity, j) - self.rate[j] + drive.angular_frequency * self.wave[j][1];
-            let turned = w + 0.5 * damping * y;
+            let turned = w + self.decay_rate * y;
             energy += turned * turned + y * ((chain.at(&chain.diagonal, j) - shift) * y - 2.0 * coupling * before);
             before = y;
         }
@@ -232,7 +257,7 @@ impl Leap {
 
     /// Bounds |y_j| now into `residue`; returns the largest.
     fn bound_free_motion(&mut self, chain: &Chain, energy: f64) -> f64 {
-        let shift = 0.25 * chain.damping_rate * chain.damping_rate;
+        let shift = self.shift(chain);
         let mut largest = 0.0_f64;
         for j in 0..chain.layout.blocks {
             let ahead = 1.0 / self.inverse_shifted[j];
