@@ -18,9 +18,10 @@ use std::time::Duration;
 const EVENT_BUDGET: u64 = 5_000_000;
 /// Time on the clock after which a case is given up: far beyond what any takes.
 const TIME_BUDGET: Duration = Duration::from_secs(40);
-/// Largest residual of the ledger that passes: of the event-driven solver at its default tolerance, and of a fixed step
-/// near its limit of stability.
-const BALANCED: f64 = 1e-7;
+/// Largest residual of the ledger that passes, in tolerances of the event-driven solver, and of a fixed step near its limit
+/// of stability. Seen: 13 at γ = 1e7 and V0 = 1e-6, where a million short steps make up one relaxation, 2 at V0 = 1e-4 and
+/// under 0.1 elsewhere; 6e-3.
+const BALANCED_TOLERANCES: f64 = 30.0;
 const BALANCED_FIXED_STEP: f64 = 2e-2;
 
 /// What a case must lead to.
@@ -142,7 +143,7 @@ impl HardCase {
         match ended {
             Ok((summary, slips, residual)) => {
                 let allowed = match self.solver {
-                    Solver::EventDriven { .. } => BALANCED,
+                    Solver::EventDriven { tolerance } => BALANCED_TOLERANCES * tolerance,
                     Solver::FixedStep { .. } => BALANCED_FIXED_STEP,
                 };
                 row.passed = self.expected == Expected::Ends && residual.abs() <= allowed;
@@ -199,7 +200,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     let mut cases = Vec::new();
 
     let long = "long runs, far from the origin";
-    cases.push(case(long, &[(V0, Real(1e-4))], 20.0).slips(u64::MAX));
+    cases.push(case(long, &[(V0, Real(1e-4))], 12.0).slips(u64::MAX));
     cases.push(case(long, &[(N, Count(2)), (Ns, Count(2)), (V0, Real(1e-3))], 100.0).slips(u64::MAX));
 
     let ties = "ties: all contacts of a block break at once";
@@ -211,6 +212,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(reattachment, &[(TauR, Real(1e-6))], 0.12));
     cases.push(case(reattachment, &[(TauR, Real(1e-6)), (Dfs, Real(0.0))], 0.12));
     cases.push(case(reattachment, &[(TauR, Real(10.0))], 30.0));
+    cases.push(case(reattachment, &[(TauR, Real(10.0)), (V0, Real(1e-6))], 60.0));
 
     let wide = "thresholds that could be drawn negative";
     cases.push(case(wide, &[(Dfs, Real(0.3 * 1.37))], 0.5));
@@ -221,6 +223,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(damping, &[(Gamma, Real(0.0)), (N, Count(1))], 0.3));
     cases.push(case(damping, &[(Gamma, Real(1.0))], 0.3));
     cases.push(case(damping, &[(Gamma, Real(1e7))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(1e7)), (V0, Real(1e-6))], 10.0));
 
     let drive = "slow and fast drive, weak and strong modulation, resonance";
     let modulated = |amplitude: f64, period: f64| [(Delta, Real(amplitude)), (T, Real(period))];
@@ -249,12 +252,16 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(sizes, &[(N, Count(1000))], 0.3).slips(1));
     cases.push(case(sizes, &[(Ns, Count(1))], 0.1));
     cases.push(case(sizes, &[(Ns, Count(1000))], 1.0));
-    cases.push(case(sizes, &[(K, Real(1e10))], 0.3));
+    cases.push(case(sizes, &[(K, Real(1e10))], 2.0));
     cases.push(case(sizes, &[(K, Real(1e6))], 0.3));
 
     let limit = stability_limit(&Parameters::default());
     let step = |time_step: f64| case("the limit of stability", &[], 0.15).solver(Solver::FixedStep { time_step });
     cases.push(step(0.99 * limit));
+    for setting in [(Dfs, Real(0.0)), (TauR, Real(1e-6)), (Gamma, Real(1e7))] {
+        let solver = Solver::FixedStep { time_step: 1e-6 };
+        cases.push(case("the limit of stability", &[setting], 0.15).solver(solver));
+    }
     cases.push(step(1.01 * limit).refused("dt"));
     for time_step in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
         cases.push(step(time_step).refused("dt"));
