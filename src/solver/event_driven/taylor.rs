@@ -21,7 +21,8 @@ pub(super) const MOST_ORDER: usize = MOST_COEFFICIENTS - 1;
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
     pub layout: Layout,
-    mass: f64,
+    /// Block mass m, in kg.
+    pub mass: f64,
     /// Diagonal of S without contacts, in N/m.
     bare: Vec<Row>,
     /// K_int/m, in 1/s²; 0 in padding.
