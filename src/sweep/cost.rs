@@ -19,10 +19,10 @@ const STEP_OVERHEAD: f64 = 60e-9;
 
 /// Steps of the event-driven solver for each contact and slip: it breaks and reattaches about twice, and the motion after
 /// slips and precursors is resolved.
-const EVENT_STEPS_OF_A_CONTACT: f64 = 8.0;
+const EVENT_STEPS_OF_A_CONTACT: f64 = 7.5;
 /// CPU time of one event-driven step on one block, and beside its blocks, in s.
-const EVENT_STEP_OF_A_BLOCK: f64 = 4e-9;
-const EVENT_STEP_OVERHEAD: f64 = 150e-9;
+const EVENT_STEP_OF_A_BLOCK: f64 = 9.5e-9;
+const EVENT_STEP_OVERHEAD: f64 = 200e-9;
 
 /// Predicted interval between slips, in s: the time to load `LOADED_SHARE` of the strength, and one reattachment.
 #[must_use]
