@@ -194,9 +194,12 @@ impl Rows {
 
     /// The rows in the order of these columns.
     pub fn sorted_by(&self, columns: &[&str]) -> Vec<Vec<Cell>> {
+        if self.cells.is_empty() {
+            return Vec::new();
+        }
         let keys: Vec<usize> = columns.iter().map(|column| self.index(column)).collect();
         let mut rows = self.cells.clone();
-        rows.sort_by_key(|row| keys.iter().map(|&key| row[key].clone()).collect::<Vec<_>>());
+        rows.sort_by_cached_key(|row| keys.iter().map(|&key| row[key].clone()).collect::<Vec<_>>());
         rows
     }
 
