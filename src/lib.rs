@@ -22,6 +22,7 @@
 //! | part | consecutive jobs of the plan, committed together |
 //! | set | all jobs that differ in the seed alone |
 
+pub mod accuracy;
 pub mod figure;
 pub mod model;
 pub mod observe;

@@ -5,6 +5,7 @@
 //! errors in the times of events, second-order between them; O(N) work per step through the block sums. It is kept
 //! plain: the baseline of speed, and a witness for the other solver.
 
+use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
@@ -43,6 +44,15 @@ impl Motion {
         a[0] *= inverse_mass;
     }
 
+    /// Enters the energies at the end into an audit.
+    fn settle(&self, audit: &mut Audit, interface: &Interface, drive: &Drive, time: f64, coupling: f64, mass: f64) {
+        let x = &self.displacement[..];
+        let stretched: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
+        let pulled = drive.motion(time).0 - x[0];
+        audit.kinetic = 0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>();
+        audit.elastic = 0.5 * (coupling * stretched + drive.stiffness * pulled * pulled) + interface.elastic_energy(x);
+    }
+
     /// Whether any block is at or past a break position.
     #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
     fn reaches_a_break(&self, interface: &Interface) -> bool {
@@ -59,6 +69,7 @@ pub(super) fn run(
     time_step: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
+    mut audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let blocks = parameters.blocks;
     let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
@@ -77,16 +88,22 @@ pub(super) fn run(
     let mut force = 0.0;
     let mut force_rate = drive.stiffness * drive.velocity;
     motion.accelerate(&interface, force, coupling, mass);
-    while !observer.is_satisfied() {
+    loop {
+        summary.satisfied = observer.is_satisfied();
         let start = summary.steps as f64 * time_step;
-        if start >= limits.end_time {
-            return Ok(summary);
+        if summary.satisfied || start >= limits.end_time {
+            break;
         }
         summary.steps += 1;
         let time = summary.steps as f64 * time_step;
         for ((x, v), a) in motion.displacement.iter_mut().zip(&mut motion.velocity).zip(&motion.acceleration) {
             *v = *v * damp_before + half * a;
             *x += time_step * *v;
+        }
+        if let Some(audit) = &mut audit {
+            // The velocities of now are those of the middle of the step.
+            let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
+            audit.damping += mass * parameters.damping_rate * time_step * squares;
         }
         let (driven, drive_velocity) = drive.motion(time);
         let next_force = drive.stiffness * (driven - motion.displacement[0]);
@@ -121,7 +138,9 @@ pub(super) fn run(
             }
         }
     }
-    summary.satisfied = true;
+    if let Some(audit) = audit {
+        motion.settle(audit, &interface, &drive, summary.end_time, coupling, mass);
+    }
     Ok(summary)
 }
 

@@ -5,11 +5,15 @@
 
 mod event_driven;
 mod fixed_step;
+mod ledger;
 mod polynomial;
+mod quadrature;
 mod segment;
 
+pub use ledger::Ledger;
 pub use segment::{ForcePath, Segment};
 
+use self::ledger::Audit;
 use crate::model::slider::stability_limit;
 use crate::model::{ContactEvent, Parameters};
 use std::ops::RangeInclusive;
@@ -150,9 +154,32 @@ pub fn simulate(
     limits: Limits<'_>,
     observer: &mut dyn Observer,
 ) -> Result<Summary, SimulationError> {
+    run(parameters, solver, limits, observer, None)
+}
+
+/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last bit.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_audited(
+    parameters: &Parameters,
+    solver: Solver,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+) -> Result<(Summary, Ledger), SimulationError> {
+    ledger::audited(parameters, observer, |observer, audit| run(parameters, solver, limits, observer, Some(audit)))
+}
+
+fn run(
+    parameters: &Parameters,
+    solver: Solver,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+    audit: Option<&mut Audit>,
+) -> Result<Summary, SimulationError> {
     solver.check(parameters)?;
     match solver {
-        Solver::EventDriven { tolerance } => event_driven::run(parameters, tolerance, limits, observer),
-        Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer),
+        Solver::EventDriven { tolerance } => event_driven::run(parameters, tolerance, limits, observer, audit),
+        Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer, audit),
     }
 }

@@ -7,16 +7,19 @@
 //!
 //! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
 
+mod audit;
 mod crossing;
+mod glide;
 mod lanes;
 mod leap;
 mod taylor;
 
 use self::crossing::first_reach;
 use self::lanes::Layout;
-use self::leap::{Attempt, DriveNow, Leap};
+use self::leap::{Attempt, Bounds, DriveNow, Leap};
 use self::taylor::{Chain, Kernels, Series, State, StepInput};
-use super::polynomial::MOST_COEFFICIENTS;
+use super::ledger::Audit;
+use super::polynomial::{self, MOST_COEFFICIENTS};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
@@ -50,9 +53,11 @@ pub(super) fn run(
     tolerance: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
+    audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let kernels = Kernels::available().pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
-    Run::new(parameters, tolerance, limits, kernels).finished(observer)
+    let run = Run::new(parameters, tolerance, limits, kernels);
+    Run { audit, ..run }.finished(observer)
 }
 
 /// One simulation in progress. Times and displacements are local to the frame but where said otherwise.
@@ -79,7 +84,10 @@ struct Run<'a> {
     longest_step: f64,
     typical_advance: f64,
     next_leap: f64,
+    /// Largest shear force at the last break and at the ends of steps since, in N.
+    passed_force: f64,
     summary: Summary,
+    audit: Option<&'a mut Audit>,
 }
 
 impl<'a> Run<'a> {
@@ -99,7 +107,7 @@ impl<'a> Run<'a> {
             interface,
             state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) },
             series: Series::new(layout),
-            leap: Leap::new(parameters.blocks),
+            leap: Leap::new(layout),
             candidates: Vec::new(),
             truncation: TRUNCATION_SHARE * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),
@@ -111,7 +119,9 @@ impl<'a> Run<'a> {
             longest_step,
             typical_advance: longest_step,
             next_leap: 0.0,
+            passed_force: 0.0,
             summary: Summary::default(),
+            audit: None,
         };
         for block in 0..parameters.blocks {
             run.chain.update(block, &run.interface);
@@ -154,6 +164,11 @@ impl<'a> Run<'a> {
     fn summary(mut self, satisfied: bool) -> Summary {
         self.summary.end_time = self.epoch + self.time;
         self.summary.satisfied = satisfied;
+        if let Some(audit) = self.audit.take() {
+            let driven =
+                self.ramp_at_epoch + self.drive.velocity * self.time + self.drive.amplitude * libm::cos(self.phase());
+            audit.settle(&self.chain, &self.interface, &self.state, self.drive.stiffness, driven);
+        }
         self.summary
     }
 
@@ -173,15 +188,20 @@ impl<'a> Run<'a> {
             angular_frequency: self.drive.angular_frequency,
         };
         let start = self.epoch + self.time;
-        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, &mut self.state, |segment| {
-            observer.advance(&Segment { start, ..segment });
-        });
+        let bounds = Bounds { horizon, error: self.left_out, passed: self.passed_force };
+        let emit = |segment: Segment<'_>| observer.advance(&Segment { start, ..segment });
+        let before = self.audit.is_some().then(|| self.state.clone());
+        let (state, audit) = (&mut self.state, self.audit.as_deref_mut());
+        let attempt = self.leap.attempt(&self.chain, self.kernels, &drive, bounds, state, emit, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.time + seconds.max(self.longest_step);
                 false
             }
-            Attempt::Leapt { elapsed, reached } => {
+            Attempt::Leapt { elapsed, reached, glided } => {
+                if let Some(before) = before.filter(|_| glided) {
+                    self.audit_glide(before, elapsed);
+                }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
                 self.next_leap = 0.0;
@@ -193,6 +213,25 @@ impl<'a> Run<'a> {
                 true
             }
         }
+    }
+
+    /// Goes over a glide once more in Taylor steps, for the energies alone.
+    fn audit_glide(&mut self, before: State, elapsed: f64) {
+        let after = std::mem::replace(&mut self.state, before);
+        let (start, mut done) = (self.time, 0.0);
+        while done < elapsed {
+            let left = elapsed - done;
+            let Ok(length) = self.expand(left) else { break };
+            let s = (left / length).min(1.0);
+            if let Some(audit) = &mut self.audit {
+                audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
+            }
+            self.kernels.evaluate(&self.series, s, length, &mut self.state);
+            done = if s < 1.0 { elapsed } else { done + length };
+            self.time = start + done;
+        }
+        self.state = after;
+        self.time = start;
     }
 
     /// One Taylor step, to the first of its end, a break, and `horizon` s.
@@ -208,7 +247,11 @@ impl<'a> Run<'a> {
             duration,
             path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
         });
+        if let Some(audit) = &mut self.audit {
+            audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
+        }
         self.kernels.evaluate(&self.series, s, length, &mut self.state);
+        self.passed_force = self.passed_force.max(polynomial::value(&coefficients[..=self.series.order], s));
         let is_attachment = reached.is_none() && s == end && end < 1.0;
         self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
         if let Some(block) = reached {
@@ -311,6 +354,7 @@ impl<'a> Run<'a> {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
         let x = self.state.displacement[row][lane];
+        self.passed_force = self.shear_force();
         // Rounding may leave the block a hair before the position that it was found to reach.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
@@ -319,6 +363,13 @@ impl<'a> Run<'a> {
             observer.contact(&absolute(event, epoch, origin));
         });
         self.chain.update(block, &self.interface);
+    }
+
+    /// F_S now, in N.
+    fn shear_force(&self) -> f64 {
+        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
+        let cosine = if self.drive.is_modulated() { libm::cos(self.phase()) } else { 0.0 };
+        self.drive.stiffness * (ramp + self.drive.amplitude * cosine - self.state.displacement[0][0])
     }
 
     /// Reattaches what is due now.

@@ -1,0 +1,54 @@
+//! CPU time of the calling thread, and the processor that it runs on.
+
+/// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
+#[must_use]
+pub fn thread_seconds() -> f64 {
+    #[cfg(unix)]
+    {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: the pointer is to a timespec of our own, and the call keeps none.
+        let failed = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+        if failed == 0 {
+            return time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64;
+        }
+    }
+    clock_seconds()
+}
+
+fn clock_seconds() -> f64 {
+    static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+}
+
+/// CPU seconds of the calling thread that a computation takes, and its result.
+pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
+    let begin = thread_seconds();
+    let result = compute();
+    (thread_seconds() - begin, result)
+}
+
+/// Name of the processor as the operating system tells it, and the architecture.
+#[must_use]
+pub fn processor() -> String {
+    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let field = |key: &str| {
+        let line = told.lines().find(|line| line.starts_with(key))?;
+        line.split_once(':').map(|(_, value)| value.trim().to_owned())
+    };
+    let name = field("model name").unwrap_or_else(|| "unknown processor".to_owned());
+    let clock = field("cpu MHz").map_or_else(String::new, |clock| format!(", {clock} MHz"));
+    format!("{name} ({}{clock})", std::env::consts::ARCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_sleeps_uses_no_processor_time() {
+        let (asleep, ()) = timed(|| std::thread::sleep(std::time::Duration::from_millis(30)));
+        let (busy, sum) = timed(|| (0..3_000_000).fold(0.0_f64, |sum, i| (sum + f64::from(i)).sqrt()));
+        assert!(asleep < 0.02, "{asleep}");
+        assert!(busy > 0.0 && sum > 0.0);
+    }
+}

@@ -1,0 +1,298 @@
+//! Hard cases: parameters that break a naive code, each run with an audit and within budgets, so that none hangs.
+//!
+//! A case passes if it ends as it must: the simulation reaches its end and its ledger balances, or bad values are refused
+//! by name. Anything else is told with time and cause.
+
+use super::cpu;
+use crate::model::slider::{StiffnessMatrix, stability_limit};
+use crate::model::{ParameterError, Parameters, Symbol, Value};
+use crate::observe::{Recording, SlipObserver};
+use crate::solver::{Limits, SimulationError, Solver, Summary, simulate_audited};
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// Contact events after which a case is given up.
+const EVENT_BUDGET: u64 = 5_000_000;
+/// Time on the clock after which a case is given up: far beyond what any takes.
+const TIME_BUDGET: Duration = Duration::from_secs(40);
+/// Largest residual of the ledger that passes, in tolerances of the event-driven solver, and of a fixed step near its limit
+/// of stability. Seen: 13 at γ = 1e7 and V0 = 1e-6, where a million short steps make up one relaxation, 2 at V0 = 1e-4 and
+/// under 0.1 elsewhere; 6e-3.
+const BALANCED_TOLERANCES: f64 = 30.0;
+const BALANCED_FIXED_STEP: f64 = 2e-2;
+
+/// What a case must lead to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Expected {
+    /// It reaches its end.
+    Ends,
+    /// Parameters or solver are refused, in a message that names this.
+    Refused(&'static str),
+}
+
+/// One case.
+#[derive(Clone, Debug)]
+pub struct HardCase {
+    /// What breaks a naive code; cases that share it form a group.
+    pub threat: &'static str,
+    /// What differs from the defaults.
+    settings: Vec<(Symbol, Value)>,
+    solver: Solver,
+    /// It ends at this model time in s, or after so many slips.
+    end_time: f64,
+    slips: u64,
+    expected: Expected,
+}
+
+/// How a case went.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stability {
+    /// What breaks a naive code.
+    pub threat: String,
+    /// What differs from the defaults.
+    pub case: String,
+    /// The method and its setting.
+    pub solver: String,
+    /// Whether it ended as it must.
+    pub passed: bool,
+    /// How it ended: in words, with time and cause if it could not go on.
+    pub outcome: String,
+    /// Model time, in s; `None` if it did not reach its end.
+    pub simulated_seconds: Option<f64>,
+    /// Slips.
+    pub slips: u64,
+    /// Steps of the solver.
+    pub steps: u64,
+    /// Of these, leaps.
+    pub leaps: u64,
+    /// Contacts broken.
+    pub breaks: u64,
+    /// Residual of the energy ledger, relative to the work of the drive; `None` if it did not reach its end.
+    pub ledger_residual: Option<f64>,
+    /// CPU time with the audit, in s.
+    pub cpu_seconds: f64,
+}
+
+/// Why a case did not reach its end.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error("refused: {0}")]
+    Parameters(#[from] ParameterError),
+    #[error("refused: {0}")]
+    Solver(SimulationError),
+    #[error("stopped {0}")]
+    Stopped(SimulationError),
+}
+
+impl From<SimulationError> for Failure {
+    fn from(error: SimulationError) -> Self {
+        match error {
+            SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => Self::Solver(error),
+            _ => Self::Stopped(error),
+        }
+    }
+}
+
+impl HardCase {
+    fn new(threat: &'static str, settings: &[(Symbol, Value)], end_time: f64) -> Self {
+        let settings = settings.to_vec();
+        Self { threat, settings, solver: Solver::default(), end_time, slips: 3, expected: Expected::Ends }
+    }
+
+    fn slips(self, slips: u64) -> Self {
+        Self { slips, ..self }
+    }
+
+    fn solver(self, solver: Solver) -> Self {
+        Self { solver, ..self }
+    }
+
+    fn refused(self, naming: &'static str) -> Self {
+        Self { expected: Expected::Refused(naming), ..self }
+    }
+
+    /// What differs from the defaults, in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let words: Vec<String> =
+            self.settings.iter().map(|(symbol, value)| format!("{} = {value}", symbol.key())).collect();
+        if words.is_empty() { "defaults".to_owned() } else { words.join(", ") }
+    }
+
+    /// Runs it within its budgets.
+    #[must_use]
+    pub fn run(&self) -> Stability {
+        let (cpu_seconds, ended) = cpu::timed(|| self.simulate());
+        let mut row = Stability {
+            threat: self.threat.to_owned(),
+            case: self.name(),
+            solver: super::described(self.solver),
+            passed: false,
+            outcome: String::new(),
+            simulated_seconds: None,
+            slips: 0,
+            steps: 0,
+            leaps: 0,
+            breaks: 0,
+            ledger_residual: None,
+            cpu_seconds,
+        };
+        match ended {
+            Ok((summary, slips, residual)) => {
+                let allowed = match self.solver {
+                    Solver::EventDriven { tolerance } => BALANCED_TOLERANCES * tolerance,
+                    Solver::FixedStep { .. } => BALANCED_FIXED_STEP,
+                };
+                row.passed = self.expected == Expected::Ends && residual.abs() <= allowed;
+                row.outcome =
+                    if residual.abs() <= allowed { "done" } else { "done, but energy does not balance" }.to_owned();
+                row.simulated_seconds = Some(summary.end_time);
+                row.ledger_residual = Some(residual);
+                (row.slips, row.steps, row.leaps, row.breaks) = (slips, summary.steps, summary.leaps, summary.breaks);
+            }
+            Err(failure) => {
+                row.outcome = failure.to_string();
+                row.passed = match (self.expected, failure) {
+                    (_, Failure::Stopped(_)) | (Expected::Ends, _) => false,
+                    (Expected::Refused(name), _) => row.outcome.contains(name),
+                };
+            }
+        }
+        row
+    }
+
+    fn simulate(&self) -> Result<(Summary, u64, f64), Failure> {
+        let mut parameters = Parameters::default();
+        for &(symbol, value) in &self.settings {
+            parameters.set(symbol, value)?;
+        }
+        let parameters = parameters.validated()?;
+        let recording = Recording { slips: self.slips, discard: 0, ..Recording::default() };
+        let mut observer = SlipObserver::new(&parameters, &recording);
+        let interrupt = AtomicBool::new(false);
+        let limits = Limits { end_time: self.end_time, events: EVENT_BUDGET, interrupt: Some(&interrupt) };
+        let (done, ended) = channel::<()>();
+        let (summary, ledger) = std::thread::scope(|scope| {
+            let flag = &interrupt;
+            scope.spawn(move || {
+                // The other end is dropped when the simulation is over.
+                if ended.recv_timeout(TIME_BUDGET) == Err(RecvTimeoutError::Timeout) {
+                    flag.store(true, Ordering::Relaxed);
+                }
+            });
+            let result = simulate_audited(&parameters, self.solver, limits, &mut observer);
+            drop(done);
+            result
+        })?;
+        Ok((summary, observer.slips().len() as u64, ledger.residual()))
+    }
+}
+
+/// Every case, group by group.
+#[must_use]
+pub fn hard_cases() -> Vec<HardCase> {
+    use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, L, M, N, Ns, Seed, SmallK, T, TauR, V0};
+    use Value::{Count, Real};
+    let case = HardCase::new;
+    let mut cases = Vec::new();
+
+    let long = "long runs, far from the origin";
+    cases.push(case(long, &[(V0, Real(1e-4))], 12.0).slips(u64::MAX));
+    cases.push(case(long, &[(N, Count(2)), (Ns, Count(2)), (V0, Real(1e-3))], 100.0).slips(u64::MAX));
+
+    let ties = "ties: all contacts of a block break at once";
+    cases.push(case(ties, &[(Dfs, Real(0.0))], 1.0));
+    cases.push(case(ties, &[(Dfs, Real(0.0)), (N, Count(1))], 1.0).slips(50));
+    cases.push(case(ties, &[(Dfs, Real(0.0)), (N, Count(8)), (Delta, Real(1e-6)), (T, Real(0.02))], 1.0).slips(20));
+
+    let reattachment = "very short and very long reattachment";
+    cases.push(case(reattachment, &[(TauR, Real(1e-6))], 0.12));
+    cases.push(case(reattachment, &[(TauR, Real(1e-6)), (Dfs, Real(0.0))], 0.12));
+    cases.push(case(reattachment, &[(TauR, Real(10.0))], 30.0));
+    cases.push(case(reattachment, &[(TauR, Real(10.0)), (V0, Real(1e-6))], 60.0));
+
+    let wide = "thresholds that could be drawn negative";
+    cases.push(case(wide, &[(Dfs, Real(0.3 * 1.37))], 0.5));
+    cases.push(case(wide, &[(Dfs, Real(1.37))], 0.5));
+
+    let damping = "no damping, overdamping";
+    cases.push(case(damping, &[(Gamma, Real(0.0))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(0.0)), (N, Count(1))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(1.0))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(1e7))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(1e7)), (V0, Real(1e-6))], 10.0));
+
+    let drive = "slow and fast drive, weak and strong modulation, resonance";
+    let modulated = |amplitude: f64, period: f64| [(Delta, Real(amplitude)), (T, Real(period))];
+    cases.push(case(drive, &[(V0, Real(1e-8))], 1e4));
+    cases.push(case(drive, &[(V0, Real(1e-2))], 0.05));
+    cases.push(case(drive, &[(V0, Real(1e-8)), (Delta, Real(1e-6)), (T, Real(100.0))], 1e4));
+    for (amplitude, period, end_time) in [
+        (1e-9, 0.02, 0.5),
+        (1e-4, 0.02, 0.2),
+        (1e-4, 1.0, 1.0),
+        (1e-6, 1e-5, 0.2),
+        (1e-9, 1e-5, 0.5),
+        (1e-6, 100.0, 0.5),
+    ] {
+        cases.push(case(drive, &modulated(amplitude, period), end_time));
+    }
+    for (index, gamma) in [(0, 10.0), (0, 0.0), (69, 10.0)] {
+        let [amplitude, period] = modulated(1e-8, resonant_period(index));
+        cases.push(case(drive, &[amplitude, period, (Gamma, Real(gamma))], 0.2));
+    }
+
+    let sizes = "sizes: lanes, stiffness, growth of cost";
+    for blocks in [1, 2, 7, 8, 9, 64] {
+        cases.push(case(sizes, &[(N, Count(blocks))], 0.5));
+    }
+    cases.push(case(sizes, &[(N, Count(1000))], 0.3).slips(1));
+    cases.push(case(sizes, &[(Ns, Count(1))], 0.1));
+    cases.push(case(sizes, &[(Ns, Count(1000))], 1.0));
+    cases.push(case(sizes, &[(K, Real(1e10))], 2.0));
+    cases.push(case(sizes, &[(K, Real(1e6))], 0.3));
+
+    let limit = stability_limit(&Parameters::default());
+    let step = |time_step: f64| case("the limit of stability", &[], 0.15).solver(Solver::FixedStep { time_step });
+    cases.push(step(0.99 * limit));
+    for setting in [(Dfs, Real(0.0)), (TauR, Real(1e-6)), (Gamma, Real(1e7))] {
+        let solver = Solver::FixedStep { time_step: 1e-6 };
+        cases.push(case("the limit of stability", &[setting], 0.15).solver(solver));
+    }
+    cases.push(step(1.01 * limit).refused("dt"));
+    for time_step in [0.0, -1e-6, f64::NAN, f64::INFINITY] {
+        cases.push(step(time_step).refused("dt"));
+    }
+    for tolerance in [0.0, -1e-6, f64::NAN, 1.0] {
+        let solver = Solver::EventDriven { tolerance };
+        cases.push(case("the limit of stability", &[], 0.15).solver(solver).refused("tolerance"));
+    }
+
+    let bad = "values that make no sense";
+    let reals = [M, K, Kd, SmallK, Fs, Dfs, TauR, Gamma, V0, Delta, T, FN, L];
+    for symbol in reals {
+        for value in [f64::NAN, f64::INFINITY, -1.0] {
+            cases.push(case(bad, &[(symbol, Real(value))], 0.1).refused(symbol.key()));
+        }
+    }
+    for symbol in [M, K, Kd, SmallK, Fs, TauR, V0, T, FN, L] {
+        cases.push(case(bad, &[(symbol, Real(0.0))], 0.1).refused(symbol.key()));
+    }
+    for symbol in [N, Ns] {
+        for count in [0, u64::MAX] {
+            cases.push(case(bad, &[(symbol, Count(count))], 0.1).refused(symbol.key()));
+        }
+    }
+    cases.push(case(bad, &[(Seed, Count(u64::MAX))], 0.1).refused(Seed.key()));
+    cases
+}
+
+/// Period of the mode with this index of the intact slider, in s.
+fn resonant_period(index: usize) -> f64 {
+    let parameters = Parameters::default();
+    let squared = StiffnessMatrix::intact(&parameters).eigenvalue(index) / parameters.block_mass();
+    TAU / squared.sqrt()
+}

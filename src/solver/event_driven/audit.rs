@@ -1,0 +1,90 @@
+//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
+
+use super::leap::{DriveNow, Driving};
+use super::taylor::{Chain, Kernels, Series, State};
+use crate::model::Interface;
+use crate::solver::ledger::Audit;
+
+impl Audit {
+    /// Enters the damping loss over [0, s] of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
+    pub(super) fn follow_series(&mut self, kernels: Kernels, chain: &Chain, series: &Series, end: f64, length: f64) {
+        let mut probe = State { displacement: chain.layout.filled(0.0), velocity: chain.layout.filled(0.0) };
+        let nodes = self.quadrature.nodes(series.order);
+        let mean_square: f64 = nodes
+            .iter()
+            .map(|&(s, weight)| {
+                kernels.evaluate(series, s * end, length, &mut probe);
+                weight * probe.velocity.iter().flat_map(|row| row.iter()).map(|v| v * v).sum::<f64>()
+            })
+            .sum();
+        self.damping += chain.mass * chain.damping_rate * end * length * mean_square;
+    }
+
+    /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and the
+    /// energy of the free motion that is dropped at its start.
+    pub(super) fn follow_leap(
+        &mut self,
+        chain: &Chain,
+        drive: &DriveNow,
+        driven: Driving<'_>,
+        state: &State,
+        elapsed: f64,
+    ) {
+        let frequency = drive.angular_frequency;
+        let coupling = chain.coupling[0][0];
+        // Σ p1², Σ p1 q, Σ |q|² and Σ q²: the velocity is p1 - ω Im(q e^{iωt}).
+        let (mut ramp, mut mixed, mut size, mut square) = (0.0, [0.0; 2], 0.0, [0.0; 2]);
+        let (mut dropped, mut before) = (0.0, [0.0; 2]);
+        for j in 0..chain.layout.blocks {
+            let (rate, [real, imaginary]) = (driven.rate[j], driven.wave[j]);
+            ramp += rate * rate;
+            mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
+            size += real * real + imaginary * imaginary;
+            square = [square[0] + real * real - imaginary * imaginary, square[1] + 2.0 * real * imaginary];
+            // E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2), with the forces per mass.
+            let (x, v) = (driven.start[j] + real, rate - frequency * imaginary);
+            let (y, w) = (chain.at(&state.displacement, j) - x, chain.at(&state.velocity, j) - v);
+            let middle = x + 0.5 * y;
+            let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
+            if j == 0 {
+                let displacement = drive.ramp + drive.amplitude * libm::cos(drive.phase);
+                force -= drive.stiffness / chain.mass * displacement;
+            }
+            dropped += y * force + w * (v + 0.5 * w);
+            if j > 0 {
+                // The two off-diagonal terms of the pair, y_j m_{j-1} + y_{j-1} m_j.
+                dropped -= coupling * (y * before[1] + before[0] * middle);
+            }
+            before = [y, middle];
+        }
+        self.left_out += chain.mass * dropped;
+        let mut integral = ramp * elapsed;
+        if drive.amplitude > 0.0 {
+            let (sine, versine) = turned(frequency, elapsed);
+            let (sine_twice, versine_twice) = turned(2.0 * frequency, elapsed);
+            integral -= 2.0 * (mixed[0] * versine + mixed[1] * sine);
+            let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
+            integral += 0.5 * frequency * (size * frequency * elapsed - swing);
+        }
+        self.damping += chain.mass * chain.damping_rate * integral;
+    }
+
+    /// Enters the energies at the end, with the drive at `driven` m.
+    pub(super) fn settle(&mut self, chain: &Chain, interface: &Interface, state: &State, stiffness: f64, driven: f64) {
+        let blocks = chain.layout.blocks;
+        let displacements: Vec<f64> = (0..blocks).map(|j| chain.at(&state.displacement, j)).collect();
+        let speeds = (0..blocks).map(|j| chain.at(&state.velocity, j));
+        let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
+        let sprung = stiffness * (driven - displacements[0]) * (driven - displacements[0]);
+        self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
+        self.elastic =
+            0.5 * (chain.mass * chain.coupling[0][0] * stretched + sprung) + interface.elastic_energy(&displacements);
+    }
+}
+
+/// sin ωt and 1 - cos ωt; whole turns are taken off first.
+fn turned(frequency: f64, elapsed: f64) -> (f64, f64) {
+    let angle = std::f64::consts::TAU * (frequency * elapsed / std::f64::consts::TAU).fract();
+    let half = libm::sin(0.5 * angle);
+    (libm::sin(angle), 2.0 * half * half)
+}

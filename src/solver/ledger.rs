@@ -1,0 +1,182 @@
+//! The energy ledger: what the drive put in, against what is stored and what was lost.
+//!
+//! The work of the drive, ∫ F_S u' dt, equals the elastic and kinetic energy at the end (both are zero at the start) and
+//! the losses in damping, ∫ mγ Σ v² dt, and in breaking contacts, f²/2k each. Work and breaks are read off the segments and
+//! events that every observer sees, by Gauss-Legendre quadrature or in closed form; the rest comes from the solver. A
+//! break found late, a contact attached stressed or a series cut short all show as a residual.
+//!
+//! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered as
+//! such; [`Ledger::left_out`] tells how much that was.
+
+use super::quadrature::Quadrature;
+use super::segment::{ForcePath, Segment};
+use super::{Observer, SimulationError, Summary};
+use crate::model::{Change, ContactEvent, Drive, Parameters};
+use std::f64::consts::TAU;
+
+/// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
+const NODES_FOR_DRIVE: usize = 8;
+
+/// The energy balance of one simulation, from its start to its end. All in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ledger {
+    /// Work of the drive.
+    pub work: f64,
+    /// Elastic energy of chain, attached contacts and driving spring at the end.
+    pub elastic: f64,
+    /// Kinetic energy at the end.
+    pub kinetic: f64,
+    /// Loss in damping.
+    pub damping: f64,
+    /// The part of it that leaps entered: the energy of the free motion that they dropped.
+    pub left_out: f64,
+    /// Loss in breaking contacts.
+    pub broken: f64,
+}
+
+impl Ledger {
+    /// What does not balance, relative to the work of the drive. Zero for an exact solution; 0 if no work was done.
+    #[must_use]
+    pub fn residual(&self) -> f64 {
+        let spent = self.elastic + self.kinetic + self.damping + self.broken;
+        if self.work == 0.0 { 0.0 } else { (self.work - spent) / self.work }
+    }
+}
+
+/// The entries that a solver makes.
+#[derive(Clone, Debug)]
+pub(super) struct Audit {
+    pub quadrature: Quadrature,
+    pub damping: f64,
+    pub left_out: f64,
+    pub elastic: f64,
+    pub kinetic: f64,
+}
+
+/// An observer that keeps the work of the drive and the loss in breaks, and passes on all that it sees.
+struct Meter<'a> {
+    observer: &'a mut dyn Observer,
+    drive: Drive,
+    quadrature: Quadrature,
+    work: f64,
+    broken: f64,
+}
+
+impl Observer for Meter<'_> {
+    fn advance(&mut self, segment: &Segment<'_>) {
+        self.work += work(&self.drive, &self.quadrature, segment);
+        self.observer.advance(segment);
+    }
+
+    fn contact(&mut self, event: &ContactEvent) {
+        if event.change == Change::Break {
+            self.broken += 0.5 * event.threshold * event.threshold / event.stiffness;
+        }
+        self.observer.contact(event);
+    }
+
+    fn is_satisfied(&self) -> bool {
+        self.observer.is_satisfied()
+    }
+}
+
+/// Runs a solver with an audit and draws up the ledger.
+pub(super) fn audited(
+    parameters: &Parameters,
+    observer: &mut dyn Observer,
+    run: impl FnOnce(&mut dyn Observer, &mut Audit) -> Result<Summary, SimulationError>,
+) -> Result<(Summary, Ledger), SimulationError> {
+    let quadrature = Quadrature::new();
+    let mut audit = Audit { quadrature: quadrature.clone(), damping: 0.0, left_out: 0.0, elastic: 0.0, kinetic: 0.0 };
+    let mut meter = Meter { observer, drive: Drive::new(parameters), quadrature, work: 0.0, broken: 0.0 };
+    let summary = run(&mut meter, &mut audit)?;
+    let ledger = Ledger {
+        work: meter.work,
+        elastic: audit.elastic,
+        kinetic: audit.kinetic,
+        damping: audit.damping + audit.left_out,
+        left_out: audit.left_out,
+        broken: meter.broken,
+    };
+    Ok((summary, ledger))
+}
+
+/// Work of the drive along a segment, in J.
+fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>) -> f64 {
+    if !drive.is_modulated() {
+        return drive.velocity * segment.impulse();
+    }
+    match segment.path {
+        ForcePath::Polynomial { coefficients, .. } => {
+            let nodes = quadrature.nodes(coefficients.len().div_ceil(2) + NODES_FOR_DRIVE);
+            let power = |s: f64| {
+                let elapsed = s * segment.duration;
+                segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1
+            };
+            segment.duration * nodes.iter().map(|&(s, weight)| weight * power(s)).sum::<f64>()
+        }
+        ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
+            // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + turned)) dτ, term by term.
+            let turned = drive.phase(segment.start);
+            let angle = TAU * (segment.duration * angular_frequency / TAU).fract();
+            let (sine, cosine) = libm::sincos(angle + turned);
+            let (sine_before, cosine_before) = libm::sincos(turned);
+            let ramp = (start + rate * segment.duration) * cosine
+                - start * cosine_before
+                - rate / angular_frequency * (sine - sine_before);
+            let beat = 0.25 * (libm::cos(2.0 * angle + phase + turned) - libm::cos(phase + turned));
+            let drift = 0.5 * angular_frequency * segment.duration * libm::sin(turned - phase);
+            drive.velocity * segment.impulse() + drive.amplitude * (ramp + amplitude * (beat - drift))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A modulated drive, and the rule to judge the closed form by.
+    fn modulated() -> (Drive, Quadrature) {
+        let parameters =
+            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+        (Drive::new(&parameters), Quadrature::new())
+    }
+
+    #[test]
+    fn work_over_a_leap_is_that_of_many_short_quadratures() {
+        let (drive, quadrature) = modulated();
+        let path = ForcePath::Harmonic {
+            start: 120.0,
+            rate: 3e3,
+            amplitude: 38.0,
+            phase: 0.7,
+            angular_frequency: drive.angular_frequency,
+        };
+        let segment = Segment { start: 0.3, duration: 0.07, path };
+        let pieces = 200;
+        let width = segment.duration / f64::from(pieces);
+        let power = |elapsed: f64| segment.force_after(elapsed) * drive.motion(segment.start + elapsed).1;
+        let numeric: f64 = (0..pieces)
+            .flat_map(|piece| quadrature.nodes(8).iter().map(move |(s, weight)| (f64::from(piece) + s, weight)))
+            .map(|(s, weight)| weight * width * power(s * width))
+            .sum();
+        let closed = work(&drive, &quadrature, &segment);
+        assert!((closed - numeric).abs() < 1e-12 * numeric.abs(), "{closed} against {numeric}");
+    }
+
+    #[test]
+    fn work_along_a_polynomial_is_that_of_its_halves() {
+        let (drive, quadrature) = modulated();
+        let coefficients = [100.0, 20.0, -7.0, 3.0];
+        let path = ForcePath::Polynomial { coefficients: &coefficients, scale: 0.01 };
+        let whole = work(&drive, &quadrature, &Segment { start: 0.2, duration: 0.01, path });
+        let halved = [50.0 * 2.0, 20.0 / 2.0, -7.0 / 4.0, 3.0 / 8.0];
+        let moved = [100.0 + 10.0 - 1.75 + 0.375, 10.0 - 3.5 + 1.125, -1.75 + 1.125, 0.375];
+        let half = |start: f64, coefficients: &[f64]| {
+            let path = ForcePath::Polynomial { coefficients, scale: 0.005 };
+            work(&drive, &quadrature, &Segment { start, duration: 0.005, path })
+        };
+        let parts = half(0.2, &halved) + half(0.205, &moved);
+        assert!((whole - parts).abs() < 1e-13 * whole.abs(), "{whole} against {parts}");
+    }
+}
