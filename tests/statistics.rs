@@ -107,14 +107,16 @@ fn identical_contacts_keep_the_distribution_broad() {
 
 #[test]
 fn modulated_intervals_sit_on_multiples_of_the_period_at_29_and_58_hz() {
-    // (1/T in Hz, mean of the reference in s). A longer run gave locking indices of 0.874 and 0.893.
-    for (frequency, mean) in [(29.0, 0.1371), (58.0, 0.1273)] {
+    // (1/T in Hz, mean of the reference in s, its median in periods: 4/29 s = 8/58 s). A longer run gave locking indices of 0.874 and 0.893.
+    for (frequency, mean, periods) in [(29.0, 0.1371, 4), (58.0, 0.1273, 8)] {
         let intervals = Intervals::of(&modulated(frequency), 8, 40);
         let shown = intervals.describe();
         let index = intervals.locking_index(1.0 / frequency);
         assert!(index > 0.8, "{frequency} Hz: {index}, {shown}");
-        // Four of the slow periods, eight of the fast ones.
-        assert!(intervals.share(0.128, 0.148) > 0.5, "{frequency} Hz: {shown}");
+        // A third or more at the median's number, and nowhere as many.
+        let share = |n: i32| intervals.share((f64::from(n) - 0.5) / frequency, (f64::from(n) + 0.5) / frequency);
+        let most = (1..20).max_by(|a, b| share(*a).total_cmp(&share(*b)));
+        assert!(most == Some(periods) && share(periods) > 1.0 / 3.0, "{frequency} Hz: {most:?}, {shown}");
         let difference = (intervals.mean() - mean).abs();
         assert!(difference < 0.03 * mean + 3.0 * intervals.standard_error(), "{frequency} Hz: {shown}");
     }
