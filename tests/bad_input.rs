@@ -1,6 +1,6 @@
 //! Bad input, as sweep files and as flags of every command: exit code 2, a message with the key and the way out, and
 //! nothing written.
-#![allow(clippy::tests_outside_test_module, reason = "an integration test")]
+#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
 mod program;
 

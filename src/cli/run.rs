@@ -5,6 +5,7 @@ use super::progress::Progress;
 use super::{output, reduce};
 use anyhow::{Context, Result};
 use clap::Args;
+use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -51,6 +52,16 @@ fn threads(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number >= 1")
 }
 
+/// Version of [`Report`] as JSON.
+const FORMAT: u32 = 1;
+
+#[derive(Serialize)]
+struct Report {
+    format: u32,
+    #[serde(flatten)]
+    report: RunReport,
+}
+
 /// Set by the first Ctrl-C or SIGTERM.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -80,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         &mut |event| progress.show(event),
     )?;
     if arguments.json {
-        output::json(&report)?;
+        output::json(&Report { format: FORMAT, report })?;
     } else {
         output::pairs(&described(&report))?;
     }

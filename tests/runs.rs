@@ -1,0 +1,431 @@
+//! Whole runs of the built program: where results lie, that interruptions, threads, shards and extensions leave no trace in
+//! them, and what exit codes say.
+#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
+
+mod program;
+
+use program::{Cell, Folder};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::Child;
+use std::time::{Duration, Instant};
+
+/// Modulated and not, two velocities, two seeds, with precursors: 12 jobs, which differ in everything that is measured.
+const TINY: &str = "\
+name = \"tiny\"
+[model]
+N = 9
+[axes]
+V0 = [1e-4, 2e-4]
+Delta = [0, 1e-6]
+frequency = [29, 58]
+seed = { count = 2 }
+[record]
+slips = 4
+precursors = true
+";
+/// Jobs of [`TINY`]: without modulation one frequency stands for both.
+const TINY_JOBS: u64 = 12;
+
+/// Many jobs of some 50 µs, in several parts of 4096 jobs: something to interrupt.
+const MANY: &str = "\
+name = \"many\"
+[model]
+N = 1
+Ns = 1
+[axes]
+seed = { count = 28000 }
+[record]
+slips = 2
+discard = 0
+";
+/// Parts of [`MANY`].
+const MANY_PARTS: usize = 7;
+
+/// One in three jobs needs more contact events than it may have.
+const FAILING: &str = "\
+name = \"failing\"
+[model]
+Ns = 2
+[axes]
+N = [1, 2, 30]
+seed = { count = 2 }
+[record]
+slips = 2
+discard = 0
+max_events = 300
+";
+
+const TABLES: [&str; 3] = ["slips", "precursors", "jobs"];
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// The files of all tables with their bytes.
+fn tables(folder: &Folder, directory: &str) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for table in TABLES {
+        for path in folder.parts(directory, table) {
+            let bytes = fs::read(&path).unwrap();
+            files.insert(path.strip_prefix(folder.path(directory)).unwrap().to_owned(), bytes);
+        }
+    }
+    files
+}
+
+/// Every row of every table, all columns, by job and slip.
+fn sorted_rows(folder: &Folder, directory: &str) -> Vec<Vec<Vec<Cell>>> {
+    vec![
+        folder.table(directory, "slips").sorted_by(&["job_id", "slip"]),
+        folder.table(directory, "precursors").sorted_by(&["job_id", "slip", "precursor"]),
+        folder.table(directory, "jobs").sorted_by(&["job_id"]),
+    ]
+}
+
+/// The words before the values of a report.
+fn labels(report: &str) -> Vec<&str> {
+    report.lines().map(|line| line.split("  ").next().unwrap_or_default()).collect()
+}
+
+#[test]
+fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_nothing() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    let plan = json(&folder.ends(0, "plan tiny.toml --json").stdout);
+    assert_eq!((plan["jobs"].as_u64(), plan["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
+
+    let first = folder.ends(0, "run tiny.toml");
+    let expected = ["jobs run", "parts committed", "CPU time", "wall time", "jobs", "parameter sets", "slips"];
+    assert_eq!(labels(&first.stdout)[..7], expected);
+    let after = &labels(&first.stdout)[7..];
+    assert!(after.iter().all(|label| ["reduced data", "figure"].contains(label)), "{}", first.stdout);
+    assert!(first.stdout.contains("jobs run         12, 0 failed\n"), "{}", first.stdout);
+    assert!(!first.stderr.contains('\u{1b}'), "no terminal, no colours: {:?}", first.stderr);
+
+    let before = folder.contents("results/tiny");
+    let there: Vec<&str> =
+        before.iter().filter(|(_, bytes)| bytes.is_some()).map(|(p, _)| p.to_str().unwrap()).collect();
+    for file in [
+        "tables/slips/part-000-000000.parquet",
+        "tables/precursors/part-000-000000.parquet",
+        "tables/jobs/part-000-000000.parquet",
+        "reduced/sets.parquet",
+        "reduced/histograms.parquet",
+        "reduced/backbone.parquet",
+        "reduced/points.parquet",
+        "figures/phi-eta.svg",
+        "figures/phi-eta.png",
+        "figures/tau-T.svg",
+        "figures/tau-T.png",
+        "run/manifest.json",
+        "run/sweep-000.toml",
+    ] {
+        assert!(there.contains(&file), "{file} is not in {there:?}");
+    }
+    assert!(there.iter().filter(|file| !file.starts_with("run/")).count() == 11, "{there:?}");
+    assert!(!there.iter().any(|file| file.starts_with("run/staging")), "{there:?}");
+    assert_eq!(before[&PathBuf::from("run/sweep-000.toml")], Some(TINY.as_bytes().to_vec()));
+    assert_eq!(folder.table("results/tiny", "jobs").cells.len() as u64, TINY_JOBS);
+    assert_eq!(folder.table("results/tiny", "slips").cells.len() as u64, 4 * TINY_JOBS);
+
+    let second = folder.ends(0, "run tiny.toml");
+    assert!(second.stdout.starts_with("jobs run         0, 0 failed\n"), "{}", second.stdout);
+    assert!(folder.contents("results/tiny") == before);
+}
+
+#[test]
+fn tables_do_not_depend_on_threads() {
+    let folder = Folder::new();
+    for (name, text) in [("tiny", TINY), ("many", MANY)] {
+        folder.write("sweep.toml", text);
+        for threads in [1, 2] {
+            let out = format!("{name}-{threads}");
+            folder.ends(0, &format!("run sweep.toml --no-reduce --threads {threads} --out {out}"));
+        }
+        let [one, two] = [1, 2].map(|threads| format!("{name}-{threads}"));
+        // Every column of every row, bit by bit; and what is more, the files.
+        assert!(sorted_rows(&folder, &one) == sorted_rows(&folder, &two), "{name}");
+        assert!(tables(&folder, &one) == tables(&folder, &two), "{name}");
+    }
+    assert_eq!(folder.parts("many-1", "jobs").len(), MANY_PARTS);
+    assert!(!folder.table("tiny-1", "precursors").cells.is_empty());
+}
+
+#[test]
+fn shards_side_by_side_make_the_same_tables() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out whole");
+    let shards =
+        [1, 2].map(|shard| folder.start(&format!("run many.toml --no-reduce --out sharded --shard {shard}/2")));
+    for shard in shards {
+        let (code, _, stderr) = wait(shard);
+        assert_eq!(code, Some(0), "{stderr}");
+    }
+    assert!(tables(&folder, "sharded") == tables(&folder, "whole"));
+}
+
+#[test]
+fn an_extended_axis_runs_its_new_jobs_alone() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce --out grown");
+    let before = tables(&folder, "grown");
+    folder.write("tiny.toml", &TINY.replace("count = 2", "count = 3"));
+    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out grown --json").stdout);
+    assert_eq!(report["jobs_run"].as_u64(), Some(TINY_JOBS / 2));
+    let after = tables(&folder, "grown");
+    assert!(before.iter().all(|(path, bytes)| after.get(path) == Some(bytes)));
+    folder.ends(0, "run tiny.toml --no-reduce --out at-once");
+    assert!(sorted_rows(&folder, "grown") == sorted_rows(&folder, "at-once"));
+}
+
+/// Exit code, standard output and standard error of a program that was started.
+fn wait(mut child: Child) -> (Option<i32>, String, String) {
+    let code = child.wait().unwrap().code();
+    let (mut stdout, mut stderr) = (String::new(), String::new());
+    if let Some(mut pipe) = child.stdout.take() {
+        pipe.read_to_string(&mut stdout).unwrap();
+    }
+    if let Some(mut pipe) = child.stderr.take() {
+        pipe.read_to_string(&mut stderr).unwrap();
+    }
+    (code, stdout, stderr)
+}
+
+/// Waits until so many parts are committed, or the program has ended.
+fn wait_for_parts(folder: &Folder, directory: &str, parts: usize, child: &mut Child) {
+    let begin = Instant::now();
+    while folder.parts(directory, "jobs").len() < parts && child.try_wait().unwrap().is_none() {
+        assert!(begin.elapsed() < Duration::from_mins(1), "no part is committed");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out whole");
+    let whole = tables(&folder, "whole");
+    for signal in ["INT", "TERM"] {
+        // One thread, so that on a machine with many cores there is a middle, too.
+        let command = format!("run many.toml --no-reduce --threads 1 --out {signal}");
+        let mut child = folder.start(&command);
+        wait_for_parts(&folder, signal, 2, &mut child);
+        let sent = std::process::Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status();
+        assert!(sent.unwrap().success());
+        let (code, stdout, stderr) = wait(child);
+        assert_eq!(code, Some(3), "{signal}: {stderr}");
+        assert!(stderr.contains("The same command goes on."), "{stderr}");
+        assert!(stdout.starts_with("jobs run"), "{stdout}");
+
+        let kept = tables(&folder, signal);
+        assert!((2..MANY_PARTS).contains(&folder.parts(signal, "jobs").len()), "it was to be stopped in the middle");
+        assert!(kept.iter().all(|(path, bytes)| whole.get(path) == Some(bytes)));
+        let times = modified(&folder, signal);
+        let status = json(&folder.ends(0, &format!("status {signal} --json")).stdout);
+        assert_eq!(status["parts_done"].as_u64(), Some(folder.parts(signal, "jobs").len() as u64));
+        assert!(status["jobs_missing"].as_u64() > Some(0));
+
+        folder.ends(0, &command);
+        assert!(tables(&folder, signal) == whole, "{signal}");
+        let times_after = modified(&folder, signal);
+        assert!(times.iter().all(|(path, time)| times_after[path] == *time), "a committed part was written again");
+    }
+}
+
+/// When the committed files were written.
+fn modified(folder: &Folder, directory: &str) -> BTreeMap<PathBuf, std::time::SystemTime> {
+    let written = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
+    folder.parts(directory, "jobs").into_iter().map(written).collect()
+}
+
+#[test]
+fn a_killed_run_resumes_byte_identical_whenever_it_was_killed() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out whole");
+    let whole = tables(&folder, "whole");
+    // Milliseconds after the start, or after a part, so that some kills come while files are written.
+    for (round, delay) in [0_u64, 20, 0, 2, 5, 9, 14].into_iter().enumerate() {
+        let parts = folder.parts("killed", "jobs").len();
+        let mut child = folder.start("run many.toml --no-reduce --threads 2 --out killed");
+        if round >= 2 {
+            wait_for_parts(&folder, "killed", parts + 1, &mut child);
+        }
+        std::thread::sleep(Duration::from_millis(delay));
+        child.kill().unwrap();
+        wait(child);
+        // Whatever there is, is whole.
+        assert!(tables(&folder, "killed").iter().all(|(path, bytes)| whole.get(path) == Some(bytes)), "round {round}");
+    }
+    folder.ends(0, "run many.toml --no-reduce --out killed");
+    assert!(tables(&folder, "killed") == whole);
+    let staged = folder.contents("killed/run/staging");
+    assert!(staged.values().all(Option::is_none), "left in staging: {:?}", staged.keys());
+}
+
+#[test]
+fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
+    let folder = Folder::new();
+    folder.write("failing.toml", FAILING);
+    let ended = folder.ends(1, "run failing.toml --out r");
+    assert!(ended.stdout.starts_with("jobs run         6, 2 failed\n"), "{}", ended.stdout);
+    assert!(ended.stderr.contains("--retry-failed"), "{}", ended.stderr);
+    let jobs = folder.table("r", "jobs");
+    assert_eq!(jobs.counts("N"), [1, 1, 2, 2, 30, 30]);
+    assert_eq!(jobs.texts("outcome"), ["done", "done", "done", "done", "failed", "failed"]);
+    let reasons = jobs.texts("reason");
+    assert_eq!(reasons[..4], [""; 4]);
+    for (reason, id) in reasons[4..].iter().zip(&jobs.texts("job_id")[4..]) {
+        assert!(reason.contains("300 contact events") && reason.contains("record.max_events"), "{reason}");
+        assert!(ended.stderr.contains(&format!("job {id} failed: {reason}")), "{}", ended.stderr);
+    }
+    assert_eq!(jobs.counts("slips"), [2; 4]);
+
+    let status = json(&folder.ends(1, "status r --json").stdout);
+    assert_eq!((status["jobs_done"].as_u64(), status["jobs_failed"].as_u64()), (Some(4), Some(2)));
+    assert_eq!(json(&folder.ends(1, "reduce r --json").stdout)["failed_jobs"].as_u64(), Some(2));
+    let before = tables(&folder, "r");
+    let again = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json").stdout);
+    assert_eq!((again["jobs_run"].as_u64(), again["jobs_failed"].as_u64()), (Some(0), Some(2)));
+    let retried = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json --retry-failed").stdout);
+    assert_eq!((retried["jobs_run"].as_u64(), retried["jobs_failed"].as_u64()), (Some(2), Some(2)));
+    assert!(tables(&folder, "r") == before);
+}
+
+#[test]
+fn the_status_counts_what_is_there_for_people_and_for_programs() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out r");
+    for table in ["jobs", "slips"] {
+        fs::remove_file(&folder.parts("r", table)[3]).unwrap();
+    }
+    let status = json(&folder.ends(0, "status r --json").stdout);
+    let count = |key: &str| status[key].as_u64().unwrap();
+    assert_eq!((status["name"].as_str(), count("format")), (Some("many"), 1));
+    assert_eq!((count("jobs_done"), count("jobs_failed"), count("jobs_missing")), (28_000 - 4096, 0, 4096));
+    assert_eq!((count("parts_done"), count("parts_missing")), (MANY_PARTS as u64 - 1, 1));
+    assert!(status["time_left"].as_f64() > Some(0.0) && status["running"].as_array().unwrap().is_empty());
+    let text = folder.ends(0, "status r").stdout;
+    assert_eq!(labels(&text), ["sweep", "jobs done", "jobs failed", "jobs missing", "parts", "running", "time left"]);
+    assert!(text.contains("jobs missing  4096\n"), "{text}");
+}
+
+#[test]
+fn reduced_data_and_figures_can_be_made_again() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --out r");
+    let before = folder.contents("r");
+    for gone in ["reduced", "figures"] {
+        fs::remove_dir_all(folder.path("r").join(gone)).unwrap();
+    }
+    let refused = folder.run("plot r");
+    assert_ne!(refused.code, Some(0), "there is nothing to plot");
+    assert!(refused.stderr.contains("reduced"), "{}", refused.stderr);
+    let summary = json(&folder.ends(0, "reduce r --json").stdout);
+    assert_eq!((summary["jobs"].as_u64(), summary["slips"].as_u64()), (Some(TINY_JOBS), Some(4 * TINY_JOBS)));
+    let drawn = folder.ends(0, "plot r").stdout;
+    assert_eq!(
+        drawn.lines().collect::<Vec<_>>(),
+        ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"].map(|name| format!("r/figures/{name}"))
+    );
+    assert!(folder.contents("r") == before);
+}
+
+#[test]
+fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out r");
+    let whole = tables(&folder, "r");
+    for (table, commands) in [
+        ("jobs", &["run many.toml --out r", "status r", "reduce r"][..]),
+        ("slips", &["run many.toml --out r", "reduce r"]),
+    ] {
+        let part = folder.parts("r", table)[1].clone();
+        let name = part.strip_prefix(folder.path("")).unwrap().display().to_string();
+        let bytes = fs::read(&part).unwrap();
+        fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
+        for command in commands {
+            let ended = folder.ends(4, command);
+            assert!(ended.stderr.contains(&format!("{name}: damaged")), "{command}: {}", ended.stderr);
+            assert!(ended.stderr.contains("move this file and those of the same name"), "{}", ended.stderr);
+        }
+        // The way out that the message tells.
+        for table in TABLES {
+            let _ = fs::remove_file(folder.path("r/tables").join(table).join(part.file_name().unwrap()));
+        }
+        let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);
+        assert_eq!(report["jobs_run"].as_u64(), Some(4096));
+        assert!(tables(&folder, "r") == whole, "{table}");
+    }
+    for (file, text) in [("run/manifest.json", "{"), ("run/sweep-000.toml", "name = \"other\"")] {
+        let kept = fs::read(folder.path("r").join(file)).unwrap();
+        folder.write(&format!("r/{file}"), text);
+        for command in ["run many.toml --out r", "status r", "reduce r", "plot r"] {
+            let ended = folder.ends(4, command);
+            assert!(ended.stderr.contains(&format!("r/{file}: damaged")), "{command}: {}", ended.stderr);
+        }
+        fs::write(folder.path("r").join(file), kept).unwrap();
+    }
+    assert!(tables(&folder, "r") == whole);
+}
+
+#[test]
+fn a_pipe_gets_the_report_and_nothing_else() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    let report = folder.ends(0, "run tiny.toml --json --out r").stdout;
+    assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    for command in
+        ["plan tiny.toml --json", "status r --json", "reduce r --json", "simulate --set N=3 --slips 1 --json"]
+    {
+        assert_eq!(json(&folder.ends(0, command).stdout)["format"].as_u64(), Some(1), "{command}");
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_does_not_end_a_run() {
+    let folder = Folder::new();
+    folder.write("failing.toml", FAILING);
+    // Both ends of what it says are closed at once.
+    let mut child = folder.start("run failing.toml --out r");
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert_eq!(folder.table("r", "jobs").cells.len(), 6);
+    let mut child = folder.start("completions bash");
+    drop(child.stdout.take());
+    assert_eq!(wait(child), (Some(0), String::new(), String::new()));
+}
+
+#[test]
+fn completions_are_there_for_the_usual_shells() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = folder.ends(0, &format!("completions {shell}")).stdout;
+        for word in ["stickslip", "simulate", "retry-failed"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn the_help_of_every_command_holds_an_example() {
+    let folder = Folder::new();
+    assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
+    for command in ["", "plan", "run", "status", "reduce", "plot", "simulate", "completions"] {
+        let help = folder.ends(0, &format!("{command} --help")).stdout;
+        let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
+        assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");
+    }
+}
