@@ -47,14 +47,14 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
         return None;
     }
     let mut generator = ChaCha8Rng::seed_from_u64(key);
-    let (value_wasserstein, value_kolmogorov) = both(sorted(sample), sorted(reference));
+    let (value_wasserstein, value_kolmogorov) = both(&sorted(sample), &sorted(reference));
     let (mut wasserstein, mut kolmogorov, mut by_chance) = (Vec::new(), Vec::new(), (Vec::new(), Vec::new()));
     for _ in 0..RESAMPLES {
         let other = resample(reference, reference.len(), &mut generator);
-        let (w, k) = both(resample(sample, sample.len(), &mut generator), other.clone());
+        let (w, k) = both(&resample(sample, sample.len(), &mut generator), &other);
         wasserstein.push(w);
         kolmogorov.push(k);
-        let (w, k) = both(resample(reference, sample.len(), &mut generator), other);
+        let (w, k) = both(&resample(reference, sample.len(), &mut generator), &other);
         by_chance.0.push(w);
         by_chance.1.push(k);
     }
@@ -96,7 +96,7 @@ fn below(bound: usize, generator: &mut ChaCha8Rng) -> usize {
 }
 
 /// Both distances of sorted samples.
-fn both(left: Vec<f64>, right: Vec<f64>) -> (f64, f64) {
+fn both(left: &[f64], right: &[f64]) -> (f64, f64) {
     let (mut i, mut j) = (0, 0);
     let (mut wasserstein, mut kolmogorov) = (0.0, 0.0_f64);
     let mut before = left[0].min(right[0]);
@@ -139,9 +139,9 @@ mod tests {
 
     #[test]
     fn distances_of_small_samples_are_those_by_hand() {
-        assert_eq!(both(vec![0.0, 1.0], vec![0.0, 1.0]), (0.0, 0.0));
-        assert_eq!(both(vec![0.0, 1.0], vec![2.0, 3.0]), (2.0, 1.0));
-        let (wasserstein, kolmogorov) = both(vec![1.0, 2.0, 3.0], vec![2.0]);
+        assert_eq!(both(&[0.0, 1.0], &[0.0, 1.0]), (0.0, 0.0));
+        assert_eq!(both(&[0.0, 1.0], &[2.0, 3.0]), (2.0, 1.0));
+        let (wasserstein, kolmogorov) = both(&[1.0, 2.0, 3.0], &[2.0]);
         assert!((wasserstein - 2.0 / 3.0).abs() < 1e-15 && (kolmogorov - 1.0 / 3.0).abs() < 1e-15);
     }
 

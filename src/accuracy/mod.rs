@@ -18,7 +18,7 @@ mod tables;
 mod write;
 
 pub use hard_cases::{HardCase, Stability, hard_cases};
-pub use study::{Cost, DistanceRow, Findings, MethodRow, Quantity, Study};
+pub use study::{Cost, DistanceRow, Findings, MethodRow, Quantity, Study, drive_in_words};
 pub use tables::{distances, methods, stability};
 pub use write::{as_json, stability_json, write, write_stability};
 
@@ -31,12 +31,10 @@ use crate::store::storage::StorageError;
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
     /// A simulation cannot go on.
-    #[error("V0 = {velocity:e} m/s, Delta = {amplitude:e} m, seed {seed}, {solver}: {source}")]
+    #[error("{drive}, seed {seed}, {solver}: {source}")]
     Simulation {
-        /// Drive velocity, in m/s.
-        velocity: f64,
-        /// Amplitude of the modulation, in m.
-        amplitude: f64,
+        /// Velocity and modulation in words.
+        drive: String,
         /// Realisation.
         seed: u64,
         /// Method and setting.

@@ -127,7 +127,7 @@ pub fn write_stability(
 
 /// The figures at one velocity, each with its name: cost against the error of break times, and against the distance of τ.
 fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>, AccuracyError> {
-    const WORK: &str = "CPU time per slip (s)";
+    const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
     let breaks = lines(
         &findings.methods,
         velocity,
@@ -172,15 +172,19 @@ fn lines<'a>(
 ) -> Vec<(String, Vec<WorkPrecision>)> {
     let mut lines: Vec<(String, Vec<WorkPrecision>)> = Vec::new();
     for (row, point) in rows.iter().filter(|row| parameters(row).drive_velocity == velocity).filter_map(point) {
-        let drive = if row.parameters.modulation_amplitude > 0.0 { "modulated" } else { "Δ = 0" };
-        let cost = if row.cost.timed_slips == 0 { ", extrapolated" } else { "" };
-        let name = format!("{}, {drive}{cost}", method(row.solver));
+        let drive = if row.parameters.modulation_amplitude > 0.0 { "Δ > 0" } else { "Δ = 0" };
+        let cost = if row.cost.timed_slips == 0 { "*" } else { "" };
+        let name = format!("{}{cost}, {drive}", method(row.solver));
         match lines.iter_mut().find(|(known, _)| *known == name) {
             Some((_, points)) => points.push(point),
             None => lines.push((name, vec![point])),
         }
     }
     lines
+}
+
+fn staging(folder: &Path) -> PathBuf {
+    folder.join("staging")
 }
 
 /// Files on their way into a folder.
@@ -194,7 +198,7 @@ struct Output<'a> {
 impl<'a> Output<'a> {
     fn begin(storage: &'a dyn Storage, folder: &'a Path) -> Result<Self, AccuracyError> {
         create_folder(storage, folder)?;
-        let commit = Commit::begin(storage, &folder.join("staging"))?;
+        let commit = Commit::begin(storage, &staging(folder))?;
         Ok(Self { storage, folder, commit, files: Vec::new() })
     }
 
@@ -220,6 +224,76 @@ impl<'a> Output<'a> {
 
     fn publish(self) -> Result<Vec<PathBuf>, AccuracyError> {
         self.commit.publish()?;
+        // Empty now; should it not go, it does no harm.
+        let _ = std::fs::remove_dir(staging(self.folder));
         Ok(self.files)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::breaks::BreakErrors;
+    use super::super::distance::distances as measured;
+    use super::super::study::Cost;
+    use super::*;
+    use crate::solver::Solver;
+    use crate::store::dataset::Reader;
+    use crate::store::storage::Disk;
+
+    fn findings() -> Findings {
+        let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });
+        let break_times = Some(BreakErrors {
+            breaks: 100,
+            missing: 0,
+            median: 1e-7,
+            largest: 1e-6,
+            together: 140,
+            together_seconds: 0.06,
+            together_throughout: false,
+        });
+        let cost =
+            Cost { per_simulated_second: 0.2, per_slip: 0.02, steps_per_slip: 1e5, per_step: 2e-7, timed_slips: 0 };
+        let method =
+            MethodRow { parameters: parameters.clone(), solver, cost, break_times, ledger_residual: Some(-1e-3) };
+        let untested = MethodRow { break_times: None, ledger_residual: None, ..method.clone() };
+        let distance = DistanceRow {
+            parameters,
+            solver,
+            quantity: Quantity::Interval,
+            sizes: (3, 3),
+            means: (0.11, 0.11),
+            deviations: (0.01, 0.01),
+            distances: measured(&[0.1, 0.11, 0.12], &[0.1, 0.11, 0.13], 0).unwrap(),
+        };
+        Findings { methods: vec![method, untested], distances: vec![distance] }
+    }
+
+    #[test]
+    fn a_study_is_written_as_tables_json_and_figures() {
+        let folder = tempfile::tempdir().unwrap();
+        let study = Study { velocities: vec![1e-4], ..Study::quick() };
+        let files = write(&Disk, folder.path(), &study, &findings()).unwrap();
+        let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(
+            names,
+            [
+                "methods.parquet",
+                "distances.parquet",
+                "accuracy.json",
+                "work-precision-break-times-V0-1e-4.svg",
+                "work-precision-break-times-V0-1e-4.png",
+                "work-precision-intervals-V0-1e-4.svg",
+                "work-precision-intervals-V0-1e-4.png"
+            ]
+        );
+        assert!(files.iter().all(|file| file.is_file()));
+        let rows: usize =
+            Reader::new(&Disk, files[..1].to_vec(), None).map(|batch| batch.unwrap().rows.num_rows()).sum();
+        assert_eq!(rows, 2);
+        let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
+        assert_eq!(json["methods"][0]["is_extrapolated"], true);
+        assert_eq!(json["methods"][1]["break_times"], Value::Null);
+        assert_eq!(json["distances"][0]["quantity"], "interval");
+        assert!(!folder.path().join("staging").exists(), "the staging folder must not stay");
     }
 }

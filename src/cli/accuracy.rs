@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stickslip::accuracy::{
-    self, Findings, MethodRow, Quantity, Stability, Study, described, hard_cases, stability_json,
+    self, Findings, MethodRow, Quantity, Stability, Study, described, drive_in_words, hard_cases, stability_json,
 };
 use stickslip::store::storage::Disk;
 
@@ -97,8 +97,7 @@ fn print_study(study: &Study, findings: &Findings) {
     for row in &findings.methods {
         if drive != Some(&row.parameters) {
             drive = Some(&row.parameters);
-            let (velocity, amplitude) = (row.parameters.drive_velocity, row.parameters.modulation_amplitude);
-            println!("\nV0 = {velocity:e} m/s, Delta = {amplitude:e} m");
+            println!("\n{}", drive_in_words(&row.parameters));
             println!(
                 "{:30} {:>10} {:>10} {:>8} {:>10} {:>10} {:>22} {:>9} {:>24} {:>13}",
                 "solver",
