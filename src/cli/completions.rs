@@ -2,6 +2,7 @@
 
 use super::Cli;
 use super::exit::Exit;
+use super::output;
 use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
@@ -15,8 +16,9 @@ pub struct Arguments {
     shell: Shell,
 }
 
-#[expect(clippy::unnecessary_wraps, reason = "one type for all commands")]
 pub fn completions(arguments: &Arguments) -> Result<Exit> {
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "stickslip", &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Cli::command(), "stickslip", &mut script);
+    output::print(&String::from_utf8_lossy(&script))?;
     Ok(Exit::Done)
 }

@@ -57,8 +57,17 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => completions::completions(&arguments),
     };
     let exit = ended.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        output::tell(&format!("error: {}", message(&error)));
         Exit::of(&error)
     });
     ExitCode::from(exit as u8)
+}
+
+/// An error and its causes, without those that it already quotes.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
+        "" => cause,
+        _ if told.contains(&cause) => told,
+        _ => format!("{told}: {cause}"),
+    })
 }

@@ -1,20 +1,31 @@
 //! Text for people and JSON for programs.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde::Serialize;
+use std::io::{ErrorKind, Write};
+
+/// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
+pub fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("cannot write to standard output"),
+    }
+}
+
+/// Writes a line to standard error. That nobody can read it must not end a run.
+pub fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
 
 /// Prints a value as JSON.
 pub fn json(value: &impl Serialize) -> Result<()> {
-    println!("{}", serde_json::to_string_pretty(value)?);
-    Ok(())
+    print(&format!("{}\n", serde_json::to_string_pretty(value)?))
 }
 
 /// Prints labels and values in two columns.
-pub fn pairs(pairs: &[(&str, String)]) {
+pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
     let width = pairs.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
-    for (label, value) in pairs {
-        println!("{label:width$}  {value}");
-    }
+    pairs.iter().try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
 }
 
 /// A duration in the unit that suits it.

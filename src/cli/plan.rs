@@ -72,7 +72,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ("slips to record", report.slips.to_string()),
             ("predicted CPU time", output::duration(totals.cost)),
             ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
-        ]);
+        ])?;
     }
     Ok(Exit::Done)
 }

@@ -9,7 +9,7 @@ use stickslip::run::RunEvent;
 /// Time between two plain lines.
 const PLAIN_SPACING: Duration = Duration::from_secs(10);
 /// Steps of the bar: thousandths of the predicted cost.
-const RESOLUTION: f64 = 1000.0;
+const RESOLUTION: u32 = 1000;
 
 /// Shows the events of a run.
 pub struct Progress {
@@ -51,7 +51,7 @@ impl Progress {
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),
                 ));
-                self.bar.set_length(RESOLUTION as u64);
+                self.bar.set_length(u64::from(RESOLUTION));
                 if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
@@ -70,9 +70,9 @@ impl Progress {
     /// A line that stays.
     fn say(&self, line: &str) {
         if self.is_terminal {
-            self.bar.suspend(|| eprintln!("{line}"));
+            self.bar.suspend(|| output::tell(line));
         } else {
-            eprintln!("{line}");
+            output::tell(line);
         }
     }
 
@@ -84,11 +84,11 @@ impl Progress {
         let left = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::INFINITY };
         let text = format!("{} of {} jobs, {} left", self.jobs_done, self.jobs, output::duration(left));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
-        self.bar.set_position((RESOLUTION * share) as u64);
+        self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            eprintln!("{:.0} %: {text}", 100.0 * share);
+            output::tell(&format!("{:.0} %: {text}", 100.0 * share));
         }
     }
 }

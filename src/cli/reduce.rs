@@ -39,7 +39,7 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
     if arguments.json {
         output::json(&summary)?;
     } else {
-        output::pairs(&described(&summary, directory.layout()));
+        output::pairs(&described(&summary, directory.layout()))?;
     }
     Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
 }
@@ -47,7 +47,7 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
 pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
     let directory = Directory::read(&Disk, &arguments.directory)?;
     for path in draw_all(&Disk, directory.layout())? {
-        println!("{}", path.display());
+        output::print(&format!("{}\n", path.display()))?;
     }
     Ok(Exit::Done)
 }

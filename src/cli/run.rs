@@ -31,7 +31,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// Run one share of N, beside other processes that run the others
     #[arg(long, value_name = "K/N")]
@@ -45,6 +45,10 @@ pub struct Arguments {
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
+}
+
+fn threads(text: &str) -> Result<NonZeroUsize, &'static str> {
+    text.parse().map_err(|_| "must be a whole number >= 1")
 }
 
 /// Set by the first Ctrl-C or SIGTERM.
@@ -78,11 +82,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         output::json(&report)?;
     } else {
-        output::pairs(&described(&report));
+        output::pairs(&described(&report))?;
     }
     if report.stopped {
         let left = output::count(report.jobs_left, "job");
-        eprintln!("stopped with {left} left; finished parts are kept. The same command goes on.");
+        output::tell(&format!("stopped with {left} left; finished parts are kept. The same command goes on."));
         return Ok(Exit::Stopped);
     }
     if !arguments.no_reduce {
@@ -90,15 +94,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         let summary = reduce::reduce_directory(&directory)?;
         let figures = draw_all(&Disk, directory.layout())?;
         if !arguments.json {
-            output::pairs(&reduce::described(&summary, directory.layout()));
+            output::pairs(&reduce::described(&summary, directory.layout()))?;
             for path in figures {
-                println!("figure  {}", path.display());
+                output::print(&format!("figure  {}\n", path.display()))?;
             }
         }
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
-        eprintln!("{failed} failed; their reasons stand in tables/jobs. --retry-failed runs them again.");
+        output::tell(&format!("{failed} failed; their reasons stand in tables/jobs. --retry-failed runs them again."));
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)

@@ -22,7 +22,7 @@ use stickslip::store::dataset::{Footer, TableWriter};
 use stickslip::store::storage::Disk;
 use stickslip::store::tables::{JobLabel, SlipRow};
 use stickslip::store::{records, tables};
-use stickslip::sweep::{Sweep, SweepError};
+use stickslip::sweep::{Sweep, SweepError, predicted_interval};
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
@@ -39,22 +39,22 @@ pub struct Arguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Record so many slips past start-up [default: 20, unless --time is given]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
     slips: Option<u64>,
     /// End at this model time, in s
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Slips discarded as start-up
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N", default_value_t = 5)]
     discard: u64,
     /// Method
     #[arg(long, value_enum, default_value_t = Method::EventDriven)]
     solver: Method,
     /// Tolerance of the event-driven solver, relative to fs/k
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
     /// Step of the fixed-step solver, in s
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
     /// Write shear force, displacement and attached fraction over time, as Parquet
     #[arg(long, value_name = "FILE")]
@@ -72,10 +72,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Time between samples of trace, map and plot, in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 1e-4)]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
     sample: f64,
     /// First instant of the plot, in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0)]
     from: f64,
     /// Print JSON
     #[arg(long)]
@@ -90,8 +90,8 @@ enum Method {
 
 /// Version of [`Report`] as JSON.
 const FORMAT: u32 = 1;
-/// More samples than this are a mistake: ten minutes at 10 kHz for each of 70 blocks.
-const MOST_SAMPLES: f64 = 1e9;
+/// More samples than this, of 24 bytes each, are a mistake.
+const MOST_SAMPLES: f64 = 1e8;
 
 #[derive(Serialize)]
 struct Report {
@@ -109,11 +109,27 @@ struct Report {
     wall_seconds: f64,
 }
 
+fn count(text: &str) -> Result<u64, &'static str> {
+    text.parse().map_err(|_| "must be a whole number >= 0")
+}
+
+fn real(text: &str) -> Result<f64, &'static str> {
+    text.parse().map_err(|_| "must be a number")
+}
+
+/// A number in the form that a sweep file takes.
+fn number(text: &str) -> Result<String, &'static str> {
+    if let Ok(whole) = text.parse::<i128>() {
+        return Ok(whole.to_string());
+    }
+    real(text).map(|real| if real.is_nan() { "nan".to_owned() } else { format!("{real:?}") })
+}
+
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::parse(&as_sweep(arguments)?, Path::new("flags")).map_err(as_flags)?;
     let job = sweep.jobs().next().ok_or_else(|| UsageError("the flags name no job".to_owned()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, parameters)?;
+    check_outputs(arguments, &sweep, parameters)?;
 
     let mut slips = SlipObserver::new(parameters, sweep.recording());
     let mut trace = Trace::new(parameters, arguments.sample);
@@ -157,13 +173,18 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 /// The flags as the text of a sweep with one point.
 fn as_sweep(arguments: &Arguments) -> Result<String> {
     let (mut model, mut axes) = (String::new(), String::new());
+    let mut keys = Vec::new();
     for setting in &arguments.settings {
         let (key, value) = setting
             .split_once('=')
             .ok_or_else(|| UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")))?;
         let (key, value) = (key.trim(), value.trim());
-        // A word such as tension needs quotes in a sweep file; a number must stay as it was given.
-        let written = if value.parse::<f64>().is_ok() { value.to_owned() } else { format!("{value:?}") };
+        if keys.contains(&key) {
+            return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")).into());
+        }
+        keys.push(key);
+        // A word such as tension needs quotes in a sweep file.
+        let written = number(value).unwrap_or_else(|_| format!("{value:?}"));
         if matches!(key, "eta" | "frequency") {
             writeln!(axes, "{key} = [{written}]")?;
         } else if Symbol::from_key(key).is_some() {
@@ -206,7 +227,7 @@ fn as_flags(error: SweepError) -> anyhow::Error {
 }
 
 /// Refuses what could not be written, before anything runs.
-fn check_outputs(arguments: &Arguments, parameters: &Parameters) -> Result<()> {
+fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
     let sample = arguments.sample;
     if !(sample > 0.0 && sample.is_finite()) {
         return Err(UsageError(format!("--sample {sample}: must be a finite number > 0, in s")).into());
@@ -214,10 +235,22 @@ fn check_outputs(arguments: &Arguments, parameters: &Parameters) -> Result<()> {
     if !(arguments.from >= 0.0 && arguments.from.is_finite()) {
         return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.from)).into());
     }
-    let maps = arguments.map.is_some() || arguments.plot.is_some();
-    let time = arguments.time.as_ref().and_then(|time| time.parse::<f64>().ok()).unwrap_or(0.0);
-    if maps && time / sample * parameters.blocks as f64 > MOST_SAMPLES {
-        let problem = format!("--sample {sample}: more than {MOST_SAMPLES:e} samples in {time} s; take a longer one");
+    let recording = sweep.recording();
+    let longest = recording.max_time.unwrap_or(f64::INFINITY);
+    if arguments.plot.is_some() && arguments.from >= longest {
+        let problem = format!("--from {}: must lie before the end, --time {longest}", arguments.from);
+        return Err(UsageError(problem).into());
+    }
+    let cells = match arguments {
+        Arguments { map: None, plot: None, trace: None, .. } => 0,
+        Arguments { map: None, plot: None, .. } => 1,
+        _ => parameters.blocks,
+    };
+    let slips = recording.slips as f64 + recording.discard as f64;
+    let time = (slips * predicted_interval(parameters)).min(longest);
+    if time / sample * cells as f64 > MOST_SAMPLES {
+        let problem =
+            format!("--sample {sample}: more than {MOST_SAMPLES:e} samples in about {time:.3} s; take a longer one");
         return Err(UsageError(problem).into());
     }
     if let Some(path) = &arguments.plot
@@ -225,13 +258,27 @@ fn check_outputs(arguments: &Arguments, parameters: &Parameters) -> Result<()> {
     {
         return Err(UsageError(format!("--plot {}: must end in .svg or .png", path.display())).into());
     }
-    let outputs = [&arguments.trace, &arguments.map, &arguments.contacts, &arguments.slip_table, &arguments.plot];
-    for path in outputs.into_iter().flatten() {
+    let outputs = [
+        ("--trace", &arguments.trace),
+        ("--map", &arguments.map),
+        ("--contacts", &arguments.contacts),
+        ("--slip-table", &arguments.slip_table),
+        ("--plot", &arguments.plot),
+    ];
+    let mut paths = Vec::new();
+    for (flag, path) in outputs.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))) {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() || path.is_dir() {
-            let problem = format!("{}: cannot be written, its folder must exist and it must be a file", path.display());
+        // A device is not to be replaced by a file.
+        if !folder.is_dir() || (path.exists() && !path.is_file()) {
+            let path = path.display();
+            let problem = format!("{flag} {path}: cannot be written; its folder must exist, and it must be a file");
             return Err(UsageError(problem).into());
         }
+        if paths.contains(&path) {
+            let problem = format!("{flag} {}: another flag writes this file, too; give each its own", path.display());
+            return Err(UsageError(problem).into());
+        }
+        paths.push(path);
     }
     Ok(())
 }
@@ -297,7 +344,7 @@ fn draw(parameters: &Parameters, trace: &[TraceRow], map: &[MapRow], from: f64) 
         fractions: &fractions,
         length: parameters.slider_length,
     };
-    figure::simulation(&samples, Some(map)).map_err(|error| anyhow!(UsageError(error.to_string())))
+    figure::simulation(&samples, Some(map)).map_err(|error| anyhow!(UsageError(format!("--from {from}: {error}"))))
 }
 
 /// The parameters as JSON, under their keys.
@@ -336,14 +383,14 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
         return output::json(&report);
     }
     if !slips.is_empty() {
-        println!("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors");
+        output::print("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors\n")?;
     }
     for slip in slips {
         let optional = |value: Option<f64>, digits: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
         };
-        println!(
-            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}",
+        output::print(&format!(
+            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}\n",
             slip.number,
             slip.onset,
             optional(slip.interval, 6),
@@ -351,7 +398,7 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
             slip.peak_force,
             slip.drop,
             slip.precursors
-        );
+        ))?;
     }
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
@@ -364,6 +411,5 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
         ("contacts", format!("{} breaks, {} reattachments", report.breaks, report.reattachments)),
         ("steps", format!("{}, of which {} leaps", report.steps, report.leaps)),
         ("wall time", output::duration(report.wall_seconds)),
-    ]);
-    Ok(())
+    ])
 }

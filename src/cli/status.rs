@@ -40,7 +40,7 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ("parts", format!("{} done, {} missing", status.parts_done, status.parts_missing)),
             ("running", running),
             ("time left", left),
-        ]);
+        ])?;
     }
     Ok(if status.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
 }

@@ -8,7 +8,6 @@
 use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
-use crate::model::slider::stability_limit;
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
 use std::sync::atomic::Ordering;
 
@@ -64,7 +63,7 @@ impl Motion {
     }
 }
 
-/// Runs the scheme with `time_step` s; see [`super::simulate`].
+/// Runs the scheme with a stable `time_step`, in s; see [`super::simulate`].
 pub(super) fn run(
     parameters: &Parameters,
     time_step: f64,
@@ -72,10 +71,6 @@ pub(super) fn run(
     observer: &mut dyn Observer,
     mut audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
-    let limit = stability_limit(parameters);
-    if !(time_step > 0.0 && time_step < limit) {
-        return Err(SimulationError::UnstableStep { time_step, limit });
-    }
     let blocks = parameters.blocks;
     let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
     let drive = Drive::new(parameters);

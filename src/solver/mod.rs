@@ -14,6 +14,7 @@ pub use ledger::Ledger;
 pub use segment::{ForcePath, Segment};
 
 use self::ledger::Audit;
+use crate::model::slider::stability_limit;
 use crate::model::{ContactEvent, Parameters};
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
@@ -36,6 +37,26 @@ pub enum Solver {
 impl Default for Solver {
     fn default() -> Self {
         Self::EventDriven { tolerance: 1e-6 }
+    }
+}
+
+impl Solver {
+    /// Checks that the setting fits the parameters.
+    ///
+    /// # Errors
+    /// When the time step is not stable, or the tolerance out of range.
+    pub fn check(self, parameters: &Parameters) -> Result<(), SimulationError> {
+        match self {
+            Self::EventDriven { tolerance } if !TOLERANCES.contains(&tolerance) => {
+                Err(SimulationError::BadTolerance { tolerance })
+            }
+            Self::EventDriven { .. } => Ok(()),
+            Self::FixedStep { time_step } => {
+                let limit = stability_limit(parameters);
+                let is_stable = time_step > 0.0 && time_step < limit;
+                if is_stable { Ok(()) } else { Err(SimulationError::UnstableStep { time_step, limit }) }
+            }
+        }
     }
 }
 
@@ -156,10 +177,8 @@ fn run(
     observer: &mut dyn Observer,
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
+    solver.check(parameters)?;
     match solver {
-        Solver::EventDriven { tolerance } if !TOLERANCES.contains(&tolerance) => {
-            Err(SimulationError::BadTolerance { tolerance })
-        }
         Solver::EventDriven { tolerance } => event_driven::run(parameters, tolerance, limits, observer, audit),
         Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer, audit),
     }

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -125,7 +125,7 @@ pub enum DirectoryError {
     #[error("{}: is not empty and no results directory (there is no run/manifest.json); choose another with --out", .0.display())]
     NotOurs(PathBuf),
     /// There are no results.
-    #[error("{}: is no results directory (there is no run/manifest.json)", .0.display())]
+    #[error("{}: is no results directory (there is no run/manifest.json); name one that a run made, such as results/fig3", .0.display())]
     NoResults(PathBuf),
     /// The results belong to something else.
     #[error(
@@ -287,7 +287,11 @@ fn is_fresh(storage: &dyn Storage, layout: &Layout) -> Result<bool, StorageError
     let ours = |name: &std::ffi::OsString| {
         RUN_FOLDERS.iter().any(|folder| name == folder) || Some(name.as_os_str()) == first_sweep.file_name()
     };
-    Ok(list(layout.root())?.iter().all(|name| name == RUN) && list(&layout.run())?.iter().all(ours))
+    match storage.list(layout.root()) {
+        // A file at this place is somebody else's.
+        Err(error) if error.kind() == ErrorKind::NotADirectory => Ok(false),
+        _ => Ok(list(layout.root())?.iter().all(|name| name == RUN) && list(&layout.run())?.iter().all(ours)),
+    }
 }
 
 fn read_text(storage: &dyn Storage, path: &Path) -> Result<String, DirectoryError> {

@@ -117,7 +117,11 @@ impl Storage for Disk {
     }
 
     fn exists(&self, file: &Path) -> io::Result<bool> {
-        file.try_exists()
+        match file.try_exists() {
+            // What should be a folder on the way is a file.
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
+            exists => exists,
+        }
     }
 
     fn remove(&self, file: &Path) -> io::Result<()> {

@@ -87,10 +87,18 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     {
         return Err(places.error(quantity, problem));
     }
-    if sweep.walk().next().is_none() {
+    let Some(first) = sweep.walk().next() else {
         return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
-    }
-    Ok(())
+    };
+    solver(sweep, &first, file)
+}
+
+/// Refuses a solver that would refuse the first job. A later job can only differ where an axis moves masses or stiffnesses;
+/// it then fails by itself, and the others go on.
+fn solver(sweep: &Sweep, first: &Point, file: &Section<'_>) -> Result<(), SweepError> {
+    let section = file.entry("solver").and_then(|entry| entry.section("[solver]"));
+    let time_step = section.and_then(|section| section.entry("dt")).map_or(0, |entry| entry.at);
+    sweep.solver.check(&first.parameters).map_err(|error| file.source.error(time_step, error.to_string()))
 }
 
 /// A period without modulation has no effect, and a modulation without period no meaning.

@@ -6,6 +6,9 @@
 use crate::solver::polynomial::{excursion, shifted, value, value_and_slope};
 use std::f64::consts::{PI, TAU};
 
+/// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
+const QUADRATIC: f64 = 1e-9;
+
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
 
@@ -56,13 +59,16 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
 
 /// The root of a polynomial that rises from below zero throughout [low, high]; `None` if it stays below.
 fn rising_root(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
-    (value(coefficients, high) >= 0.0).then(|| safeguarded_newton(low, high, |s| value_and_slope(coefficients, s)))
+    let first = low - value(coefficients, low) / coefficients[1];
+    (value(coefficients, high) >= 0.0)
+        .then(|| safeguarded_newton(low, high, first, |s| value_and_slope(coefficients, s)))
 }
 
-/// Root of a function that rises through zero once between `low` and `high`, to the last bits: Newton's steps, bisection
-/// where they leave the bracket. Returns the last iterate, never a stale end of the bracket.
-fn safeguarded_newton(mut low: f64, mut high: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut s = 0.5 * (low + high);
+/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
+/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
+/// the bracket.
+fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
     loop {
         let (height, slope) = function(s);
         if height >= 0.0 {
@@ -71,9 +77,14 @@ fn safeguarded_newton(mut low: f64, mut high: f64, function: impl Fn(f64) -> (f6
             low = s;
         }
         let newton = s - height / slope;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if next == s || next <= low || next >= high || (next - s).abs() <= 2.0 * f64::EPSILON * high.abs() {
-            return if newton >= low && newton <= high { newton } else { next };
+        let is_inside = newton >= low && newton <= high;
+        let next = if is_inside { newton } else { 0.5 * (low + high) };
+        let moved = (next - s).abs();
+        if moved == 0.0 || (is_inside && moved <= QUADRATIC * high) {
+            return next;
+        }
+        if !is_inside && (next == low || next == high) {
+            return next;
         }
         s = next;
     }
@@ -115,7 +126,7 @@ impl Driven {
             return if self.rate > 0.0 { ((level - self.start) / self.rate).max(from) } else { f64::INFINITY };
         }
         let newton = |low: f64, high: f64| {
-            safeguarded_newton(low, high, |elapsed| {
+            safeguarded_newton(low, high, high, |elapsed| {
                 let (height, slope) = self.value_and_slope(elapsed);
                 (height - level, slope)
             })
@@ -163,7 +174,7 @@ impl Driven {
         // Before the trough the motion falls, from the crest or from the start.
         let crest = low - (PI - 2.0 * (PI - trough)) / self.angular_frequency;
         let high = crest.max(from);
-        safeguarded_newton(high, low, |elapsed| {
+        safeguarded_newton(high, low, low, |elapsed| {
             let (height, slope) = self.value_and_slope(elapsed);
             (level - height, -slope)
         })

@@ -11,7 +11,7 @@ pub(super) const LANES: usize = 8;
 
 /// One row: eight blocks that lie R apart, in one line of the cache.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub(super) struct Row(pub [f64; LANES]);
 
 impl Row {
@@ -35,6 +35,21 @@ impl DerefMut for Row {
     fn deref_mut(&mut self) -> &mut [f64; LANES] {
         &mut self.0
     }
+}
+
+/// The doubles of some rows, one after the other: the neighbours of entry i are i - 8 and i + 8, and a plain loop over
+/// them runs in vectors.
+#[inline(always)]
+pub(super) fn flat(rows: &[Row]) -> &[f64] {
+    // SAFETY: a `Row` is eight doubles and nothing else: 64 bytes, as its alignment asks, laid out as in C.
+    unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len() * LANES) }
+}
+
+/// The same, to be written.
+#[inline(always)]
+pub(super) fn flat_mut(rows: &mut [Row]) -> &mut [f64] {
+    // SAFETY: as above.
+    unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len() * LANES) }
 }
 
 /// Where blocks lie.

@@ -10,14 +10,18 @@
 //!
 //! hold if S' is positive definite: a bound for each block, and its decay. With a = γ/2 it is sharp unless a mode is
 //! overdamped; then a is halved until S' is positive definite. A leap may therefore start while y is still large, if the bound
-//! shows that meanwhile no block reaches a break position, that y has fallen under the tolerance when the next event
-//! comes, and that the force passes its largest possible value of that time later on. Contract: a leap leaves out at most
-//! `tolerance` · f_s/k of any block's displacement at its end, and no event on its way.
+//! shows that meanwhile no block reaches a break position, and that the shear force has been or will be larger than it
+//! can be meanwhile. If y has fallen under the tolerance when the next event comes, it is dropped; if not, and no mode is
+//! overdamped, it is carried over in one go ([`super::glide`]). Contract: a leap leaves out at most `tolerance` · f_s/k of
+//! any block's displacement at its end, no event on its way, and no largest shear force.
 
 use super::crossing::Driven;
-use super::taylor::{Chain, State};
+use super::glide::Glide;
+use super::lanes::Layout;
+use super::taylor::{Chain, Kernels, State};
 use crate::solver::ledger::Audit;
 use crate::solver::segment::{ForcePath, Segment};
+use std::f64::consts::TAU;
 
 /// Halvings of the decay rate after which free motion counts as undamped.
 const MOST_HALVINGS: i32 = 40;
@@ -39,11 +43,15 @@ pub(super) struct DriveNow {
     pub angular_frequency: f64,
 }
 
+/// How far ahead of a modulated glide a larger shear force is looked for, in units of 1/γ.
+const LOOK_AHEAD: f64 = 10.0;
+
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
-    /// The slider moved on by so many seconds; a block reached a break position if one is named.
-    Leapt { elapsed: f64, reached: Option<usize> },
+    /// The slider moved on by so many seconds; a block reached a break position if one is named. Whether the free motion was
+    /// carried over.
+    Leapt { elapsed: f64, reached: Option<usize>, glided: bool },
     /// Not yet: try again after so many seconds.
     Wait { seconds: f64 },
 }
@@ -75,10 +83,23 @@ pub(super) struct Leap {
     rate: Vec<f64>,
     wave: Vec<[f64; 2]>,
     residue: Vec<f64>,
+    glide: Glide,
+}
+
+/// What bounds a leap.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// Time to the next reattachment or to the end, in s.
+    pub horizon: f64,
+    /// Displacement that may be left out, in m.
+    pub error: f64,
+    /// Largest shear force on record since the last break, in N. Every observer has seen it.
+    pub passed: f64,
 }
 
 impl Leap {
-    pub fn new(blocks: usize) -> Self {
+    pub fn new(layout: Layout) -> Self {
+        let blocks = layout.blocks;
         let zeros = vec![0.0; blocks];
         Self {
             decay_rate: f64::INFINITY,
@@ -90,39 +111,46 @@ impl Leap {
             rate: zeros.clone(),
             wave: vec![[0.0; 2]; blocks],
             residue: zeros,
+            glide: Glide::new(layout.rows),
         }
     }
 
     /// Tries to leap by at most `horizon` s, leaving out no displacement above `error` m, and writes the state at its end.
-    /// `emit` receives the shear force on the way, `audit` the energies.
+    /// Shear forces up to `passed` N have been seen since the last break. `emit` receives the shear force on the way,
+    /// `audit` the energies, unless the free motion was carried over.
     #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it tells")]
     pub fn attempt(
         &mut self,
         chain: &Chain,
+        kernels: Kernels,
         drive: &DriveNow,
-        horizon: f64,
-        error: f64,
+        Bounds { horizon, error, passed }: Bounds,
         state: &mut State,
         emit: impl FnOnce(Segment<'_>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
+        // Worth another try after so many e-foldings of the free motion, or after the next event.
         if !self.find_decay(chain) {
-            return Attempt::Wait { seconds: 2.0 / chain.damping_rate };
+            return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
         }
         let decay_rate = self.decay_rate;
-        let wait = |folds: f64| Attempt::Wait { seconds: folds / decay_rate };
+        let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(horizon) };
         self.solve_driven(chain, drive);
         let energy = self.free_energy(chain, drive, state);
         let largest = self.bound_free_motion(chain, energy);
         let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
-        if decay >= horizon {
+        let is_short = decay >= horizon;
+        if is_short && decay_rate < 0.5 * chain.damping_rate {
             return Attempt::Wait { seconds: horizon };
         }
-        if decay > 0.0 && !self.stays_clear(chain, drive, decay, error) {
+        let moving = decay.min(horizon);
+        let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
+        if decay > 0.0 && !self.stays_clear(chain, drive, moving, left) {
             return wait(0.7);
         }
-        let (elapsed, reached) = self.first_reached(chain, drive, decay, horizon);
-        if elapsed <= decay && decay > 0.0 {
+        let (elapsed, reached) =
+            if is_short { (horizon, None) } else { self.first_reached(chain, drive, decay, horizon) };
+        if elapsed <= decay && decay > 0.0 && !is_short {
             return wait(0.7);
         }
         if !elapsed.is_finite() {
@@ -130,20 +158,83 @@ impl Leap {
         }
         let path = self.force_path(drive);
         let segment = Segment { start: 0.0, duration: elapsed, path };
-        if decay > 0.0 {
-            let passed = Segment { start: 0.0, duration: decay, path }.maximum_above(f64::NEG_INFINITY);
-            let hidden = passed.map_or(f64::INFINITY, |(_, force)| force) + drive.stiffness * self.residue[0];
-            if segment.maximum_above(hidden).is_none() {
-                return wait(0.7);
-            }
+        if largest > error && !self.hides_no_peak(chain, drive, &segment, moving, left, passed) {
+            return wait(0.7);
         }
         emit(segment);
-        if let Some(audit) = audit {
+        if is_short {
+            self.set_free_motion(chain, drive, state);
+            kernels.glide(chain, elapsed, &mut self.glide);
+        } else if let Some(audit) = audit {
             let driven = Driving { start: &self.start, rate: &self.rate, wave: &self.wave };
             audit.follow_leap(chain, drive, driven, state, elapsed);
         }
         self.follow(chain, drive, elapsed, state);
-        Attempt::Leapt { elapsed, reached }
+        if is_short {
+            self.add_free_motion(chain, left, state);
+        }
+        Attempt::Leapt { elapsed, reached, glided: is_short }
+    }
+
+    /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
+    /// one as large is on record, or comes later in the segment, or comes after it and before any break.
+    fn hides_no_peak(
+        &self,
+        chain: &Chain,
+        drive: &DriveNow,
+        segment: &Segment<'_>,
+        moving: f64,
+        left: f64,
+        passed: f64,
+    ) -> bool {
+        let swing = drive.stiffness * self.residue[0];
+        let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
+        let now = segment.force_after(0.0);
+        let later = segment.force_after(moving);
+        let highest = if drive.amplitude == 0.0 {
+            // A rising line and a decaying bound: largest at an end.
+            (now + swing).max(later + left * swing)
+        } else {
+            driven(moving).maximum_above(f64::NEG_INFINITY).map_or(f64::INFINITY, |(_, force)| force) + swing
+        };
+        if highest <= passed || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
+            return true;
+        }
+        let rate = drive.stiffness * (drive.velocity - self.rate[0]);
+        let further = if drive.amplitude == 0.0 {
+            3.0 * (highest - later) / rate
+        } else {
+            (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
+        };
+        let ahead = moving + further;
+        driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
+    }
+
+    /// Puts u(0) = y and u'(0) = w + γ y/2 of the free motion into the work space.
+    fn set_free_motion(&mut self, chain: &Chain, drive: &DriveNow, state: &State) {
+        for j in 0..chain.layout.blocks {
+            let (y, turned) = self.free_motion(chain, drive, state, j);
+            let (row, lane) = chain.layout.slot(j);
+            self.glide.start(row, lane, y, turned);
+        }
+    }
+
+    /// Adds y and w = u' e^{-γt/2} - γ y/2, where `left` is e^{-γt/2}.
+    fn add_free_motion(&self, chain: &Chain, left: f64, state: &mut State) {
+        for j in 0..chain.layout.blocks {
+            let (row, lane) = chain.layout.slot(j);
+            let (u, rate) = self.glide.end(row, lane);
+            state.displacement[row][lane] += left * u;
+            state.velocity[row][lane] += left * (rate - 0.5 * chain.damping_rate * u);
+        }
+    }
+
+    /// y and w + a y of a block.
+    fn free_motion(&self, chain: &Chain, drive: &DriveNow, state: &State, j: usize) -> (f64, f64) {
+        let y = chain.at(&state.displacement, j) - self.start[j] - self.wave[j][0];
+        // d/dt Re(q e^{iωt}) = -ω Im q at the start.
+        let w = chain.at(&state.velocity, j) - self.rate[j] + drive.angular_frequency * self.wave[j][1];
+        (y, w + self.decay_rate * y)
     }
 
     /// Finds the decay rate, from that of the last time, and eliminates; false if there is none.
@@ -245,10 +336,7 @@ impl Leap {
         let shift = self.shift(chain);
         let (mut energy, mut before) = (0.0, 0.0);
         for j in 0..blocks {
-            let y = chain.at(&state.displacement, j) - self.start[j] - self.wave[j][0];
-            // d/dt Re(q e^{iωt}) = -ω Im q at the start.
-            let w = chain.at(&state.velocity, j) - self.rate[j] + drive.angular_frequency * self.wave[j][1];
-            let turned = w + self.decay_rate * y;
+            let (y, turned) = self.free_motion(chain, drive, state, j);
             energy += turned * turned + y * ((chain.at(&chain.diagonal, j) - shift) * y - 2.0 * coupling * before);
             before = y;
         }
@@ -268,13 +356,15 @@ impl Leap {
         largest
     }
 
-    /// Whether no block can reach a break position within `decay` s, driven and free motion together.
-    fn stays_clear(&self, chain: &Chain, drive: &DriveNow, decay: f64, error: f64) -> bool {
+    /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's
+    /// bound remains.
+    fn stays_clear(&self, chain: &Chain, drive: &DriveNow, seconds: f64, left: f64) -> bool {
         let turns = drive.amplitude > 0.0;
         (0..chain.layout.blocks).all(|j| {
             let swing = if turns { libm::hypot(self.wave[j][0], self.wave[j][1]) } else { 0.0 };
             // Ramp and decaying bound together are convex in time: largest at the ends.
-            let highest = (self.start[j] + self.residue[j]).max(self.start[j] + self.rate[j] * decay + error) + swing;
+            let late = self.start[j] + self.rate[j] * seconds + left * self.residue[j];
+            let highest = late.max(self.start[j] + self.residue[j]) + swing;
             let lowest = self.start[j] - self.residue[j] - swing;
             highest < chain.at(&chain.upper, j) && lowest > chain.at(&chain.lower, j)
         })
@@ -332,7 +422,7 @@ impl Leap {
 
     /// Writes the driven solution after so many seconds into the state.
     fn follow(&self, chain: &Chain, drive: &DriveNow, elapsed: f64, state: &mut State) {
-        let turn = std::f64::consts::TAU * (elapsed * drive.angular_frequency / std::f64::consts::TAU).fract();
+        let turn = TAU * (elapsed * drive.angular_frequency / TAU).fract();
         let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(turn) } else { (0.0, 1.0) };
         for j in 0..chain.layout.blocks {
             let [real, imaginary] = product(self.wave[j], [cosine, sine]);

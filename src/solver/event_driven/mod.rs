@@ -9,16 +9,17 @@
 
 mod audit;
 mod crossing;
+mod glide;
 mod lanes;
 mod leap;
 mod taylor;
 
 use self::crossing::first_reach;
 use self::lanes::Layout;
-use self::leap::{Attempt, DriveNow, Leap};
+use self::leap::{Attempt, Bounds, DriveNow, Leap};
 use self::taylor::{Chain, Kernels, Series, State, StepInput};
 use super::ledger::Audit;
-use super::polynomial::MOST_COEFFICIENTS;
+use super::polynomial::{self, MOST_COEFFICIENTS};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
@@ -83,6 +84,8 @@ struct Run<'a> {
     longest_step: f64,
     typical_advance: f64,
     next_leap: f64,
+    /// Largest shear force at the last break and at the ends of steps since, in N.
+    passed_force: f64,
     summary: Summary,
     audit: Option<&'a mut Audit>,
 }
@@ -104,7 +107,7 @@ impl<'a> Run<'a> {
             interface,
             state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) },
             series: Series::new(layout),
-            leap: Leap::new(parameters.blocks),
+            leap: Leap::new(layout),
             candidates: Vec::new(),
             truncation: TRUNCATION_SHARE * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),
@@ -116,6 +119,7 @@ impl<'a> Run<'a> {
             longest_step,
             typical_advance: longest_step,
             next_leap: 0.0,
+            passed_force: 0.0,
             summary: Summary::default(),
             audit: None,
         };
@@ -184,15 +188,20 @@ impl<'a> Run<'a> {
             angular_frequency: self.drive.angular_frequency,
         };
         let start = self.epoch + self.time;
+        let bounds = Bounds { horizon, error: self.left_out, passed: self.passed_force };
         let emit = |segment: Segment<'_>| observer.advance(&Segment { start, ..segment });
+        let before = self.audit.is_some().then(|| self.state.clone());
         let (state, audit) = (&mut self.state, self.audit.as_deref_mut());
-        let attempt = self.leap.attempt(&self.chain, &drive, horizon, self.left_out, state, emit, audit);
+        let attempt = self.leap.attempt(&self.chain, self.kernels, &drive, bounds, state, emit, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.time + seconds.max(self.longest_step);
                 false
             }
-            Attempt::Leapt { elapsed, reached } => {
+            Attempt::Leapt { elapsed, reached, glided } => {
+                if let Some(before) = before.filter(|_| glided) {
+                    self.audit_glide(before, elapsed);
+                }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
                 self.next_leap = 0.0;
@@ -204,6 +213,25 @@ impl<'a> Run<'a> {
                 true
             }
         }
+    }
+
+    /// Goes over a glide once more in Taylor steps, for the energies alone.
+    fn audit_glide(&mut self, before: State, elapsed: f64) {
+        let after = std::mem::replace(&mut self.state, before);
+        let (start, mut done) = (self.time, 0.0);
+        while done < elapsed {
+            let left = elapsed - done;
+            let Ok(length) = self.expand(left) else { break };
+            let s = (left / length).min(1.0);
+            if let Some(audit) = &mut self.audit {
+                audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
+            }
+            self.kernels.evaluate(&self.series, s, length, &mut self.state);
+            done = if s < 1.0 { elapsed } else { done + length };
+            self.time = start + done;
+        }
+        self.state = after;
+        self.time = start;
     }
 
     /// One Taylor step, to the first of its end, a break, and `horizon` s.
@@ -223,6 +251,7 @@ impl<'a> Run<'a> {
             audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
         }
         self.kernels.evaluate(&self.series, s, length, &mut self.state);
+        self.passed_force = self.passed_force.max(polynomial::value(&coefficients[..=self.series.order], s));
         let is_attachment = reached.is_none() && s == end && end < 1.0;
         self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
         if let Some(block) = reached {
@@ -325,6 +354,7 @@ impl<'a> Run<'a> {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
         let x = self.state.displacement[row][lane];
+        self.passed_force = self.shear_force();
         // Rounding may leave the block a hair before the position that it was found to reach.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
@@ -333,6 +363,13 @@ impl<'a> Run<'a> {
             observer.contact(&absolute(event, epoch, origin));
         });
         self.chain.update(block, &self.interface);
+    }
+
+    /// F_S now, in N.
+    fn shear_force(&self) -> f64 {
+        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
+        let cosine = if self.drive.is_modulated() { libm::cos(self.phase()) } else { 0.0 };
+        self.drive.stiffness * (ramp + self.drive.amplitude * cosine - self.state.displacement[0][0])
     }
 
     /// Reattaches what is due now.

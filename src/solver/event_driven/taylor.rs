@@ -8,7 +8,8 @@
 //! Every path of [`Kernels`] compiles the same plain code for another set of processor features; since nothing is fused
 //! or reassociated, all give the same bits.
 
-use super::lanes::{LANES, Layout, Row, ghost_after, ghost_before};
+use super::glide::{Glide, advance};
+use super::lanes::{LANES, Layout, Row, flat, flat_mut, ghost_after, ghost_before};
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
 use crate::solver::polynomial::MOST_COEFFICIENTS;
@@ -140,6 +141,7 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
+    glide: unsafe fn(&Chain, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
     pub name: &'static str,
@@ -149,7 +151,7 @@ pub(super) struct Kernels {
 macro_rules! kernels {
     ($module:ident, $name:literal $(, $features:literal)?) => {
         mod $module {
-            use super::{Chain, Kernels, Series, State, StepInput, evaluate, expand, reachable};
+            use super::{Chain, Glide, Kernels, Series, State, StepInput, advance, evaluate, expand, reachable};
 
             $(#[target_feature(enable = $features)])?
             fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
@@ -166,10 +168,16 @@ macro_rules! kernels {
                 reachable(chain, series, blocks);
             }
 
+            $(#[target_feature(enable = $features)])?
+            fn glide_here(chain: &Chain, seconds: f64, glide: &mut Glide) {
+                advance(chain, seconds, glide);
+            }
+
             pub(super) const KERNELS: Kernels = Kernels {
                 expand: expand_here,
                 evaluate: evaluate_here,
                 reachable: reachable_here,
+                glide: glide_here,
                 name: $name,
             };
         }
@@ -220,6 +228,13 @@ impl Kernels {
     pub fn reachable(self, chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
         // SAFETY: as above.
         unsafe { (self.reachable)(chain, series, blocks) }
+    }
+
+    /// Carries the free motion over so many seconds.
+    #[inline]
+    pub fn glide(self, chain: &Chain, seconds: f64, glide: &mut Glide) {
+        // SAFETY: as above.
+        unsafe { (self.glide)(chain, seconds, glide) }
     }
 }
 
@@ -274,18 +289,14 @@ fn stencil(chain: &Chain, terms: &mut [Row], for_force: f64, for_damping: f64) {
     let rows = stride - 2;
     let (x, rest) = terms.split_at_mut(stride);
     let (rate, next) = rest.split_at_mut(stride);
-    let (coupling, diagonal) = (&chain.coupling[..rows], &chain.diagonal[..rows]);
-    let (x, rate, next) = (&x[..rows + 2], &rate[..rows + 2], &mut next[..rows + 2]);
-    for r in 0..rows {
-        // Whole rows are read before one is written, or the loop over lanes would not run in vectors.
-        let (before, here, after, rate) = (x[r], x[r + 1], x[r + 2], rate[r + 1]);
-        let (coupling, diagonal) = (coupling[r], diagonal[r]);
-        let mut row = Row::filled(0.0);
-        for l in 0..LANES {
-            let force = coupling[l] * (before[l] + after[l]) - diagonal[l] * here[l];
-            row[l] = for_force * force - for_damping * rate[l];
-        }
-        next[r + 1] = row;
+    let entries = rows * LANES;
+    let (coupling, diagonal) = (&flat(&chain.coupling)[..entries], &flat(&chain.diagonal)[..entries]);
+    let (before, here, after) = (&flat(x)[..entries], &flat(&x[1..])[..entries], &flat(&x[2..])[..entries]);
+    let rate = &flat(&rate[1..])[..entries];
+    let next = &mut flat_mut(&mut next[1..])[..entries];
+    for i in 0..entries {
+        let force = coupling[i] * (before[i] + after[i]) - diagonal[i] * here[i];
+        next[i] = for_force * force - for_damping * rate[i];
     }
 }
 

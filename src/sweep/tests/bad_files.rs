@@ -104,6 +104,8 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
         ("name = \"a\"\n[record]\nmax_time = -1", 3, &["max_time = -1", "finite number > 0, in s"]),
         ("name = \"a\"\n[record]\nprecursors = 1", 3, &["precursors = 1", "true or false"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ndt = 0", 4, &["dt = 0", "in s"]),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ndt = 5e-6", 4, &["dt = 5e-6", "limit", "4.8719e-6 s"]),
+        ("name = \"a\"\n[solver]\ndt = 4e-6\nmethod = \"fixed-step\"\n[axes]\nM = [1]", 3, &["dt = 4e-6", "limit"]),
         ("name = \"a\"\n[solver]\ntolerance = 1", 3, &["tolerance = 1", "from 1e-12 to 1e-2"]),
         ("name = \"a\"\n[solver]\ntolerance = 0.5", 3, &["tolerance = 0.5", "relative to fs/k"]),
     ]);

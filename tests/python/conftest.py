@@ -1,0 +1,55 @@
+"""A small sweep, run by the built program: two parameter sets, extended once, so that every table has several files."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SWEEP = """
+name = "tiny"
+
+[model]
+N = 9
+
+[[axes.zip]]
+Delta     = [0, 1e-6]
+frequency = [29, 29]
+
+[axes]
+seed = {{ count = {seeds} }}
+
+[record]
+slips = 6
+discard = 2
+precursors = true
+"""
+
+
+@pytest.fixture(scope="session")
+def stickslip():
+    """Runs the program with some arguments; it must succeed."""
+    target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+    program = Path(os.environ.get("STICKSLIP", target / "release" / "stickslip"))
+    if not program.exists():
+        pytest.fail(f"{program} is missing: run cargo build --release, or set STICKSLIP to the program")
+
+    def run(*arguments):
+        done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, f"{arguments}: exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def results(stickslip, tmp_path_factory):
+    """The results folder of the sweep."""
+    folder = tmp_path_factory.mktemp("sweep")
+    sweep, results = folder / "tiny.toml", folder / "results"
+    for seeds in (3, 5):
+        sweep.write_text(SWEEP.format(seeds=seeds))
+        stickslip("run", sweep, "--out", results)
+    return results

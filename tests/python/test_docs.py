@@ -1,0 +1,90 @@
+"""The documentation names every parameter and every column, its sweep files run, and its links lead somewhere."""
+
+import json
+import re
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def name(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+def examples():
+    """The sweep files in the documentation: blocks of TOML that have a name."""
+    for page in PAGES:
+        for number, block in enumerate(re.findall(r"^```toml\n(.*?)^```", page.read_text(), re.M | re.S)):
+            if re.search(r"^name\b", block, re.M):
+                yield pytest.param(block, id=f"{name(page)}-{number}")
+
+
+def parameters():
+    """Keys and units of the model's parameters, from the one place that describes them."""
+    source = (ROOT / "src" / "model" / "parameters.rs").read_text()
+    found = re.findall(r'describe\(\s*"(\w+)",\s*"([^"]*)",', source)
+    assert len(found) == len(re.findall(r"^\s+Self::\w+ =>\s+(?:\{\s+)?describe\(", source, re.M)) > 10
+    return found
+
+
+@pytest.mark.parametrize("key, unit", parameters())
+def test_the_model_page_has_every_parameter_with_its_unit(key, unit):
+    rows = [line.split("|") for line in (ROOT / "docs" / "model.md").read_text().splitlines() if f"| `{key}` |" in line]
+    assert len(rows) == 1, f"docs/model.md: one row of the table of parameters for `{key}`"
+    assert rows[0][-2].strip() == unit
+
+
+def test_every_column_is_documented(results):
+    written = {file.parent.name: file for file in (results / "tables").glob("*/*.parquet")}
+    written |= {file.stem: file for file in (results / "reduced").glob("*.parquet")}
+    assert {"slips", "jobs", "precursors", "sets", "histograms", "backbone", "points"} <= set(written)
+    text = "".join(page.read_text() for page in PAGES if page.parent.name == "docs")
+    for table, file in written.items():
+        for field in pq.read_schema(file):
+            assert field.metadata[b"description"], f"{table}.{field.name} has no meaning in its metadata"
+            assert f"`{field.name}`" in text, f"{table}.{field.name} is not in docs/"
+
+
+def test_every_column_of_a_simulation_is_documented(stickslip, tmp_path):
+    files = {flag: tmp_path / f"{flag}.parquet" for flag in ("trace", "map", "contacts")}
+    flags = [argument for flag, file in files.items() for argument in (f"--{flag}", file)]
+    stickslip("simulate", "--set", "N=9", "--time", 0.01, *flags)
+    text = (ROOT / "docs" / "results.md").read_text()
+    for flag, file in files.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `--{flag}` |"))
+        for field in pq.read_schema(file):
+            assert f"`{field.name}`" in row, f"{flag}.{field.name}"
+
+
+def test_every_field_of_json_output_is_documented(stickslip, results):
+    sweep = results.parent / "tiny.toml"
+    outputs = {
+        "plan": ("plan", sweep),
+        "run": ("run", sweep, "--out", results, "--no-reduce"),
+        "status": ("status", results),
+        "reduce": ("reduce", results),
+        "simulate": ("simulate", "--set", "N=9", "--time", 0.01),
+    }
+    text = (ROOT / "docs" / "results.md").read_text()
+    for command, arguments in outputs.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{command}` |"))
+        for field in json.loads(stickslip(*arguments, "--json").stdout):
+            assert f"`{field}`" in row, f"{command} --json: {field}"
+
+
+@pytest.mark.parametrize("text", list(examples()))
+def test_the_sweep_files_in_the_documentation_can_run(stickslip, tmp_path, text):
+    sweep = tmp_path / "example.toml"
+    sweep.write_text(text)
+    stickslip("plan", sweep)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text()):
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists(), f"{name(page)} links to {target}"
