@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `store` <- `run`; `store` <- `reduce` <- `figure`.
-//! Only the binary's `cli` prints.
+//! `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
 //!
 //! | word | meaning |
 //! |---|---|

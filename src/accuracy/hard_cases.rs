@@ -147,8 +147,8 @@ impl HardCase {
                     Solver::FixedStep { .. } => BALANCED_FIXED_STEP,
                 };
                 row.passed = self.expected == Expected::Ends && residual.abs() <= allowed;
-                row.outcome =
-                    if residual.abs() <= allowed { "done" } else { "done, but energy does not balance" }.to_owned();
+                let outcome = if residual.abs() <= allowed { "done" } else { "done, but energy does not balance" };
+                outcome.clone_into(&mut row.outcome);
                 row.simulated_seconds = Some(summary.end_time);
                 row.ledger_residual = Some(residual);
                 (row.slips, row.steps, row.leaps, row.breaks) = (slips, summary.steps, summary.leaps, summary.breaks);

@@ -1,16 +1,57 @@
 //! Accuracy: speed against error of every solver in one run, and what happens in hard cases.
 //!
 //! ```text
-//! cpu.rs                      what a computation costs
-//! hard_cases.rs               parameters that break a naive code
+//! breaks.rs     before chaos: break times, contact by contact
+//! distance.rs   after chaos: distances of distributions, with intervals
+//! study.rs      every solver under every drive, timed on one thread
+//! hard_cases.rs parameters that break a naive code, each audited
+//! cpu.rs        what a computation costs
+//! tables.rs -> write.rs
 //! ```
 
+pub mod breaks;
 pub mod cpu;
+pub mod distance;
 mod hard_cases;
+mod study;
+mod tables;
+mod write;
 
 pub use hard_cases::{HardCase, Stability, hard_cases};
+pub use study::{Cost, DistanceRow, Findings, MethodRow, Quantity, Study, drive_in_words};
+pub use tables::{distances, methods, stability};
+pub use write::{as_json, stability_json, write, write_stability};
 
-use crate::solver::Solver;
+use crate::figure::FigureError;
+use crate::solver::{SimulationError, Solver};
+use crate::store::dataset::DatasetError;
+use crate::store::storage::StorageError;
+
+/// A study that cannot be made or written.
+#[derive(Debug, thiserror::Error)]
+pub enum AccuracyError {
+    /// A simulation cannot go on.
+    #[error("{drive}, seed {seed}, {solver}: {source}")]
+    Simulation {
+        /// Velocity and modulation in words.
+        drive: String,
+        /// Realisation.
+        seed: u64,
+        /// Method and setting.
+        solver: String,
+        /// The cause.
+        source: SimulationError,
+    },
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A table cannot be written.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A file cannot be put in its place.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+}
 
 /// A solver and its setting in words.
 #[must_use]

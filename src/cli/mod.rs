@@ -1,5 +1,6 @@
 //! Flags, text and JSON output, progress, exit codes: the only code that prints.
 
+mod accuracy;
 mod completions;
 mod exit;
 mod output;
@@ -39,6 +40,7 @@ enum Command {
     Reduce(reduce::ReduceArguments),
     Plot(reduce::PlotArguments),
     Simulate(simulate::Arguments),
+    Accuracy(accuracy::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -51,6 +53,7 @@ pub fn main() -> ExitCode {
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => reduce::plot(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
+        Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Completions(arguments) => completions::completions(&arguments),
     };
     let exit = ended.unwrap_or_else(|error| {

@@ -6,7 +6,8 @@
 //! break found late, a contact attached stressed or a series cut short all show as a residual.
 //!
 //! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered as
-//! such; [`Ledger::left_out`] tells how much that was.
+//! such; [`Ledger::left_out`] tells how much that was. Where a leap carries the free motion on, it is resolved once more for
+//! its damping and for the work on it, which the segment of the leap does not show.
 
 use super::quadrature::Quadrature;
 use super::segment::{ForcePath, Segment};
@@ -49,8 +50,17 @@ pub(super) struct Audit {
     pub quadrature: Quadrature,
     pub damping: f64,
     pub left_out: f64,
+    /// Work of the drive on motion that the segments do not show.
+    pub unseen_work: f64,
     pub elastic: f64,
     pub kinetic: f64,
+}
+
+impl Audit {
+    fn new() -> Self {
+        let quadrature = Quadrature::new();
+        Self { quadrature, damping: 0.0, left_out: 0.0, unseen_work: 0.0, elastic: 0.0, kinetic: 0.0 }
+    }
 }
 
 /// An observer that keeps the work of the drive and the loss in breaks, and passes on all that it sees.
@@ -86,12 +96,12 @@ pub(super) fn audited(
     observer: &mut dyn Observer,
     run: impl FnOnce(&mut dyn Observer, &mut Audit) -> Result<Summary, SimulationError>,
 ) -> Result<(Summary, Ledger), SimulationError> {
-    let quadrature = Quadrature::new();
-    let mut audit = Audit { quadrature: quadrature.clone(), damping: 0.0, left_out: 0.0, elastic: 0.0, kinetic: 0.0 };
-    let mut meter = Meter { observer, drive: Drive::new(parameters), quadrature, work: 0.0, broken: 0.0 };
+    let mut audit = Audit::new();
+    let mut meter =
+        Meter { observer, drive: Drive::new(parameters), quadrature: audit.quadrature.clone(), work: 0.0, broken: 0.0 };
     let summary = run(&mut meter, &mut audit)?;
     let ledger = Ledger {
-        work: meter.work,
+        work: meter.work + audit.unseen_work,
         elastic: audit.elastic,
         kinetic: audit.kinetic,
         damping: audit.damping + audit.left_out,
@@ -102,7 +112,7 @@ pub(super) fn audited(
 }
 
 /// Work of the drive along a segment, in J.
-fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>) -> f64 {
+pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>) -> f64 {
     if !drive.is_modulated() {
         return drive.velocity * segment.impulse();
     }

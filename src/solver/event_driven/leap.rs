@@ -126,7 +126,7 @@ impl Leap {
         drive: &DriveNow,
         Bounds { horizon, error, passed }: Bounds,
         state: &mut State,
-        emit: impl FnOnce(Segment<'_>),
+        emit: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
         // Worth another try after so many e-foldings of the free motion, or after the next event.

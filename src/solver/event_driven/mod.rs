@@ -18,7 +18,7 @@ use self::crossing::first_reach;
 use self::lanes::Layout;
 use self::leap::{Attempt, Bounds, DriveNow, Leap};
 use self::taylor::{Chain, Kernels, Series, State, StepInput};
-use super::ledger::Audit;
+use super::ledger::{Audit, work};
 use super::polynomial::{self, MOST_COEFFICIENTS};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
@@ -189,7 +189,12 @@ impl<'a> Run<'a> {
         };
         let start = self.epoch + self.time;
         let bounds = Bounds { horizon, error: self.left_out, passed: self.passed_force };
-        let emit = |segment: Segment<'_>| observer.advance(&Segment { start, ..segment });
+        let mut shown = None;
+        let emit = |segment: Segment<'static>| {
+            let segment = Segment { start, ..segment };
+            shown = Some(segment);
+            observer.advance(&segment);
+        };
         let before = self.audit.is_some().then(|| self.state.clone());
         let (state, audit) = (&mut self.state, self.audit.as_deref_mut());
         let attempt = self.leap.attempt(&self.chain, self.kernels, &drive, bounds, state, emit, audit);
@@ -199,8 +204,8 @@ impl<'a> Run<'a> {
                 false
             }
             Attempt::Leapt { elapsed, reached, glided } => {
-                if let Some(before) = before.filter(|_| glided) {
-                    self.audit_glide(before, elapsed);
+                if let (Some(before), Some(shown)) = (before.filter(|_| glided), shown) {
+                    self.audit_glide(before, &shown);
                 }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
@@ -215,16 +220,21 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Goes over a glide once more in Taylor steps, for the energies alone.
-    fn audit_glide(&mut self, before: State, elapsed: f64) {
+    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
+    fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
+        let elapsed = shown.duration;
         let after = std::mem::replace(&mut self.state, before);
         let (start, mut done) = (self.time, 0.0);
         while done < elapsed {
             let left = elapsed - done;
             let Ok(length) = self.expand(left) else { break };
             let s = (left / length).min(1.0);
+            let coefficients = self.force_coefficients(length);
             if let Some(audit) = &mut self.audit {
                 audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
+                let path = ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length };
+                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
+                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
             }
             self.kernels.evaluate(&self.series, s, length, &mut self.state);
             done = if s < 1.0 { elapsed } else { done + length };
@@ -232,6 +242,9 @@ impl<'a> Run<'a> {
         }
         self.state = after;
         self.time = start;
+        if let Some(audit) = &mut self.audit {
+            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
+        }
     }
 
     /// One Taylor step, to the first of its end, a break, and `horizon` s.

@@ -1,0 +1,166 @@
+//! After chaos: distances between two samples of slips, with bootstrap intervals.
+//!
+//! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Resampling draws blocks of
+//! consecutive slips, since neighbours are correlated, and is keyed: the same samples give the same intervals. Both distances
+//! are positive even between samples of the same distribution; the floor says how large that is.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Consecutive slips that are drawn together: slips are correlated with the next one or two.
+const BLOCK: usize = 5;
+/// Resamples behind an interval: its ends are then good to a tenth of its width.
+const RESAMPLES: usize = 400;
+/// Tails left out of an interval, on each side.
+const TAIL: f64 = 0.025;
+/// Quantile of the distances under the null hypothesis that makes the floor.
+const FLOOR: f64 = 0.95;
+
+/// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in 95 %
+/// of cases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// Of the samples.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+    /// 95 % quantile for samples that differ by chance alone.
+    pub floor: f64,
+}
+
+/// Wasserstein-1 and Kolmogorov-Smirnov distances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distances {
+    /// ∫ |F - G|.
+    pub wasserstein: Distance,
+    /// max |F - G|.
+    pub kolmogorov: Distance,
+}
+
+/// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. `key` keeps the random numbers
+/// of different comparisons apart.
+#[must_use]
+pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distances> {
+    if sample.is_empty() || reference.is_empty() {
+        return None;
+    }
+    let mut generator = ChaCha8Rng::seed_from_u64(key);
+    let (value_wasserstein, value_kolmogorov) = both(&sorted(sample), &sorted(reference));
+    let (mut wasserstein, mut kolmogorov, mut by_chance) = (Vec::new(), Vec::new(), (Vec::new(), Vec::new()));
+    for _ in 0..RESAMPLES {
+        let other = resample(reference, reference.len(), &mut generator);
+        let (w, k) = both(&resample(sample, sample.len(), &mut generator), &other);
+        wasserstein.push(w);
+        kolmogorov.push(k);
+        let (w, k) = both(&resample(reference, sample.len(), &mut generator), &other);
+        by_chance.0.push(w);
+        by_chance.1.push(k);
+    }
+    let distance = |value: f64, mut resampled: Vec<f64>, mut chance: Vec<f64>| Distance {
+        value,
+        low: quantile(&mut resampled, TAIL),
+        high: quantile(&mut resampled, 1.0 - TAIL),
+        floor: quantile(&mut chance, FLOOR),
+    };
+    Some(Distances {
+        wasserstein: distance(value_wasserstein, wasserstein, by_chance.0),
+        kolmogorov: distance(value_kolmogorov, kolmogorov, by_chance.1),
+    })
+}
+
+fn sorted(sample: &[f64]) -> Vec<f64> {
+    let mut sorted = sample.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+/// A sorted resample of a given size, in blocks that wrap around.
+fn resample(sample: &[f64], size: usize, generator: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut drawn = Vec::with_capacity(size + BLOCK);
+    while drawn.len() < size {
+        let first = below(sample.len(), generator);
+        drawn.extend((first..first + BLOCK).map(|i| sample[i % sample.len()]));
+    }
+    drawn.truncate(size);
+    drawn.sort_by(f64::total_cmp);
+    drawn
+}
+
+/// A whole number below a bound, by the upper half of a product; the bias of 2^-64 times the bound is of no account.
+fn below(bound: usize, generator: &mut ChaCha8Rng) -> usize {
+    #[expect(clippy::cast_possible_truncation, reason = "below the bound")]
+    let drawn = ((u128::from(generator.next_u64()) * bound as u128) >> 64) as usize;
+    drawn
+}
+
+/// Both distances of sorted samples.
+fn both(left: &[f64], right: &[f64]) -> (f64, f64) {
+    let (mut i, mut j) = (0, 0);
+    let (mut wasserstein, mut kolmogorov) = (0.0, 0.0_f64);
+    let mut before = left[0].min(right[0]);
+    while i < left.len() || j < right.len() {
+        let next = match (left.get(i), right.get(j)) {
+            (Some(&l), Some(&r)) => l.min(r),
+            (Some(&only), None) | (None, Some(&only)) => only,
+            (None, None) => break,
+        };
+        let gap = (i as f64 / left.len() as f64 - j as f64 / right.len() as f64).abs();
+        wasserstein += gap * (next - before);
+        kolmogorov = kolmogorov.max(gap);
+        before = next;
+        while left.get(i) == Some(&next) {
+            i += 1;
+        }
+        while right.get(j) == Some(&next) {
+            j += 1;
+        }
+    }
+    (wasserstein, kolmogorov)
+}
+
+/// Nearest-rank quantile.
+fn quantile(values: &mut [f64], probability: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+    let index = (probability * (values.len() - 1) as f64).round() as usize;
+    values[index]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uniform(count: usize, shift: f64, key: u64) -> Vec<f64> {
+        let mut generator = ChaCha8Rng::seed_from_u64(key);
+        (0..count).map(|_| shift + generator.next_u64() as f64 / 2.0_f64.powi(64)).collect()
+    }
+
+    #[test]
+    fn distances_of_small_samples_are_those_by_hand() {
+        assert_eq!(both(&[0.0, 1.0], &[0.0, 1.0]), (0.0, 0.0));
+        assert_eq!(both(&[0.0, 1.0], &[2.0, 3.0]), (2.0, 1.0));
+        let (wasserstein, kolmogorov) = both(&[1.0, 2.0, 3.0], &[2.0]);
+        assert!((wasserstein - 2.0 / 3.0).abs() < 1e-15 && (kolmogorov - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_shift_is_told_from_chance_and_chance_from_a_shift() {
+        let reference = uniform(1000, 0.0, 1);
+        let same = distances(&uniform(500, 0.0, 2), &reference, 3).unwrap();
+        assert!(same.wasserstein.value <= 1.5 * same.wasserstein.floor, "{same:?}");
+        let moved = distances(&uniform(500, 0.1, 2), &reference, 3).unwrap();
+        assert!(moved.wasserstein.value > 2.0 * moved.wasserstein.floor, "{moved:?}");
+        assert!(moved.wasserstein.low < 0.1 && 0.1 < moved.wasserstein.high, "{moved:?}");
+        assert!(moved.kolmogorov.value > moved.kolmogorov.floor, "{moved:?}");
+    }
+
+    #[test]
+    fn the_same_samples_give_the_same_intervals() {
+        let (sample, reference) = (uniform(50, 0.0, 1), uniform(60, 0.0, 2));
+        assert_eq!(distances(&sample, &reference, 7), distances(&sample, &reference, 7));
+        assert_ne!(distances(&sample, &reference, 7), distances(&sample, &reference, 8));
+        assert_eq!(distances(&[], &reference, 7), None);
+    }
+}

@@ -1,0 +1,426 @@
+//! The study: every solver at several settings, in one run, on one thread, interleaved; what each costs and how far it errs.
+//!
+//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of slips
+//! that is timed and whose distributions are held against a reference ensemble of other seeds. A fixed step at low velocity
+//! would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps in one.
+
+use super::breaks::{BreakErrors, Comparison, Reference};
+use super::distance::{Distances, distances};
+use super::{AccuracyError, cpu};
+use crate::model::Parameters;
+use crate::observe::{Recording, Slip, SlipObserver};
+use crate::solver::{Limits, Solver, Summary, TOLERANCES, simulate, simulate_audited};
+use rayon::prelude::*;
+
+/// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
+const MODULATION: (f64, f64) = (1e-6, 58.0);
+/// Slips discarded as start-up.
+const DISCARD: u64 = 5;
+/// Slips that are audited.
+const AUDITED_SLIPS: u64 = 2;
+/// Tolerance of the reference ensemble.
+const ENSEMBLE_TOLERANCE: f64 = 1e-10;
+/// Seeds of the reference ensemble begin here, far from those of the methods: the samples are independent.
+const REFERENCE_SEEDS: u64 = 1_000_000;
+/// The reference ensemble has so many times the seeds of a method, so that its own error matters less.
+const REFERENCE_SHARE: u64 = 2;
+
+/// What to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Study {
+    /// Drive velocities, in m/s.
+    pub velocities: Vec<f64>,
+    /// Solvers and their settings.
+    pub solvers: Vec<Solver>,
+    /// Realisations of each ensemble.
+    pub seeds: u64,
+    /// Slips of each realisation, past start-up.
+    pub slips: u64,
+    /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own way.
+    pub breaks: usize,
+    /// Breaks over which trajectories are followed to see how far they stay together.
+    pub followed_breaks: usize,
+    /// Lowest drive velocity at which a fixed step runs its ensemble, and its breaks, in m/s.
+    pub fixed_step_slips_from: f64,
+    /// See [`Study::fixed_step_slips_from`].
+    pub fixed_step_breaks_from: f64,
+    /// Steps over which a fixed step is timed below that velocity.
+    pub timed_steps: u64,
+}
+
+impl Study {
+    /// The full study: minutes.
+    #[must_use]
+    pub fn full() -> Self {
+        Self {
+            velocities: vec![1e-4, 1e-5, 1e-6],
+            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]),
+            seeds: 8,
+            slips: 100,
+            breaks: 100,
+            followed_breaks: 30_000,
+            fixed_step_slips_from: 1e-4,
+            fixed_step_breaks_from: 1e-6,
+            timed_steps: 3_000_000,
+        }
+    }
+
+    /// A quick one: a minute.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self {
+            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
+            seeds: 2,
+            slips: 12,
+            followed_breaks: 10_000,
+            fixed_step_breaks_from: 1e-4,
+            timed_steps: 300_000,
+            ..Self::full()
+        }
+    }
+
+    /// The drives under which every solver runs, with seed 0.
+    fn drives(&self) -> Vec<Parameters> {
+        let (amplitude, frequency) = MODULATION;
+        let plain = |&drive_velocity: &f64| Parameters { drive_velocity, ..Parameters::default() };
+        let modulated = |parameters: &Parameters| Parameters {
+            modulation_amplitude: amplitude,
+            modulation_period: Some(1.0 / frequency),
+            ..parameters.clone()
+        };
+        self.velocities.iter().map(plain).flat_map(|parameters| [parameters.clone(), modulated(&parameters)]).collect()
+    }
+}
+
+fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
+    let fixed = time_steps.iter().map(|&time_step| Solver::FixedStep { time_step });
+    fixed.chain(tolerances.iter().map(|&tolerance| Solver::EventDriven { tolerance })).collect()
+}
+
+/// What a solver costs under one drive, on one thread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// CPU seconds per simulated second.
+    pub per_simulated_second: f64,
+    /// CPU seconds per slip.
+    pub per_slip: f64,
+    /// Steps per slip.
+    pub steps_per_slip: f64,
+    /// CPU time per step, in s.
+    pub per_step: f64,
+    /// Slips that were timed, start-up included; 0 if the cost per slip is extrapolated from that of a step.
+    pub timed_slips: u64,
+}
+
+/// One solver under one drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MethodRow {
+    /// The drive, and all other parameters; seed 0.
+    pub parameters: Parameters,
+    /// Method and setting.
+    pub solver: Solver,
+    /// What it costs.
+    pub cost: Cost,
+    /// Errors of the first break times; `None` if they would take too long.
+    pub break_times: Option<BreakErrors>,
+    /// Relative residual of the energy ledger over the first slips; `None` likewise.
+    pub ledger_residual: Option<f64>,
+}
+
+/// A quantity of slips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Interval τ, in s.
+    Interval,
+    /// Phase φ, in rad.
+    Phase,
+    /// Stress drop, in N.
+    Drop,
+}
+
+impl Quantity {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Interval, Self::Phase, Self::Drop];
+
+    /// Its name in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Interval => "interval",
+            Self::Phase => "phase",
+            Self::Drop => "drop",
+        }
+    }
+
+    fn of(self, slip: &Slip) -> Option<f64> {
+        match self {
+            Self::Interval => slip.interval,
+            Self::Phase => slip.phase,
+            Self::Drop => Some(slip.drop),
+        }
+    }
+}
+
+/// A distribution of one solver under one drive against that of the reference ensemble.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistanceRow {
+    /// The drive, and all other parameters; seed 0.
+    pub parameters: Parameters,
+    /// Method and setting.
+    pub solver: Solver,
+    /// What is distributed.
+    pub quantity: Quantity,
+    /// Sizes of the sample and of the reference.
+    pub sizes: (u64, u64),
+    /// Means of the sample and of the reference.
+    pub means: (f64, f64),
+    /// Standard deviations of the sample and of the reference.
+    pub deviations: (f64, f64),
+    /// The distances.
+    pub distances: Distances,
+}
+
+/// All that a study finds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Drive by drive, solver by solver.
+    pub methods: Vec<MethodRow>,
+    /// Likewise, quantity by quantity.
+    pub distances: Vec<DistanceRow>,
+}
+
+/// Slips and cost of one solver so far.
+#[derive(Clone, Debug, Default)]
+struct Ensemble {
+    slips: Vec<Slip>,
+    slips_seen: u64,
+    summary: Summary,
+    cpu_seconds: f64,
+}
+
+impl Ensemble {
+    fn add(&mut self, cpu_seconds: f64, summary: &Summary, slips: Vec<Slip>) {
+        self.cpu_seconds += cpu_seconds;
+        self.summary.end_time += summary.end_time;
+        self.summary.steps += summary.steps;
+        self.slips_seen += if slips.is_empty() { 0 } else { DISCARD + slips.len() as u64 };
+        self.slips.extend(slips);
+    }
+
+    /// Costs; where there are no slips, those per slip follow from the mean interval in s.
+    fn cost(&self, mean_interval: f64) -> Cost {
+        let per_step = self.cpu_seconds / self.summary.steps as f64;
+        let steps_per_slip = if self.slips_seen > 0 {
+            self.summary.steps as f64 / self.slips_seen as f64
+        } else {
+            mean_interval * self.summary.steps as f64 / self.summary.end_time
+        };
+        Cost {
+            per_simulated_second: self.cpu_seconds / self.summary.end_time,
+            per_slip: per_step * steps_per_slip,
+            steps_per_slip,
+            per_step,
+            timed_slips: self.slips_seen,
+        }
+    }
+}
+
+impl Study {
+    /// Runs it. `tell` hears in words what comes next.
+    ///
+    /// # Errors
+    /// When a simulation cannot go on.
+    pub fn run(&self, tell: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
+        let mut findings = Findings::default();
+        for parameters in &self.drives() {
+            tell(&format!("{}: reference ensemble", drive_in_words(parameters)));
+            let reference = self.reference_ensemble(parameters)?;
+            tell("first breaks and energy ledgers");
+            let mut first_breaks = Reference::new(parameters, self.followed_breaks);
+            let tightest = Solver::EventDriven { tolerance: *TOLERANCES.start() };
+            simulate(parameters, tightest, NO_LIMITS, &mut first_breaks).map_err(failed(parameters, tightest))?;
+            let mut checks = Vec::new();
+            for &solver in &self.solvers {
+                let break_times = self.break_times(parameters, solver, &first_breaks)?;
+                checks.push((break_times, self.ledger_residual(parameters, solver)?));
+            }
+            tell("timed ensembles");
+            let ensembles = self.ensembles(parameters)?;
+            let intervals = sample(&reference, Quantity::Interval);
+            let mean_interval = mean(&intervals);
+            for ((&solver, ensemble), (break_times, ledger_residual)) in self.solvers.iter().zip(&ensembles).zip(checks)
+            {
+                findings.methods.push(MethodRow {
+                    parameters: parameters.clone(),
+                    solver,
+                    cost: ensemble.cost(mean_interval),
+                    break_times,
+                    ledger_residual,
+                });
+                for quantity in Quantity::ALL {
+                    let (sample, reference) = (sample(&ensemble.slips, quantity), sample(&reference, quantity));
+                    let key = findings.distances.len() as u64;
+                    if let Some(distances) = distances(&sample, &reference, key) {
+                        findings.distances.push(DistanceRow {
+                            parameters: parameters.clone(),
+                            solver,
+                            quantity,
+                            sizes: (sample.len() as u64, reference.len() as u64),
+                            means: (mean(&sample), mean(&reference)),
+                            deviations: (deviation(&sample), deviation(&reference)),
+                            distances,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(findings)
+    }
+
+    fn recording(&self) -> Recording {
+        Recording { slips: self.slips, discard: DISCARD, ..Recording::default() }
+    }
+
+    /// Slips at a tight tolerance, of other seeds; not timed, so on all threads.
+    fn reference_ensemble(&self, parameters: &Parameters) -> Result<Vec<Slip>, AccuracyError> {
+        let solver = Solver::EventDriven { tolerance: ENSEMBLE_TOLERANCE };
+        let seeds = (0..REFERENCE_SHARE * self.seeds).into_par_iter();
+        let realisation = |seed: u64| {
+            let parameters = Parameters { seed: REFERENCE_SEEDS + seed, ..parameters.clone() };
+            let mut observer = SlipObserver::new(&parameters, &self.recording());
+            simulate(&parameters, solver, NO_LIMITS, &mut observer).map_err(failed(&parameters, solver))?;
+            Ok(observer.into_rows().0)
+        };
+        let slips: Vec<Vec<Slip>> = seeds.map(realisation).collect::<Result<_, AccuracyError>>()?;
+        Ok(slips.concat())
+    }
+
+    fn break_times(
+        &self,
+        parameters: &Parameters,
+        solver: Solver,
+        reference: &Reference,
+    ) -> Result<Option<BreakErrors>, AccuracyError> {
+        let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
+        if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
+            return Ok(None);
+        }
+        let mut comparison = Comparison::new(reference, self.breaks);
+        simulate(parameters, solver, NO_LIMITS, &mut comparison).map_err(failed(parameters, solver))?;
+        Ok(Some(comparison.errors()))
+    }
+
+    fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>, AccuracyError> {
+        if self.is_stretch_only(parameters, solver) {
+            return Ok(None);
+        }
+        let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
+        let mut observer = SlipObserver::new(parameters, &recording);
+        let (_, ledger) =
+            simulate_audited(parameters, solver, NO_LIMITS, &mut observer).map_err(failed(parameters, solver))?;
+        Ok(Some(ledger.residual()))
+    }
+
+    /// Whether slips of this solver would take too long.
+    fn is_stretch_only(&self, parameters: &Parameters, solver: Solver) -> bool {
+        matches!(solver, Solver::FixedStep { .. }) && parameters.drive_velocity < self.fixed_step_slips_from
+    }
+
+    /// Seed by seed, every solver in turn, so that whatever slows the machine down slows down all.
+    fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>, AccuracyError> {
+        let mut ensembles = vec![Ensemble::default(); self.solvers.len()];
+        for seed in 0..self.seeds {
+            let parameters = Parameters { seed, ..parameters.clone() };
+            for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
+                let mut limits = NO_LIMITS;
+                if self.is_stretch_only(&parameters, solver)
+                    && let Solver::FixedStep { time_step } = solver
+                {
+                    limits.end_time = time_step * self.timed_steps as f64;
+                }
+                let mut observer = SlipObserver::new(&parameters, &self.recording());
+                let (cpu_seconds, summary) = cpu::timed(|| simulate(&parameters, solver, limits, &mut observer));
+                let summary = summary.map_err(failed(&parameters, solver))?;
+                ensemble.add(cpu_seconds, &summary, observer.into_rows().0);
+            }
+        }
+        Ok(ensembles)
+    }
+}
+
+/// Observers end these simulations; none needs as many events as the default budget of a job.
+const NO_LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
+
+fn failed(
+    parameters: &Parameters,
+    solver: Solver,
+) -> impl FnOnce(crate::solver::SimulationError) -> AccuracyError + use<> {
+    let (drive, seed) = (drive_in_words(parameters), parameters.seed);
+    move |source| AccuracyError::Simulation { drive, seed, solver: super::described(solver), source }
+}
+
+/// Velocity and modulation of a drive in words.
+#[must_use]
+pub fn drive_in_words(parameters: &Parameters) -> String {
+    let modulation = parameters.modulation_period.map_or_else(
+        || "Delta = 0".to_owned(),
+        |period| format!("Delta = {:e} m, 1/T = {} Hz", parameters.modulation_amplitude, (1.0 / period).round()),
+    );
+    format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
+}
+
+fn sample(slips: &[Slip], quantity: Quantity) -> Vec<f64> {
+    slips.iter().filter_map(|slip| quantity.of(slip)).collect()
+}
+
+fn mean(sample: &[f64]) -> f64 {
+    sample.iter().sum::<f64>() / sample.len() as f64
+}
+
+fn deviation(sample: &[f64]) -> f64 {
+    let mean = mean(sample);
+    let squares: f64 = sample.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_study_tells_a_coarse_step_from_a_tight_tolerance() {
+        let (coarse, tight) = (Solver::FixedStep { time_step: 4e-6 }, Solver::EventDriven { tolerance: 1e-8 });
+        let study = Study {
+            velocities: vec![1e-4],
+            solvers: vec![coarse, tight],
+            seeds: 1,
+            slips: 4,
+            breaks: 50,
+            followed_breaks: 400,
+            ..Study::quick()
+        };
+        let findings = study.run(&mut |_| {}).unwrap();
+        assert_eq!(findings.methods.len(), 4);
+        for pair in findings.methods.chunks(2) {
+            let (coarse, tight) = (&pair[0], &pair[1]);
+            let (late, close) = (coarse.break_times.unwrap(), tight.break_times.unwrap());
+            assert!(late.median > 1e-7 && close.median < 1e-9 && close.missing == 0, "{late:?} {close:?}");
+            assert!(coarse.ledger_residual.unwrap().abs() > 1e-4 && tight.ledger_residual.unwrap().abs() < 1e-8);
+            for row in pair {
+                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
+            }
+        }
+        // Interval and drop of each, and the phase where there is a modulation.
+        assert_eq!(findings.distances.len(), 2 * 2 + 2 * 3);
+    }
+
+    #[test]
+    fn the_cost_of_a_stretch_is_extrapolated_by_the_steps_of_an_interval() {
+        let mut ensemble = Ensemble::default();
+        let summary = Summary { end_time: 0.5, steps: 500_000, ..Summary::default() };
+        ensemble.add(0.1, &summary, Vec::new());
+        let cost = ensemble.cost(10.0);
+        assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
+        assert!((cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12);
+    }
+}
