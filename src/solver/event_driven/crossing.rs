@@ -77,13 +77,12 @@ fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn
             low = s;
         }
         let newton = s - height / slope;
-        let is_inside = newton >= low && newton <= high;
-        let next = if is_inside { newton } else { 0.5 * (low + high) };
-        let moved = (next - s).abs();
-        if moved == 0.0 || (is_inside && moved <= QUADRATIC * high) {
-            return next;
+        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high {
+            return newton;
         }
-        if !is_inside && (next == low || next == high) {
+        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if next <= low || next >= high {
             return next;
         }
         s = next;
@@ -185,6 +184,14 @@ impl Driven {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn newton_does_not_go_to_and_fro_between_the_ends() {
+        // The arc tangent sends 1.39 to -1.39 and back.
+        let swing = 1.391_745_200_270_735;
+        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
+        assert!(root.abs() < 1e-9, "{root}");
+    }
 
     #[test]
     fn a_bump_that_just_reaches_the_level_is_not_missed() {
