@@ -89,14 +89,14 @@ def parameters_from(options, footer):
 
 
 def read(path):
-    """Reads a log: a dictionary of columns (block counted from 0) and the parameters in the footer, if there are any."""
+    """Reads a log: its columns (block counted from 0), and the parameters under "parameters" in the footer, if any."""
     table = parquet.read_table(path)
     columns = {name: table.column(name).to_numpy() for name in (
         "time", "block", "contact", "generation", "displacement", "force", "threshold", "stiffness")}
     columns["block"] = columns["block"].astype(int) - 1
     columns["is_break"] = np.array(table.column("event").to_pylist()) == "break"
-    footer = json.loads((table.schema.metadata or {}).get(b"parameters", b"{}"))
-    return columns, footer
+    footer = parquet.read_metadata(path).metadata or {}
+    return columns, json.loads(footer.get(b"parameters", b"{}"))
 
 
 def check(log, parameters):
