@@ -1,9 +1,10 @@
 """Contact logs and parameters, as the independent integrators read them.
 
-A contact log is the Parquet file that ``stickslip simulate --contacts FILE`` writes: every contact event in order,
-with the columns time, block (counted from 1 at the trailing edge), contact, generation, event ("attach" or "break"),
-displacement, force, threshold and stiffness, in SI units. The initial attachment of every contact comes first, as
-generation 0 at time 0. Nothing here solves anything.
+A contact log is the Parquet file that ``stickslip simulate --contacts FILE`` writes: every contact event in order, with
+the columns time, block (counted from 1 at the trailing edge), contact (counted from 1 within its block), generation,
+event ("attach" or "break"), displacement, force, threshold and stiffness, in SI units. The initial attachment of every
+contact comes first, as generation 0 at time 0. The footer holds the parameters as JSON under "parameters". Nothing here
+solves anything.
 """
 
 import argparse
@@ -12,6 +13,10 @@ import json
 
 import numpy as np
 import pyarrow.parquet as parquet
+
+
+#: Columns of a log that hold numbers.
+NUMBERS = ("time", "block", "contact", "generation", "displacement", "force", "threshold", "stiffness")
 
 
 class LogError(Exception):
@@ -89,13 +94,16 @@ def parameters_from(options, footer):
 
 
 def read(path):
-    """Reads a log: a dictionary of columns (block counted from 0) and the parameters in the footer, if there are any."""
-    table = parquet.read_table(path)
-    columns = {name: table.column(name).to_numpy() for name in (
-        "time", "block", "contact", "generation", "displacement", "force", "threshold", "stiffness")}
-    columns["block"] = columns["block"].astype(int) - 1
-    columns["is_break"] = np.array(table.column("event").to_pylist()) == "break"
-    footer = json.loads((table.schema.metadata or {}).get(b"parameters", b"{}"))
+    """Reads a log: its columns (block and contact counted from 0), and the parameters in the footer, if any."""
+    try:
+        table = parquet.read_table(path)
+        columns = {name: table.column(name).to_numpy() for name in NUMBERS}
+        columns["is_break"] = np.array(table.column("event").to_pylist()) == "break"
+        footer = json.loads((parquet.read_metadata(path).metadata or {}).get(b"parameters", b"{}"))
+    except (OSError, KeyError, ValueError) as error:
+        raise LogError(f"cannot be read as a contact log: {error}") from error
+    for name in ("block", "contact"):
+        columns[name] = columns[name].astype(int) - 1
     return columns, footer
 
 
@@ -108,13 +116,16 @@ def check(log, parameters):
         raise LogError("stiffness is not k sqrt(f_i/f_s): are --k and --fs those of the run?")
     if np.any(np.diff(log["time"]) < 0):
         raise LogError(f"row {np.argmax(np.diff(log['time']) < 0) + 1}: time runs backward")
-    for row, (time, block, contact, generation, is_break) in enumerate(zip(
-            log["time"], log["block"], log["contact"], log["generation"], log["is_break"])):
+    for row, (time, block, contact, generation, is_break) in enumerate(
+        zip(log["time"], log["block"], log["contact"], log["generation"], log["is_break"])
+    ):
         place = (block, contact)
         if not (0 <= block < parameters.N and 0 <= contact < parameters.Ns):
-            raise LogError(f"row {row}: no block {block + 1}, contact {contact}: are --N and --Ns those of the run?")
+            raise LogError(
+                f"row {row}: there is no block {block + 1}, contact {contact + 1}: are --N and --Ns those of the run?"
+            )
         if is_break != state[place] or generation != life[place] + (not is_break):
-            raise LogError(f"row {row}: block {block + 1}, contact {contact} breaks or attaches out of turn")
+            raise LogError(f"row {row}: block {block + 1}, contact {contact + 1} breaks or attaches out of turn")
         if row < parameters.N * parameters.Ns and (is_break or generation != 0 or time != 0):
             raise LogError(f"row {row}: the log must begin with the initial attachment of every contact")
         state[place] = not is_break
