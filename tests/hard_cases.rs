@@ -56,6 +56,11 @@ fn limits_of_stability() {
 }
 
 #[test]
+fn values_beyond_what_doubles_resolve() {
+    all_pass("values beyond what doubles resolve");
+}
+
+#[test]
 fn values_that_make_no_sense() {
     all_pass("values that make no sense");
 }

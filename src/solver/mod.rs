@@ -126,6 +126,17 @@ pub enum SimulationError {
         /// Model time, in s.
         time: f64,
     },
+    /// The steps that the motion needs are too short for the clock.
+    #[error(
+        "at t = {time} s: a step of {step:e} s is lost in the resolution of the time; the shortest time scale of these \
+         parameters, 1/omega_max, 1/gamma or T, is too short"
+    )]
+    StepTooShort {
+        /// Model time, in s.
+        time: f64,
+        /// The step, in s.
+        step: f64,
+    },
     /// More contact events than allowed.
     #[error(
         "at t = {time} s: {events} contact events, the most allowed; raise the budget (record.max_events) if they are wanted"

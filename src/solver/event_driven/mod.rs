@@ -48,6 +48,8 @@ const FRAME_SPAN: f64 = 0.0625;
 /// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
+/// A step must span so many units in the last place of the time, so that events are located to a millionth of it.
+const LEAST_RESOLUTION: f64 = 1_048_576.0;
 /// Steps between two looks at the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
@@ -168,6 +170,10 @@ impl<'a> Run<'a> {
                 let (time, events) = (self.epoch + self.time, self.limits.events);
                 return Err(SimulationError::EventBudget { time, events });
             }
+            // What is not finite anywhere comes to the driven edge.
+            if !self.state.displacement[0][0].is_finite() {
+                return Err(SimulationError::NotFinite { time: self.epoch + self.time });
+            }
             if self.time > FRAME_SPAN {
                 self.move_frame();
             }
@@ -268,6 +274,9 @@ impl<'a> Run<'a> {
     /// One Taylor step, to the first of its end, a break, and `horizon` s.
     fn step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
         let length = self.expand(horizon)?;
+        if length < LEAST_RESOLUTION * f64::EPSILON * self.time.max(FRAME_SPAN) {
+            return Err(SimulationError::StepTooShort { time: self.epoch + self.time, step: length });
+        }
         let end = (horizon / length).min(1.0);
         let (s, reached) = self.first_break(end);
         self.summary.steps += 1;
