@@ -4,7 +4,7 @@ use super::exit::{Exit, UsageError};
 use super::output;
 use anyhow::Result;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use stickslip::accuracy::{
     self, Findings, MethodRow, Quantity, Stability, Study, described, drive_in_words, hard_cases, stability_json,
 };
@@ -54,13 +54,13 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
         }
     }
-    let findings = study.run(&mut |next| eprintln!("{next}"))?;
+    let findings = study.run(&mut |next| output::tell(next))?;
     let files = accuracy::write(&Disk, &arguments.out, &study, &findings)?;
     if arguments.json {
         output::json(&accuracy::as_json(&study, &findings))?;
     } else {
-        print_study(&study, &findings);
-        print_files(&files);
+        output::print(&study_text(&study, &findings))?;
+        print_files(&files)?;
     }
     Ok(Exit::Done)
 }
@@ -68,37 +68,35 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
 fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
     let mut rows = Vec::new();
     for case in hard_cases() {
-        eprintln!("{}: {}", case.threat, case.name());
+        output::tell(&format!("{}: {}", case.threat, case.name()));
         rows.push(case.run());
     }
     let files = accuracy::write_stability(&Disk, &arguments.out, &rows)?;
     if arguments.json {
         output::json(&stability_json(&rows))?;
     } else {
-        print_stability(&rows);
-        print_files(&files);
+        output::print(&stability_text(&rows))?;
+        print_files(&files)?;
     }
     Ok(if rows.iter().all(|row| row.passed) { Exit::Done } else { Exit::Failed })
 }
 
-fn print_files(files: &[PathBuf]) {
-    for file in files.iter().map(PathBuf::as_path).map(Path::display) {
-        println!("{file}");
-    }
+fn print_files(files: &[PathBuf]) -> Result<()> {
+    files.iter().try_for_each(|file| output::print(&format!("{}\n", file.display())))
 }
 
 fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
 }
 
-fn print_study(study: &Study, findings: &Findings) {
-    println!("{}; one thread; first {} breaks", accuracy::cpu::processor(), study.breaks);
+fn study_text(study: &Study, findings: &Findings) -> String {
+    let mut lines = vec![format!("{}; one thread; first {} breaks", accuracy::cpu::processor(), study.breaks)];
     let mut drive = None;
     for row in &findings.methods {
         if drive != Some(&row.parameters) {
             drive = Some(&row.parameters);
-            println!("\n{}", drive_in_words(&row.parameters));
-            println!(
+            lines.push(format!("\n{}", drive_in_words(&row.parameters)));
+            lines.push(format!(
                 "{:30} {:>10} {:>10} {:>8} {:>10} {:>10} {:>22} {:>9} {:>24} {:>13}",
                 "solver",
                 "CPU/sim. s",
@@ -110,11 +108,12 @@ fn print_study(study: &Study, findings: &Findings) {
                 "ledger",
                 "W1 of tau (by chance) s",
                 "KS of tau"
-            );
+            ));
         }
-        println!("{}", study_line(row, findings));
+        lines.push(study_line(row, findings));
     }
-    println!("\n* extrapolated from the cost of a step; > together as far as the reference reaches");
+    lines.push("\n* extrapolated from the cost of a step; > together as far as the reference reaches\n".to_owned());
+    lines.join("\n")
 }
 
 fn study_line(row: &MethodRow, findings: &Findings) -> String {
@@ -154,20 +153,22 @@ fn study_line(row: &MethodRow, findings: &Findings) -> String {
     )
 }
 
-fn print_stability(rows: &[Stability]) {
+fn stability_text(rows: &[Stability]) -> String {
+    let mut lines = Vec::new();
     let mut threat = "";
     for row in rows {
         if row.threat != threat {
             threat = &row.threat;
-            println!("\n{threat}");
+            lines.push(format!("\n{threat}"));
         }
         let mark = if row.passed { "ok    " } else { "FAILED" };
         let time = row.simulated_seconds.map_or_else(String::new, |time| {
             let (steps, cpu) = (row.steps, row.cpu_seconds);
             format!("; {time:.3} s in {steps} steps, ledger {}, {cpu:.2} s", or_dash(row.ledger_residual))
         });
-        println!("  {mark} {} ({}): {}{time}", row.case, row.solver, row.outcome);
+        lines.push(format!("  {mark} {} ({}): {}{time}", row.case, row.solver, row.outcome));
     }
     let failed = rows.iter().filter(|row| !row.passed).count();
-    println!("\n{} of {} cases passed", rows.len() - failed, rows.len());
+    lines.push(format!("\n{} of {} cases passed\n", rows.len() - failed, rows.len()));
+    lines.join("\n")
 }

@@ -487,7 +487,7 @@ mod tests {
         let log = |tolerance: f64| {
             let limits = Limits { end_time: 0.5, events: u64::MAX, interrupt: None };
             let mut log = ContactLog::default();
-            run(&parameters, tolerance, limits, &mut log).unwrap();
+            run(&parameters, tolerance, limits, &mut log, None).unwrap();
             log.events
         };
         let (loose, tight) = (log(1e-4), log(1e-10));
