@@ -24,6 +24,7 @@ pub struct BackboneBin {
     pub phase_mean: Option<f64>,
     pub resultant_length: Option<f64>,
     pub rayleigh_p: Option<f64>,
+    pub load_rayleigh_p: Option<f64>,
     pub share_below: Option<f64>,
     pub locked_phase_mean: Option<f64>,
     pub phase_minimum: Option<f64>,
@@ -40,6 +41,7 @@ pub(super) struct Backbone {
 struct Bin {
     sets: u64,
     phases: Directions,
+    loads: Directions,
     below: u64,
     locked: Directions,
 }
@@ -69,6 +71,7 @@ impl Backbone {
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
         bin.phases.add(&set.phases);
+        bin.loads.add(&set.loads);
         bin.below += set.below;
         if set.row.is_locked {
             bin.locked.push(phase);
@@ -90,6 +93,7 @@ impl Backbone {
                 phase_mean: bin.phases.mean(limits.top),
                 resultant_length: bin.phases.resultant_length(),
                 rayleigh_p: bin.phases.rayleigh(),
+                load_rayleigh_p: bin.loads.rayleigh(),
                 share_below: limits.minimum.map(|_| bin.below as f64 / bin.phases.count() as f64),
                 locked_phase_mean: bin.locked.mean(limits.top),
                 phase_minimum: minimum_phase(eta_centre),
@@ -114,6 +118,12 @@ pub fn backbone() -> Table<BackboneBin> {
         Column::new("phase_mean", "rad", "circular mean of the phase of all slips", OptionalReal(|row| row.phase_mean)),
         Column::new("resultant_length", "", "|<exp(i phi)>| of all slips", OptionalReal(|row| row.resultant_length)),
         Column::new("rayleigh_p", "", "p-value of the Rayleigh test of all slips", OptionalReal(|row| row.rayleigh_p)),
+        Column::new(
+            "load_rayleigh_p",
+            "",
+            "the same of the load phases phi + eta cos(phi), for eta < 1",
+            OptionalReal(|row| row.load_rayleigh_p),
+        ),
         Column::new(
             "share_below",
             "",

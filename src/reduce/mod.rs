@@ -43,6 +43,7 @@ struct SlipSample {
 /// Where phases can lie at some η.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PhaseLimits {
+    eta: f64,
     /// φ_min, in rad; `None` for η < 1.
     minimum: Option<f64>,
     /// Upper end of the turn in which a mean phase is told, in rad. For η >= 1 the seam is in the middle of the gap between
@@ -54,7 +55,13 @@ impl PhaseLimits {
     fn at(eta: f64) -> Self {
         let minimum = minimum_phase(eta);
         let seam = minimum.zip(load_maximum_phase(eta)).map(|(low, high)| 0.5 * (low + high - TAU));
-        Self { minimum, top: seam.map_or(PI, |seam| seam + TAU) }
+        Self { eta, minimum, top: seam.map_or(PI, |seam| seam + TAU) }
+    }
+
+    /// φ + η cos φ for η < 1, where the load only grows: how far the load is between one maximum of the modulation and the
+    /// next, in rad. Slips that come at random loads are uniform in it; in φ their density is 1 - η sin φ.
+    fn load_phase(&self, phase: f64) -> Option<f64> {
+        self.minimum.is_none().then(|| phase + self.eta * libm::cos(phase))
     }
 
     fn is_below(&self, phase: f64) -> bool {

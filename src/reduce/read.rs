@@ -63,7 +63,7 @@ pub fn read_backbone(storage: &dyn Storage, layout: &Layout) -> Result<Vec<Backb
         let (phase_mean, resultant_length) = (reals("phase_mean")?, reals("resultant_length")?);
         let (rayleigh_p, share_below) = (reals("rayleigh_p")?, reals("share_below")?);
         let (locked_phase_mean, phi_min) = (reals("locked_phase_mean")?, reals("phi_min")?);
-        let asymptote = reals("asymptote")?;
+        let (load_rayleigh_p, asymptote) = (reals("load_rayleigh_p")?, reals("asymptote")?);
         let (sets, locked_sets, slips) = (batch.counts("sets")?, batch.counts("locked_sets")?, batch.counts("slips")?);
         bins.extend((0..batch.rows.num_rows()).map(|row| BackboneBin {
             eta_low: eta_low.value(row),
@@ -75,6 +75,7 @@ pub fn read_backbone(storage: &dyn Storage, layout: &Layout) -> Result<Vec<Backb
             phase_mean: real(phase_mean, row),
             resultant_length: real(resultant_length, row),
             rayleigh_p: real(rayleigh_p, row),
+            load_rayleigh_p: real(load_rayleigh_p, row),
             share_below: real(share_below, row),
             locked_phase_mean: real(locked_phase_mean, row),
             phase_minimum: real(phi_min, row),

@@ -22,6 +22,8 @@ pub(super) struct SetSlips {
     intervals: Vec<f64>,
     slips: u64,
     phases: Directions,
+    /// Load phases, for η < 1.
+    loads: Directions,
     below: u64,
     drop: Moments,
     peak_force: Moments,
@@ -37,6 +39,9 @@ impl SetSlips {
         self.intervals.extend(slip.interval);
         if let Some(phase) = slip.phase {
             self.phases.push(phase);
+            if let Some(load) = limits.load_phase(phase) {
+                self.loads.push(load);
+            }
             self.below += u64::from(limits.is_below(phase));
         }
         self.drop.push(slip.drop);
@@ -76,6 +81,7 @@ impl SetSlips {
             phase_mean: self.phases.mean(limits.top),
             resultant_length,
             rayleigh_p,
+            load_rayleigh_p: self.loads.rayleigh(),
             share_below: has_limit.then(|| self.below as f64 / self.phases.count() as f64),
             is_locked: rayleigh_p.is_some_and(|p| p < LOCKED_PROBABILITY)
                 && resultant_length.is_some_and(|length| length > LOCKED_LENGTH),
@@ -88,7 +94,7 @@ impl SetSlips {
             slow_front_speed_mean: self.slow_front_speed.mean(),
             jobs,
         };
-        FinishedSet { row, intervals: self.intervals, phases: self.phases, below: self.below }
+        FinishedSet { row, intervals: self.intervals, phases: self.phases, loads: self.loads, below: self.below }
     }
 }
 
@@ -101,6 +107,8 @@ pub(super) struct FinishedSet {
     pub(super) intervals: Vec<f64>,
     /// Its phases.
     pub(super) phases: Directions,
+    /// Its load phases, for η < 1.
+    pub(super) loads: Directions,
     /// Slips under the back-bone.
     pub(super) below: u64,
 }
@@ -138,6 +146,7 @@ pub struct SetRow {
     pub phase_mean: Option<f64>,
     pub resultant_length: Option<f64>,
     pub rayleigh_p: Option<f64>,
+    pub load_rayleigh_p: Option<f64>,
     pub share_below: Option<f64>,
     pub is_locked: bool,
     pub drop_mean: Option<f64>,
@@ -193,6 +202,12 @@ pub fn sets() -> Table<SetRow> {
             "",
             "p-value of the Rayleigh test against uniform phases",
             OptionalReal(|row| row.rayleigh_p),
+        ),
+        Column::new(
+            "load_rayleigh_p",
+            "",
+            "p-value of the Rayleigh test of the load phases phi + eta cos(phi), for eta < 1: slips at random loads are uniform in it",
+            OptionalReal(|row| row.load_rayleigh_p),
         ),
         Column::new(
             "share_below",
@@ -278,6 +293,27 @@ pub(super) mod tests {
         assert!((row.phase_mean.unwrap() + 1.2).abs() < 1e-12);
         let halves = reduced(jobs(1e-6, period), [3.0, 3.5, 4.0, 4.5].map(|n| slip(Some(n * period), Some(-1.2))));
         assert!(halves.locking_index.unwrap() < 1e-9);
+    }
+
+    #[test]
+    fn slips_at_random_loads_are_uniform_in_the_load_phase_but_not_in_the_phase() {
+        let jobs = jobs(1e-6, 0.1);
+        let eta = jobs.parameters.eta();
+        assert!((0.3..0.9).contains(&eta), "{eta}");
+        // φ + η cos φ at even spacing, by bisection.
+        let phases = (0..400).map(|slip| {
+            let load = TAU * (f64::from(slip) / 400.0 - 0.5);
+            let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
+            for _ in 0..80 {
+                let middle = 0.5 * (low + high);
+                if middle + eta * libm::cos(middle) < load { low = middle } else { high = middle }
+            }
+            slip(None, Some(low))
+        });
+        let row = reduced(jobs, phases);
+        assert!(row.rayleigh_p.unwrap() < 1e-3);
+        assert!((row.resultant_length.unwrap() - 0.5 * eta).abs() < 1e-3);
+        assert!(row.load_rayleigh_p.unwrap() > 0.99);
     }
 
     #[test]
