@@ -301,8 +301,8 @@ pub(super) mod tests {
         let eta = jobs.parameters.eta();
         assert!((0.3..0.9).contains(&eta), "{eta}");
         // φ + η cos φ at even spacing, by bisection.
-        let phases = (0..400).map(|slip| {
-            let load = TAU * (f64::from(slip) / 400.0 - 0.5);
+        let phases = (0..400).map(|step| {
+            let load = TAU * (f64::from(step) / 400.0 - 0.5);
             let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
