@@ -2,7 +2,7 @@
 //!
 //! Method: `Σ_{p>=1} |c_p| w^p` bounds the excursion from the middle of an interval of half-width w. An interval where
 //! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most one,
-//! found by bisection; any other is halved.
+//! found by Newton's method; any other is halved.
 
 /// Largest number of coefficients that [`maximum`] takes.
 pub(crate) const MOST_COEFFICIENTS: usize = 33;
@@ -10,9 +10,28 @@ pub(crate) const MOST_COEFFICIENTS: usize = 33;
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
 
-/// `Σ c_p s^p`.
+/// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
+const QUADRATIC: f64 = 1e-9;
+
+/// 1/p; 0 for p = 0.
+pub(crate) const INVERSE: [f64; MOST_COEFFICIENTS] = {
+    let mut inverse = [0.0; MOST_COEFFICIENTS];
+    let mut p = 1;
+    while p < MOST_COEFFICIENTS {
+        inverse[p] = 1.0 / p as f64;
+        p += 1;
+    }
+    inverse
+};
+
+/// `Σ c_p s^p`. Even and odd orders are summed side by side, since each sum waits for its last term.
 pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, c| sum * s + c)
+    let square = s * s;
+    let pairs = coefficients.chunks_exact(2);
+    let last = pairs.remainder().first().copied().unwrap_or(0.0);
+    let (even, odd) =
+        pairs.rev().fold((last, 0.0), |(even, odd), pair| (even * square + pair[0], odd * square + pair[1]));
+    even + s * odd
 }
 
 /// `Σ c_p s^p` and its derivative.
@@ -20,20 +39,13 @@ pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
     coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * s + c, slope * s + value))
 }
 
-/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s.
+/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s. Takes one coefficient less than [`MOST_COEFFICIENTS`].
 pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
-    let terms = coefficients.iter().enumerate().rev();
-    s * terms.fold(0.0, |sum, (p, c)| sum * s + c / (p + 1) as f64)
+    s * coefficients.iter().zip(&INVERSE[1..]).rev().fold(0.0, |sum, (c, inverse)| sum * s + c * inverse)
 }
 
 /// Where the polynomial is largest on [0, `end`], and its value there.
 pub(crate) fn maximum(coefficients: &[f64], end: f64) -> (f64, f64) {
-    let order = coefficients.len() - 1;
-    let mut derivative = [0.0; MOST_COEFFICIENTS];
-    for p in 1..=order {
-        derivative[p - 1] = p as f64 * coefficients[p];
-    }
-    let derivative = &derivative[..order.max(1)];
     let mut best = (0.0, coefficients[0]);
     let mut offer = |s: f64| {
         let candidate = value(coefficients, s);
@@ -42,6 +54,12 @@ pub(crate) fn maximum(coefficients: &[f64], end: f64) -> (f64, f64) {
         }
     };
     offer(end);
+    let order = coefficients.len() - 1;
+    let mut derivative = [0.0; MOST_COEFFICIENTS];
+    for p in 1..=order {
+        derivative[p - 1] = p as f64 * coefficients[p];
+    }
+    let derivative = &derivative[..order.max(1)];
     if excursion(derivative, end) >= derivative[0].abs() {
         for_each_root(derivative, 0.0, end, DEEPEST, &mut offer);
     }
@@ -80,7 +98,7 @@ fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &
     }
     let is_monotone = about.len() < 3 || about[1].abs() > slope_varies;
     if is_monotone {
-        if let Some(root) = bisect(coefficients, low, high) {
+        if let Some(root) = root_between(coefficients, low, high) {
             found(root);
         }
     } else if depth == 0 {
@@ -91,17 +109,41 @@ fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &
     }
 }
 
-fn bisect(coefficients: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
+/// The root of a polynomial that is monotone on [low, high], if it has one there.
+fn root_between(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
     let rises = value(coefficients, high) > 0.0;
     if (value(coefficients, low) > 0.0) == rises {
         return None;
     }
+    let sign = if rises { 1.0 } else { -1.0 };
+    Some(safeguarded_newton(low, high, 0.5 * (low + high), |s| {
+        let (value, slope) = value_and_slope(coefficients, s);
+        (sign * value, sign * slope)
+    }))
+}
+
+/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
+/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
+/// the bracket.
+pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
     loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return Some(middle);
+        let (height, slope) = function(s);
+        if height >= 0.0 {
+            high = s;
+        } else {
+            low = s;
         }
-        if (value(coefficients, middle) > 0.0) == rises { high = middle } else { low = middle }
+        let newton = s - height / slope;
+        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high {
+            return newton;
+        }
+        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if next <= low || next >= high {
+            return next;
+        }
+        s = next;
     }
 }
 
@@ -117,6 +159,14 @@ mod tests {
         let (at, most) = maximum(&coefficients, 1.0);
         let sampled = (0..=100_000).map(|i| value(&coefficients, f64::from(i) * 1e-5)).fold(f64::MIN, f64::max);
         assert!((most - sampled).abs() < 1e-9, "{most} at {at}, sampled {sampled}");
+    }
+
+    #[test]
+    fn newton_does_not_go_to_and_fro_between_the_ends() {
+        // The arc tangent sends 1.39 to -1.39 and back.
+        let swing = 1.391_745_200_270_735;
+        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
+        assert!(root.abs() < 1e-9, "{root}");
     }
 
     proptest! {

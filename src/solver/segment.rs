@@ -94,15 +94,29 @@ impl Segment<'_> {
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
             ForcePath::Polynomial { coefficients, scale } => {
-                let stray: f64 = coefficients[1..].iter().map(|c| c.abs()).sum();
-                if self.duration <= scale && sign * coefficients[0] + stray <= floor {
-                    return None;
+                let (first, end) = (sign * coefficients[0], self.duration / scale);
+                if end <= 1.0 {
+                    // The common cases in one pass: nothing reaches so far, or an end is the extreme.
+                    let (mut strays, mut slope_varies) = (0.0, 0.0);
+                    for (p, c) in coefficients.iter().enumerate().skip(2) {
+                        strays += c.abs();
+                        slope_varies += p as f64 * c.abs();
+                    }
+                    let slope = coefficients.get(1).map_or(0.0, |c| sign * c);
+                    if first + slope.max(0.0) + strays <= floor {
+                        return None;
+                    }
+                    if slope.abs() >= slope_varies {
+                        let last = sign * polynomial::value(coefficients, end);
+                        let (s, extreme) = if last > first { (end, last) } else { (0.0, first) };
+                        return (extreme > floor).then_some((self.start + s * scale, extreme));
+                    }
                 }
                 let mut signed = [0.0; polynomial::MOST_COEFFICIENTS];
                 for (s, c) in signed.iter_mut().zip(coefficients) {
                     *s = sign * c;
                 }
-                let (s, extreme) = polynomial::maximum(&signed[..coefficients.len()], self.duration / scale);
+                let (s, extreme) = polynomial::maximum(&signed[..coefficients.len()], end);
                 (s * scale, extreme)
             }
             ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {

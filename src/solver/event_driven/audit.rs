@@ -1,7 +1,8 @@
 //! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
 
+use super::kernels::Kernels;
 use super::leap::{DriveNow, Driving};
-use super::taylor::{Chain, Kernels, Series, State};
+use super::taylor::{Chain, Series, State};
 use crate::model::Interface;
 use crate::solver::ledger::Audit;
 

@@ -3,11 +3,8 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
-use crate::solver::polynomial::{excursion, shifted, value, value_and_slope};
+use crate::solver::polynomial::{excursion, safeguarded_newton, shifted, value, value_and_slope};
 use std::f64::consts::{PI, TAU};
-
-/// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
-const QUADRATIC: f64 = 1e-9;
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
@@ -62,31 +59,6 @@ fn rising_root(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
     let first = low - value(coefficients, low) / coefficients[1];
     (value(coefficients, high) >= 0.0)
         .then(|| safeguarded_newton(low, high, first, |s| value_and_slope(coefficients, s)))
-}
-
-/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
-/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
-/// the bracket.
-fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
-    loop {
-        let (height, slope) = function(s);
-        if height >= 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - height / slope;
-        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high {
-            return newton;
-        }
-        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if next <= low || next >= high {
-            return next;
-        }
-        s = next;
-    }
 }
 
 /// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
@@ -184,14 +156,6 @@ impl Driven {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    #[test]
-    fn newton_does_not_go_to_and_fro_between_the_ends() {
-        // The arc tangent sends 1.39 to -1.39 and back.
-        let swing = 1.391_745_200_270_735;
-        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
-        assert!(root.abs() < 1e-9, "{root}");
-    }
 
     #[test]
     fn a_bump_that_just_reaches_the_level_is_not_missed() {

@@ -13,14 +13,15 @@
 //! motion over θ, a third of what Taylor steps need, and nothing is evaluated on the way. Contract: errors of rounding
 //! only.
 
-use super::lanes::{LANES, Row, flat, flat_mut, ghost_after, ghost_before};
+use super::lanes::{LANES, Layout, Row};
 use super::taylor::Chain;
+use super::vector::Vector;
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
 const TAIL: f64 = 12.0;
 const LEAST_TAIL: f64 = 10.0;
 
-/// Work space: vectors of the recurrence with a ghost row before and after.
+/// Work space of the recurrence.
 #[derive(Clone, Debug)]
 pub(super) struct Glide {
     rows: usize,
@@ -30,7 +31,7 @@ pub(super) struct Glide {
     /// Sums with the coefficients of the cosine and of the sine, for u(0) and u'(0).
     cosine: [Vec<Row>; 2],
     sine: [Vec<Row>; 2],
-    /// Diagonal and coupling of 2A/Λ - 1.
+    /// Diagonal and neighbours' entries of 2A/Λ - 1.
     diagonal: Vec<Row>,
     coupling: Vec<Row>,
     bessel: Vec<f64>,
@@ -38,35 +39,36 @@ pub(super) struct Glide {
 
 impl Glide {
     pub fn new(rows: usize) -> Self {
-        let ghosted = || [vec![Row::filled(0.0); rows + 2], vec![Row::filled(0.0); rows + 2]];
-        let plain = || vec![Row::filled(0.0); rows];
+        let rows_of = || vec![Row::filled(0.0); rows];
+        let pair = || [rows_of(), rows_of()];
         Self {
             rows,
-            before: ghosted(),
-            here: ghosted(),
-            cosine: [plain(), plain()],
-            sine: [plain(), plain()],
-            diagonal: plain(),
-            coupling: plain(),
+            before: pair(),
+            here: pair(),
+            cosine: pair(),
+            sine: pair(),
+            diagonal: rows_of(),
+            coupling: rows_of(),
             bessel: Vec::new(),
         }
     }
 
-    /// Where u(0) and u'(0) of a block are put before [`advance`].
-    pub fn start(&mut self, row: usize, lane: usize, displacement: f64, velocity: f64) {
-        self.here[0][row + 1][lane] = displacement;
-        self.here[1][row + 1][lane] = velocity;
+    /// Takes u(0) and u'(0), one entry a block.
+    pub fn start(&mut self, layout: Layout, displacement: &[f64], velocity: &[f64]) {
+        layout.fold(displacement, &mut self.here[0]);
+        layout.fold(velocity, &mut self.here[1]);
     }
 
-    /// u(t) and u'(t) of a block after [`advance`].
-    pub fn end(&self, row: usize, lane: usize) -> (f64, f64) {
-        (self.cosine[0][row][lane], self.cosine[1][row][lane])
+    /// Tells u(t) and u'(t) after [`advance`], one entry a block.
+    pub fn end(&self, layout: Layout, displacement: &mut [f64], velocity: &mut [f64]) {
+        layout.unfold(&self.cosine[0], displacement);
+        layout.unfold(&self.cosine[1], velocity);
     }
 }
 
 /// Carries u and u' over so many seconds.
 #[inline(always)]
-pub(super) fn advance(chain: &Chain, seconds: f64, glide: &mut Glide) {
+pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, glide: &mut Glide) {
     let rows = glide.rows;
     let shift = 0.25 * chain.damping_rate * chain.damping_rate;
     let mut widest = 0.0_f64;
@@ -80,7 +82,7 @@ pub(super) fn advance(chain: &Chain, seconds: f64, glide: &mut Glide) {
         for l in 0..LANES {
             // In padding both are zero there, and zeros stay zero.
             glide.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
-            glide.coupling[r][l] = scale * chain.coupling[r][l];
+            glide.coupling[r][l] = -scale * chain.coupling[r][l];
         }
     }
     let root = widest.sqrt();
@@ -93,83 +95,79 @@ pub(super) fn advance(chain: &Chain, seconds: f64, glide: &mut Glide) {
         glide.bessel[2 * k + 1] = sum / root;
     }
     for which in 0..2 {
-        close(&mut glide.here[which]);
         let (even, odd) = (glide.bessel[0], glide.bessel[1]);
         for r in 0..rows {
-            let start = glide.here[which][r + 1];
+            let start = glide.here[which][r];
             glide.cosine[which][r] = Row(start.map(|x| even * x));
             glide.sine[which][r] = Row(start.map(|x| odd * x));
+            glide.before[which][r] = Row::filled(0.0);
         }
     }
     for k in 1..terms {
         let sign = if k % 2 == 0 { 2.0 } else { -2.0 };
-        let (even, odd) = (sign * glide.bessel[2 * k], sign * glide.bessel[2 * k + 1]);
+        let weights = [sign * glide.bessel[2 * k], sign * glide.bessel[2 * k + 1]];
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let (twice, keep) = if k == 1 { (1.0, 0.0) } else { (2.0, 1.0) };
+        let twice = if k == 1 { 1.0 } else { 2.0 };
         for which in 0..2 {
-            recur(
+            recur::<V>(
                 [&glide.diagonal, &glide.coupling],
                 &glide.here[which],
                 &mut glide.before[which],
-                [twice, keep],
+                twice,
                 [&mut glide.cosine[which], &mut glide.sine[which]],
-                [even, odd],
+                weights,
             );
-            close(&mut glide.before[which]);
         }
         std::mem::swap(&mut glide.before, &mut glide.here);
     }
-    finish(chain, shift, glide);
+    finish::<V>(chain, shift, glide);
 }
 
 /// One term of the recurrence and of both sums.
 #[inline(always)]
-fn recur(
+fn recur<V: Vector>(
     [diagonal, coupling]: [&[Row]; 2],
-    here: &[Row],
+    terms: &[Row],
     next: &mut [Row],
-    [twice, keep]: [f64; 2],
+    twice: f64,
     [cosine, sine]: [&mut [Row]; 2],
     [even, odd]: [f64; 2],
 ) {
-    let entries = diagonal.len() * LANES;
-    let (diagonal, coupling) = (&flat(diagonal)[..entries], &flat(coupling)[..entries]);
-    let (left, middle, right) = (&flat(here)[..entries], &flat(&here[1..])[..entries], &flat(&here[2..])[..entries]);
-    let next = &mut flat_mut(&mut next[1..])[..entries];
-    let (cosine, sine) = (&mut flat_mut(cosine)[..entries], &mut flat_mut(sine)[..entries]);
-    for i in 0..entries {
-        let product = diagonal[i] * middle[i] - coupling[i] * (left[i] + right[i]);
-        let term = twice * product - keep * next[i];
-        next[i] = term;
-        cosine[i] += even * term;
-        sine[i] += odd * term;
+    let rows = terms.len();
+    let (diagonal, coupling, next) = (&diagonal[..rows], &coupling[..rows], &mut next[..rows]);
+    let (cosine, sine) = (&mut cosine[..rows], &mut sine[..rows]);
+    let mut before = V::load(&terms[rows - 1]).to_next_lane();
+    let mut here = V::load(&terms[0]);
+    let end = here.to_lane_before();
+    for r in 0..rows {
+        let after = if r + 1 < rows { V::load(&terms[r + 1]) } else { end };
+        let coupled = before.plus(after).times(V::load(&coupling[r]));
+        let product = here.fused(V::load(&diagonal[r]), coupled);
+        let minus_last = V::splat(0.0).minus(V::load(&next[r]));
+        let term = product.fused(V::splat(twice), minus_last);
+        term.store(&mut next[r]);
+        term.fused(V::splat(even), V::load(&cosine[r])).store(&mut cosine[r]);
+        term.fused(V::splat(odd), V::load(&sine[r])).store(&mut sine[r]);
+        (before, here) = (here, after);
     }
 }
 
 /// u = cos u(0) + sin u'(0) and u' = cos u'(0) - A sin u(0), into `cosine`.
 #[inline(always)]
-fn finish(chain: &Chain, shift: f64, glide: &mut Glide) {
+fn finish<V: Vector>(chain: &Chain, shift: f64, glide: &mut Glide) {
     let rows = glide.rows;
+    let [displaced, moved] = &glide.sine;
+    let mut before = V::load(&displaced[rows - 1]).to_next_lane();
+    let mut here = V::load(&displaced[0]);
+    let end = here.to_lane_before();
     for r in 0..rows {
-        glide.here[0][r + 1] = glide.sine[0][r];
+        let after = if r + 1 < rows { V::load(&displaced[r + 1]) } else { end };
+        let diagonal = V::splat(shift).minus(V::load(&chain.diagonal[r]));
+        let pulled = before.plus(after).fused(V::load(&chain.coupling[r]), V::load(&glide.cosine[1][r]));
+        here.fused(diagonal, pulled).store(&mut glide.cosine[1][r]);
+        V::load(&glide.cosine[0][r]).plus(V::load(&moved[r])).store(&mut glide.cosine[0][r]);
+        (before, here) = (here, after);
     }
-    close(&mut glide.here[0]);
-    for r in 0..rows {
-        let (left, middle, right) = (glide.here[0][r], glide.here[0][r + 1], glide.here[0][r + 2]);
-        for l in 0..LANES {
-            let stiff = (chain.diagonal[r][l] - shift) * middle[l] - chain.coupling[r][l] * (left[l] + right[l]);
-            glide.cosine[1][r][l] -= stiff;
-            glide.cosine[0][r][l] += glide.sine[1][r][l];
-        }
-    }
-}
-
-/// Fills the ghost rows.
-#[inline(always)]
-fn close(rows: &mut [Row]) {
-    let last = rows.len() - 2;
-    rows[0] = ghost_before(&rows[last]);
-    rows[last + 1] = ghost_after(&rows[1]);
 }
 
 /// J_0(θ), J_1(θ), ... in pairs as far as they matter, by Miller's backward recurrence.

@@ -10,16 +10,18 @@
 mod audit;
 mod crossing;
 mod glide;
+mod kernels;
 mod lanes;
 mod leap;
 mod taylor;
+mod vector;
 
 use self::crossing::first_reach;
+use self::kernels::Kernels;
 use self::lanes::Layout;
 use self::leap::{Attempt, Bounds, DriveNow, Leap};
-use self::taylor::{Chain, Kernels, Series, State, StepInput};
+use self::taylor::{Chain, DriveTerms, Series, State, StepInput};
 use super::ledger::{Audit, work};
-use super::polynomial::{self, MOST_COEFFICIENTS};
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
@@ -30,13 +32,13 @@ use std::sync::atomic::Ordering;
 /// would lose digits.
 const LONGEST_STEP: f64 = 4.0;
 /// Steps are halved at most so often where events crowd; further only if a series does not converge.
-const MOST_HALVINGS: i32 = 7;
+const MOST_HALVINGS: usize = 7;
 /// Halvings at which a series that does not converge ends the run.
-const HOPELESS_HALVINGS: i32 = 60;
+const HOPELESS_HALVINGS: usize = 60;
 /// A step aims at so many times the time that recent steps covered before an event cut them.
-const STEP_AHEAD: f64 = 2.5;
+const STEP_AHEAD: f64 = 2.0;
 /// A leap is tried only if no reattachment is due within so many longest steps.
-const WORTHWHILE_LEAP: f64 = 6.0;
+const WORTHWHILE_LEAP: f64 = 4.0;
 /// Part of the tolerance that one step's truncation may take at most.
 const TRUNCATION_SHARE: f64 = 0.1;
 /// Multiple of the tolerance that the truncations of all steps may add up to within the slider's memory.
@@ -92,6 +94,11 @@ struct Run<'a> {
     series: Series,
     leap: Leap,
     candidates: Vec<(usize, usize)>,
+    /// Coefficients of F_S over the step, in N, and room for those of a block.
+    force: Vec<f64>,
+    coefficients: Vec<f64>,
+    /// Order from which on terms are checked, by the number of halvings.
+    least_orders: [usize; MOST_HALVINGS + 1],
     /// Largest error left in one step and by one leap, in m.
     truncation: f64,
     left_out: f64,
@@ -101,6 +108,8 @@ struct Run<'a> {
     time: f64,
     /// Displacement of the drive's ramp at the epoch.
     ramp_at_epoch: f64,
+    /// Δ cos θ and -Δ sin θ at the phase θ of now.
+    swing: [f64; 2],
     longest_step: f64,
     typical_advance: f64,
     next_leap: f64,
@@ -129,6 +138,9 @@ impl<'a> Run<'a> {
             series: Series::new(layout),
             leap: Leap::new(layout),
             candidates: Vec::new(),
+            force: Vec::new(),
+            coefficients: Vec::new(),
+            least_orders: [0; MOST_HALVINGS + 1],
             truncation: truncation_share(parameters, longest_step) * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),
             epoch: 0.0,
@@ -136,6 +148,7 @@ impl<'a> Run<'a> {
             time: 0.0,
             // The cosine is counted from its own zero, so the ramp starts Δ below.
             ramp_at_epoch: -drive.amplitude,
+            swing: [drive.amplitude, 0.0],
             longest_step,
             typical_advance: longest_step,
             next_leap: 0.0,
@@ -253,19 +266,18 @@ impl<'a> Run<'a> {
             let left = elapsed - done;
             let Ok(length) = self.expand(left) else { break };
             let s = (left / length).min(1.0);
-            let coefficients = self.force_coefficients(length);
             if let Some(audit) = &mut self.audit {
                 audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
-                let path = ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length };
+                let path = ForcePath::Polynomial { coefficients: &self.force, scale: length };
                 let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
                 audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
             }
             self.kernels.evaluate(&self.series, s, length, &mut self.state);
             done = if s < 1.0 { elapsed } else { done + length };
-            self.time = start + done;
+            self.set_time(start + done);
         }
         self.state = after;
-        self.time = start;
+        self.set_time(start);
         if let Some(audit) = &mut self.audit {
             audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
         }
@@ -280,20 +292,19 @@ impl<'a> Run<'a> {
         let end = (horizon / length).min(1.0);
         let (s, reached) = self.first_break(end);
         self.summary.steps += 1;
-        let coefficients = self.force_coefficients(length);
         let duration = s * length;
         observer.advance(&Segment {
             start: self.epoch + self.time,
             duration,
-            path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
+            path: ForcePath::Polynomial { coefficients: &self.force, scale: length },
         });
         if let Some(audit) = &mut self.audit {
             audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
         }
         self.kernels.evaluate(&self.series, s, length, &mut self.state);
-        self.passed_force = self.passed_force.max(polynomial::value(&coefficients[..=self.series.order], s));
         let is_attachment = reached.is_none() && s == end && end < 1.0;
         self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
+        self.passed_force = self.passed_force.max(self.shear_force());
         if let Some(block) = reached {
             self.break_block(block, observer);
         } else if is_attachment {
@@ -313,8 +324,18 @@ impl<'a> Run<'a> {
             length *= 0.5;
         }
         loop {
-            let input = StepInput { length, error: self.truncation, drive: self.drive_series(length) };
+            let least_order = self.least_orders.get(halvings).copied().unwrap_or(0);
+            let drive = self.drive_terms(length);
+            let pulling = self.drive.stiffness / self.mass;
+            let input = StepInput { length, error: self.truncation, least_order, pulling, drive };
             if self.kernels.expand(&self.chain, &self.state, &input, &mut self.series) {
+                if let Some(least_order) = self.least_orders.get_mut(halvings) {
+                    *least_order = self.series.order - 2;
+                }
+                self.series.stretch(drive, &mut self.force);
+                for coefficient in &mut self.force {
+                    *coefficient *= self.drive.stiffness;
+                }
                 return Ok(length);
             }
             halvings += 1;
@@ -325,33 +346,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// `K_d/m` times the scaled coefficients of the drive's displacement.
-    fn drive_series(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
-        let mut series = [0.0; MOST_COEFFICIENTS];
-        series[0] = self.ramp_at_epoch + self.drive.velocity * self.time;
-        series[1] = self.drive.velocity * length;
-        if self.drive.is_modulated() {
-            let (sine, cosine) = libm::sincos(self.phase());
-            let angle = self.drive.angular_frequency * length;
-            let mut power = self.drive.amplitude;
-            for (p, term) in series.iter_mut().enumerate() {
-                *term += power * [cosine, -sine, -cosine, sine][p % 4];
-                power *= angle / (p + 1) as f64;
-            }
+    /// The drive's displacement over a step of so many seconds.
+    fn drive_terms(&self, length: f64) -> DriveTerms {
+        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
+        DriveTerms {
+            ramp: [ramp, self.drive.velocity * length],
+            swing: self.swing,
+            angle: self.drive.angular_frequency * length,
         }
-        let pulling = self.drive.stiffness / self.mass;
-        series.map(|term| pulling * term)
-    }
-
-    /// Coefficients of F_S over the step.
-    fn force_coefficients(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
-        let driven = self.drive_series(length);
-        let edge = self.series.block(0, 0);
-        let mut force = [0.0; MOST_COEFFICIENTS];
-        for p in 0..=self.series.order {
-            force[p] = self.mass * driven[p] - self.drive.stiffness * edge[p];
-        }
-        force
     }
 
     /// The first break in [0, `end`] of the step, and its block; ties go to the smaller block.
@@ -360,24 +362,23 @@ impl<'a> Run<'a> {
         self.kernels.reachable(&self.chain, &self.series, &mut self.candidates);
         for &(row, lane) in &self.candidates {
             let block = self.chain.layout.block(row, lane);
-            let coefficients = self.series.block(row, lane);
-            let coefficients = &coefficients[..=self.series.order];
-            let mut relative = [0.0; MOST_COEFFICIENTS];
-            let relative = &mut relative[..coefficients.len()];
-            for (level, sign) in [(self.chain.upper[row][lane], 1.0), (-self.chain.lower[row][lane], -1.0)] {
-                if level == f64::INFINITY {
-                    continue;
-                }
-                for (r, c) in relative.iter_mut().zip(coefficients) {
-                    *r = sign * c;
-                }
-                relative[0] -= level;
+            let relative = &mut self.coefficients;
+            self.series.block(row, lane, relative);
+            let start = relative[0];
+            relative[0] = start - self.chain.upper[row][lane];
+            let mut reach = |relative: &[f64]| {
                 if let Some(s) = first_reach(relative, first.0)
                     && (s < first.0 || first.1.is_none_or(|earlier| block < earlier))
                 {
                     first = (s, Some(block));
                 }
+            };
+            reach(relative);
+            relative[0] = start - self.chain.lower[row][lane];
+            for coefficient in relative.iter_mut() {
+                *coefficient = -*coefficient;
             }
+            reach(relative);
         }
         first
     }
@@ -386,7 +387,16 @@ impl<'a> Run<'a> {
     fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
         let due = self.interface.next_reattachment();
         let reached = self.time + elapsed;
-        self.time = if at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached { due } else { reached };
+        let is_due = at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached;
+        self.set_time(if is_due { due } else { reached });
+    }
+
+    fn set_time(&mut self, time: f64) {
+        self.time = time;
+        if self.drive.is_modulated() {
+            let (sine, cosine) = libm::sincos(self.phase());
+            self.swing = [self.drive.amplitude * cosine, -self.drive.amplitude * sine];
+        }
     }
 
     /// Breaks what is reached at a block that was found at a break position.
@@ -408,8 +418,7 @@ impl<'a> Run<'a> {
     /// F_S now, in N.
     fn shear_force(&self) -> f64 {
         let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
-        let cosine = if self.drive.is_modulated() { libm::cos(self.phase()) } else { 0.0 };
-        self.drive.stiffness * (ramp + self.drive.amplitude * cosine - self.state.displacement[0][0])
+        self.drive.stiffness * (ramp + self.swing[0] - self.state.displacement[0][0])
     }
 
     /// Reattaches what is due now.
