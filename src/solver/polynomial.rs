@@ -36,12 +36,41 @@ pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
 
 /// `Σ c_p s^p` and its derivative.
 pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
-    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * s + c, slope * s + value))
+    let square = s * s;
+    let pairs = coefficients.chunks_exact(2);
+    let last = pairs.remainder().first().copied().unwrap_or(0.0);
+    let (mut even, mut odd, mut even_slope, mut odd_slope) = (last, 0.0, 0.0, 0.0);
+    for pair in pairs.rev() {
+        (even_slope, odd_slope) = (even_slope * square + even, odd_slope * square + odd);
+        (even, odd) = (even * square + pair[0], odd * square + pair[1]);
+    }
+    // Slopes of the sums are by s².
+    (even + s * odd, odd + 2.0 * s * (even_slope + s * odd_slope))
+}
+
+/// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value and to
+/// the slope.
+pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
+    let (mut strays, mut slope_varies) = (0.0, 0.0);
+    for c in coefficients.iter().skip(2).rev() {
+        strays += c.abs();
+        slope_varies += strays;
+    }
+    (strays, slope_varies + strays)
 }
 
 /// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s. Takes one coefficient less than [`MOST_COEFFICIENTS`].
 pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
-    s * coefficients.iter().zip(&INVERSE[1..]).rev().fold(0.0, |sum, (c, inverse)| sum * s + c * inverse)
+    let square = s * s;
+    let mut sums = [0.0, 0.0];
+    let pairs = coefficients.chunks_exact(2).zip(INVERSE[1..].chunks_exact(2));
+    if let [last] = coefficients.chunks_exact(2).remainder() {
+        sums[0] = last / coefficients.len() as f64;
+    }
+    for (pair, inverse) in pairs.rev() {
+        sums = [sums[0] * square + pair[0] * inverse[0], sums[1] * square + pair[1] * inverse[1]];
+    }
+    s * (sums[0] + s * sums[1])
 }
 
 /// Where the polynomial is largest on [0, `end`], and its value there.

@@ -97,11 +97,7 @@ impl Segment<'_> {
                 let (first, end) = (sign * coefficients[0], self.duration / scale);
                 if end <= 1.0 {
                     // The common cases in one pass: nothing reaches so far, or an end is the extreme.
-                    let (mut strays, mut slope_varies) = (0.0, 0.0);
-                    for (p, c) in coefficients.iter().enumerate().skip(2) {
-                        strays += c.abs();
-                        slope_varies += p as f64 * c.abs();
-                    }
+                    let (strays, slope_varies) = polynomial::beyond_linear(coefficients);
                     let slope = coefficients.get(1).map_or(0.0, |c| sign * c);
                     if first + slope.max(0.0) + strays <= floor {
                         return None;

@@ -3,7 +3,7 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
-use crate::solver::polynomial::{excursion, safeguarded_newton, shifted, value, value_and_slope};
+use crate::solver::polynomial::{beyond_linear, excursion, safeguarded_newton, shifted, value, value_and_slope};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
@@ -11,20 +11,18 @@ const DEEPEST: u32 = 40;
 
 /// First s in [0, `end`], with `end` <= 1, at which the polynomial is not below zero.
 pub(super) fn first_reach(coefficients: &[f64], end: f64) -> Option<f64> {
-    if coefficients[0] >= 0.0 {
+    let start = coefficients[0];
+    if start >= 0.0 {
         return Some(0.0);
     }
-    // The common cases in one pass over the coefficients: out of reach, or monotone throughout.
-    let (mut strays, mut slope_varies) = (0.0, 0.0);
-    for (p, c) in coefficients.iter().enumerate().skip(2) {
-        strays += c.abs();
-        slope_varies += p as f64 * c.abs();
-    }
-    if coefficients[0] + coefficients[1].max(0.0) + strays < 0.0 {
+    // The common cases: out of reach, or monotone throughout.
+    let (strays, slope_varies) = beyond_linear(coefficients);
+    let slope = coefficients[1];
+    if start + slope.max(0.0) + strays < 0.0 {
         return None;
     }
-    if coefficients[1].abs() > slope_varies {
-        return if coefficients[1] > 0.0 { rising_root(coefficients, 0.0, end) } else { None };
+    if slope.abs() > slope_varies {
+        return if slope > 0.0 { rising_root(coefficients, 0.0, end, -start / slope) } else { None };
     }
     first_in(coefficients, 0.0, end, DEEPEST)
 }
@@ -46,7 +44,8 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
         if value(coefficients, low) >= 0.0 {
             return Some(low);
         }
-        return if about[1] > 0.0 { rising_root(coefficients, low, high) } else { None };
+        let first = middle - about[0] / about[1];
+        return if about[1] > 0.0 { rising_root(coefficients, low, high, first) } else { None };
     }
     if depth == 0 {
         return (about[0] >= 0.0).then_some(middle);
@@ -54,9 +53,9 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
     first_in(coefficients, low, middle, depth - 1).or_else(|| first_in(coefficients, middle, high, depth - 1))
 }
 
-/// The root of a polynomial that rises from below zero throughout [low, high]; `None` if it stays below.
-fn rising_root(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
-    let first = low - value(coefficients, low) / coefficients[1];
+/// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
+/// below.
+fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
     (value(coefficients, high) >= 0.0)
         .then(|| safeguarded_newton(low, high, first, |s| value_and_slope(coefficients, s)))
 }

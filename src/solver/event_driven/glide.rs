@@ -105,9 +105,9 @@ pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, glide: &mut Glide)
     }
     for k in 1..terms {
         let sign = if k % 2 == 0 { 2.0 } else { -2.0 };
-        let weights = [sign * glide.bessel[2 * k], sign * glide.bessel[2 * k + 1]];
+        let weights = [V::splat(sign * glide.bessel[2 * k]), V::splat(sign * glide.bessel[2 * k + 1])];
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let twice = if k == 1 { 1.0 } else { 2.0 };
+        let twice = V::splat(if k == 1 { 1.0 } else { 2.0 });
         for which in 0..2 {
             recur::<V>(
                 [&glide.diagonal, &glide.coupling],
@@ -129,27 +129,41 @@ fn recur<V: Vector>(
     [diagonal, coupling]: [&[Row]; 2],
     terms: &[Row],
     next: &mut [Row],
-    twice: f64,
+    twice: V,
     [cosine, sine]: [&mut [Row]; 2],
-    [even, odd]: [f64; 2],
+    [even, odd]: [V; 2],
 ) {
-    let rows = terms.len();
-    let (diagonal, coupling, next) = (&diagonal[..rows], &coupling[..rows], &mut next[..rows]);
-    let (cosine, sine) = (&mut cosine[..rows], &mut sine[..rows]);
-    let mut before = V::load(&terms[rows - 1]).to_next_lane();
+    let last = terms.len() - 1;
+    let mut before = V::load(&terms[last]).to_next_lane();
     let mut here = V::load(&terms[0]);
-    let end = here.to_lane_before();
-    for r in 0..rows {
-        let after = if r + 1 < rows { V::load(&terms[r + 1]) } else { end };
-        let coupled = before.plus(after).times(V::load(&coupling[r]));
-        let product = here.fused(V::load(&diagonal[r]), coupled);
-        let minus_last = V::splat(0.0).minus(V::load(&next[r]));
-        let term = product.fused(V::splat(twice), minus_last);
-        term.store(&mut next[r]);
-        term.fused(V::splat(even), V::load(&cosine[r])).store(&mut cosine[r]);
-        term.fused(V::splat(odd), V::load(&sine[r])).store(&mut sine[r]);
+    let last_after = here.to_lane_before();
+    let sums = cosine[..last].iter_mut().zip(&mut sine[..last]);
+    let stencil = diagonal[..last].iter().zip(&coupling[..last]);
+    for (((next, sums), stencil), after) in next[..last].iter_mut().zip(sums).zip(stencil).zip(&terms[1..]) {
+        let after = V::load(after);
+        add_term::<V>(before.plus(after), here, stencil, next, twice, sums, [even, odd]);
         (before, here) = (here, after);
     }
+    let stencil = (&diagonal[last], &coupling[last]);
+    let sums = (&mut cosine[last], &mut sine[last]);
+    add_term::<V>(before.plus(last_after), here, stencil, &mut next[last], twice, sums, [even, odd]);
+}
+
+#[inline(always)]
+fn add_term<V: Vector>(
+    around: V,
+    here: V,
+    (diagonal, coupling): (&Row, &Row),
+    next: &mut Row,
+    twice: V,
+    (cosine, sine): (&mut Row, &mut Row),
+    [even, odd]: [V; 2],
+) {
+    let product = here.fused(V::load(diagonal), around.times(V::load(coupling)));
+    let term = product.fused(twice, V::splat(0.0).minus(V::load(next)));
+    term.store(next);
+    term.fused(even, V::load(cosine)).store(cosine);
+    term.fused(odd, V::load(sine)).store(sine);
 }
 
 /// u = cos u(0) + sin u'(0) and u' = cos u'(0) - A sin u(0), into `cosine`.

@@ -38,7 +38,7 @@ const HOPELESS_HALVINGS: usize = 60;
 /// A step aims at so many times the time that recent steps covered before an event cut them.
 const STEP_AHEAD: f64 = 2.0;
 /// A leap is tried only if no reattachment is due within so many longest steps.
-const WORTHWHILE_LEAP: f64 = 4.0;
+const WORTHWHILE_LEAP: f64 = 6.0;
 /// Part of the tolerance that one step's truncation may take at most.
 const TRUNCATION_SHARE: f64 = 0.1;
 /// Multiple of the tolerance that the truncations of all steps may add up to within the slider's memory.
@@ -330,12 +330,11 @@ impl<'a> Run<'a> {
             let input = StepInput { length, error: self.truncation, least_order, pulling, drive };
             if self.kernels.expand(&self.chain, &self.state, &input, &mut self.series) {
                 if let Some(least_order) = self.least_orders.get_mut(halvings) {
-                    *least_order = self.series.order - 2;
+                    // Reached at the first look: look earlier next time.
+                    let order = self.series.order;
+                    *least_order = if order <= *least_order + 1 { order - 2 } else { order };
                 }
-                self.series.stretch(drive, &mut self.force);
-                for coefficient in &mut self.force {
-                    *coefficient *= self.drive.stiffness;
-                }
+                self.series.shear_force(drive, self.drive.stiffness, &mut self.force);
                 return Ok(length);
             }
             halvings += 1;

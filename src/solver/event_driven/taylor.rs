@@ -149,18 +149,22 @@ impl Series {
 
     /// The coefficients Y_p/p! of one block, in m, written over what is there.
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
-        let terms = self.terms[row..].iter().step_by(self.rows);
-        coefficients.clear();
-        coefficients.extend(terms.zip(&INVERSE_FACTORIAL[..=self.order]).map(|(term, inverse)| inverse * term[lane]));
+        coefficients.resize(self.order + 1, 0.0);
+        let mut at = row;
+        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
+            *coefficient = inverse * self.terms[at][lane];
+            at += self.rows;
+        }
     }
 
-    /// The coefficients of the drive's stretch U - x_1, in m, written over what is there.
-    pub fn stretch(&self, mut drive: DriveTerms, coefficients: &mut Vec<f64>) {
-        let terms = self.terms.iter().step_by(self.rows);
-        coefficients.clear();
-        coefficients.extend(
-            terms.zip(&INVERSE_FACTORIAL[..=self.order]).map(|(term, inverse)| inverse * (drive.take() - term[0])),
-        );
+    /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
+    pub fn shear_force(&self, mut drive: DriveTerms, stiffness: f64, coefficients: &mut Vec<f64>) {
+        coefficients.resize(self.order + 1, 0.0);
+        let mut at = 0;
+        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
+            *coefficient = stiffness * inverse * (drive.take() - self.terms[at][0]);
+            at += self.rows;
+        }
     }
 }
 
@@ -203,9 +207,9 @@ pub(super) fn expand<V: Vector>(chain: &Chain, state: &State, input: &StepInput,
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
         if p % 2 == 1 && order >= input.least_order {
-            let before = INVERSE_FACTORIAL[order - 1] * largest::<V>(&terms[rows..2 * rows]);
-            let last = INVERSE_FACTORIAL[order] * largest::<V>(&terms[2 * rows..]);
-            if order as f64 * before.max(last) <= input.error {
+            let (lower, higher) = terms[rows..].split_at(rows);
+            let weights = [order - 1, order].map(|p| order as f64 * INVERSE_FACTORIAL[p]);
+            if largest::<V>(lower, higher, weights).within(V::splat(input.error)) {
                 series.order = order;
                 return true;
             }
@@ -247,54 +251,101 @@ const FIRST_LANE: Row = {
     row
 };
 
-/// The largest magnitude.
+/// In each lane, the largest weighted magnitude in the rows of two orders.
 #[inline(always)]
-fn largest<V: Vector>(rows: &[Row]) -> f64 {
-    let mut largest = V::splat(0.0);
-    for row in rows {
-        largest = V::load(row).magnitude().larger(largest);
+fn largest<V: Vector>(lower: &[Row], higher: &[Row], weights: [f64; 2]) -> V {
+    let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
+    for (lower, higher) in lower.iter().zip(higher) {
+        in_lower = V::load(lower).magnitude().larger(in_lower);
+        in_higher = V::load(higher).magnitude().larger(in_higher);
     }
-    let mut lanes = Row::filled(0.0);
-    largest.store(&mut lanes);
-    lanes.iter().copied().fold(0.0, f64::max)
+    in_lower.times(V::splat(weights[0])).larger(in_higher.times(V::splat(weights[1])))
 }
+
+/// Rows that are taken through all orders together: their sums need not wait for each other.
+const TOGETHER: usize = 3;
 
 /// State at s in [0, 1] of a step of so many seconds.
 #[inline(always)]
 pub(super) fn evaluate<V: Vector>(series: &Series, s: f64, length: f64, state: &mut State) {
+    let rows = series.rows;
+    let whole = rows - rows % TOGETHER;
+    for r in (0..whole).step_by(TOGETHER) {
+        evaluate_rows::<V, TOGETHER>(series, r, s, length, state);
+    }
+    for r in whole..rows {
+        evaluate_rows::<V, 1>(series, r, s, length, state);
+    }
+}
+
+/// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
+#[inline(always)]
+fn evaluate_rows<V: Vector, const G: usize>(series: &Series, first: usize, s: f64, length: f64, state: &mut State) {
     let (rows, order) = (series.rows, series.order);
     let inverse_length = V::splat(1.0 / length);
-    let terms = &series.terms[..(order + 1) * rows];
-    for r in 0..rows {
-        // Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
-        let mut at = order * rows + r;
-        let mut value = V::load(&terms[at]);
-        let mut slope = value;
-        for pair in INVERSE[1..=order].windows(2).rev() {
-            at -= rows;
-            let term = V::load(&terms[at]);
-            value = value.fused(V::splat(s * pair[1]), term);
-            slope = slope.fused(V::splat(s * pair[0]), term);
+    let mut at = order * rows + first;
+    let mut value = [V::splat(0.0); G];
+    for (value, term) in value.iter_mut().zip(&series.terms[at..at + G]) {
+        *value = V::load(term);
+    }
+    let mut slope = value;
+    let mut for_value = V::splat(s * INVERSE[order]);
+    for inverse in INVERSE[1..order].iter().rev() {
+        at -= rows;
+        let for_slope = V::splat(s * inverse);
+        for ((value, slope), term) in value.iter_mut().zip(&mut slope).zip(&series.terms[at..at + G]) {
+            let term = V::load(term);
+            *value = value.fused(for_value, term);
+            *slope = slope.fused(for_slope, term);
         }
-        value.fused(V::splat(s), V::load(&terms[r])).store(&mut state.displacement[r]);
-        slope.times(inverse_length).store(&mut state.velocity[r]);
+        for_value = for_slope;
+    }
+    for ((value, term), x) in
+        value.iter().zip(&series.terms[first..first + G]).zip(&mut state.displacement[first..first + G])
+    {
+        value.fused(for_value, V::load(term)).store(x);
+    }
+    for (slope, v) in slope.iter().zip(&mut state.velocity[first..first + G]) {
+        slope.times(inverse_length).store(v);
     }
 }
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
 pub(super) fn reachable<V: Vector>(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
-    let (rows, order) = (series.rows, series.order);
-    let terms = &series.terms[..(order + 1) * rows];
+    let rows = series.rows;
+    let whole = rows - rows % TOGETHER;
     blocks.clear();
-    for r in 0..rows {
-        let mut excursion = V::splat(0.0);
-        for (term, inverse) in terms[rows + r..].iter().step_by(rows).zip(&INVERSE_FACTORIAL[1..]) {
-            excursion = V::load(term).magnitude().fused(V::splat(*inverse), excursion);
+    for r in (0..whole).step_by(TOGETHER) {
+        reachable_rows::<V, TOGETHER>(chain, series, r, blocks);
+    }
+    for r in whole..rows {
+        reachable_rows::<V, 1>(chain, series, r, blocks);
+    }
+}
+
+#[inline(always)]
+fn reachable_rows<V: Vector, const G: usize>(
+    chain: &Chain,
+    series: &Series,
+    first: usize,
+    blocks: &mut Vec<(usize, usize)>,
+) {
+    let (rows, order) = (series.rows, series.order);
+    let mut excursion = [V::splat(0.0); G];
+    let mut at = first;
+    for inverse in &INVERSE_FACTORIAL[1..=order] {
+        at += rows;
+        let weight = V::splat(*inverse);
+        for (excursion, term) in excursion.iter_mut().zip(&series.terms[at..at + G]) {
+            *excursion = V::load(term).magnitude().fused(weight, *excursion);
         }
-        let x = V::load(&terms[r]);
-        let above = x.plus(excursion).reaches(V::load(&chain.upper[r]));
-        let below = V::load(&chain.lower[r]).reaches(x.minus(excursion));
+    }
+    for (g, excursion) in excursion.iter().enumerate() {
+        let r = first + g;
+        let x = V::load(&series.terms[r]);
+        let above = x.plus(*excursion).reaches(V::load(&chain.upper[r]));
+        let below = V::load(&chain.lower[r]).reaches(x.minus(*excursion));
         let reached = above | below;
         if reached != 0 {
             blocks.extend((0..LANES).filter(|lane| reached >> lane & 1 == 1).map(|lane| (r, lane)));

@@ -19,6 +19,11 @@ pub(super) trait Vector: Copy {
     fn larger(self, other: Self) -> Self;
     /// One bit a lane: `self >= other`.
     fn reaches(self, other: Self) -> u8;
+    /// Whether no lane exceeds that of `bound` or is not a number.
+    #[inline(always)]
+    fn within(self, bound: Self) -> bool {
+        bound.reaches(self) == u8::MAX
+    }
     /// Every lane moved to the next one, 0 into the first.
     fn to_next_lane(self) -> Self;
     /// Every lane moved to the one before, 0 into the last.
