@@ -9,9 +9,9 @@
 //!
 //! The spectrum of A lies in (0, Λ]. In x = 2A/Λ - 1 and θ = t√Λ, the Jacobi-Anger expansion gives
 //! cos(t√A) = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x) and √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x) with
-//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ). The Bessel functions vanish fast beyond their argument: some θ/2 products with A carry the
-//! motion over θ, a third of what Taylor steps need, and nothing is evaluated on the way. Contract: errors of rounding
-//! only.
+//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ); with A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel
+//! functions vanish fast beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor
+//! steps need, and nothing is evaluated on the way. Contract: the terms left out are a given part of the motion.
 
 use super::lanes::{LANES, Layout, Row};
 use super::taylor::Chain;
@@ -21,35 +21,37 @@ use super::vector::Vector;
 const TAIL: f64 = 12.0;
 const LEAST_TAIL: f64 = 10.0;
 
+/// Two vectors: u(0) and u'(0), or what became of them.
+type Pair = [Vec<Row>; 2];
+
 /// Work space of the recurrence.
 #[derive(Clone, Debug)]
 pub(super) struct Glide {
-    rows: usize,
     /// T_{k-1} and T_k applied to u(0) and to u'(0).
-    before: [Vec<Row>; 2],
-    here: [Vec<Row>; 2],
-    /// Sums with the coefficients of the cosine and of the sine, for u(0) and u'(0).
-    cosine: [Vec<Row>; 2],
-    sine: [Vec<Row>; 2],
+    before: Pair,
+    here: Pair,
+    /// u(t) and u'(t).
+    sums: Pair,
     /// Diagonal and neighbours' entries of 2A/Λ - 1.
     diagonal: Vec<Row>,
     coupling: Vec<Row>,
     bessel: Vec<f64>,
+    /// Coefficients of T_k: of the cosine, of the sine over √A, of the sine times √A.
+    weights: Vec<[f64; 3]>,
 }
 
 impl Glide {
-    pub fn new(rows: usize) -> Self {
-        let rows_of = || vec![Row::filled(0.0); rows];
-        let pair = || [rows_of(), rows_of()];
+    pub fn new(layout: Layout) -> Self {
+        let rows = || layout.filled(0.0);
+        let pair = || [rows(), rows()];
         Self {
-            rows,
             before: pair(),
             here: pair(),
-            cosine: pair(),
-            sine: pair(),
-            diagonal: rows_of(),
-            coupling: rows_of(),
+            sums: pair(),
+            diagonal: rows(),
+            coupling: rows(),
             bessel: Vec::new(),
+            weights: Vec::new(),
         }
     }
 
@@ -61,15 +63,43 @@ impl Glide {
 
     /// Tells u(t) and u'(t) after [`advance`], one entry a block.
     pub fn end(&self, layout: Layout, displacement: &mut [f64], velocity: &mut [f64]) {
-        layout.unfold(&self.cosine[0], displacement);
-        layout.unfold(&self.cosine[1], velocity);
+        layout.unfold(&self.sums[0], displacement);
+        layout.unfold(&self.sums[1], velocity);
+    }
+
+    /// The coefficients for a spectrum up to Λ and θ = t√Λ, as far as they exceed `error`.
+    fn weigh(&mut self, widest: f64, angle: f64, error: f64) {
+        bessel(angle, &mut self.bessel);
+        let (pairs, _) = self.bessel.as_chunks::<2>();
+        let terms = pairs.iter().rposition(|pair| pair[0].abs().max(pair[1].abs()) > error).map_or(1, |last| last + 1);
+        self.weights.clear();
+        self.weights.resize(terms + 1, [0.0; 3]);
+        let mut sum = 0.0;
+        for (k, [even, odd]) in pairs.iter().enumerate().rev() {
+            sum += 2.0 * odd;
+            if k < terms {
+                let twice = [1.0, -2.0, 2.0][if k == 0 { 0 } else { 2 - k % 2 }];
+                self.weights[k] = [twice * even, twice * sum / widest.sqrt(), 0.0];
+            }
+        }
+        // (x + 1) Λ/2 times the sine's series, with x T_0 = T_1 and x T_k = (T_{k-1} + T_{k+1})/2.
+        for k in 0..terms {
+            let below = match k {
+                0 => 0.0,
+                1 => 2.0 * self.weights[0][1],
+                _ => self.weights[k - 1][1],
+            };
+            let [_, here, _] = self.weights[k];
+            self.weights[k][2] = 0.5 * widest * (here + 0.5 * (below + self.weights[k + 1][1]));
+        }
+        self.weights.truncate(terms);
     }
 }
 
-/// Carries u and u' over so many seconds.
+/// Carries u and u' over so many seconds; `error` is the part of them that may be left out.
 #[inline(always)]
-pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, glide: &mut Glide) {
-    let rows = glide.rows;
+pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+    let rows = glide.diagonal.len();
     let shift = 0.25 * chain.damping_rate * chain.damping_rate;
     let mut widest = 0.0_f64;
     for (diagonal, coupling) in chain.diagonal.iter().zip(&chain.coupling) {
@@ -85,102 +115,52 @@ pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, glide: &mut Glide)
             glide.coupling[r][l] = -scale * chain.coupling[r][l];
         }
     }
-    let root = widest.sqrt();
-    bessel(seconds * root, &mut glide.bessel);
-    let terms = glide.bessel.len() / 2;
-    // s_k √Λ⁻¹ in place of the odd Bessel functions, from the far end.
-    let mut sum = 0.0;
-    for k in (0..terms).rev() {
-        sum += 2.0 * glide.bessel[2 * k + 1];
-        glide.bessel[2 * k + 1] = sum / root;
-    }
-    for which in 0..2 {
-        let (even, odd) = (glide.bessel[0], glide.bessel[1]);
-        for r in 0..rows {
-            let start = glide.here[which][r];
-            glide.cosine[which][r] = Row(start.map(|x| even * x));
-            glide.sine[which][r] = Row(start.map(|x| odd * x));
-            glide.before[which][r] = Row::filled(0.0);
+    glide.weigh(widest, seconds * widest.sqrt(), error);
+    for pair in [&mut glide.before, &mut glide.sums] {
+        for rows in pair {
+            rows.fill(Row::filled(0.0));
         }
     }
-    for k in 1..terms {
-        let sign = if k % 2 == 0 { 2.0 } else { -2.0 };
-        let weights = [V::splat(sign * glide.bessel[2 * k]), V::splat(sign * glide.bessel[2 * k + 1])];
+    add_terms::<V>(&glide.here, &mut glide.sums, glide.weights[0]);
+    for k in 1..glide.weights.len() {
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
         let twice = V::splat(if k == 1 { 1.0 } else { 2.0 });
-        for which in 0..2 {
-            recur::<V>(
-                [&glide.diagonal, &glide.coupling],
-                &glide.here[which],
-                &mut glide.before[which],
-                twice,
-                [&mut glide.cosine[which], &mut glide.sine[which]],
-                weights,
-            );
+        for (here, before) in glide.here.iter().zip(&mut glide.before) {
+            recur::<V>([&glide.diagonal, &glide.coupling], here, before, twice);
         }
+        add_terms::<V>(&glide.before, &mut glide.sums, glide.weights[k]);
         std::mem::swap(&mut glide.before, &mut glide.here);
     }
-    finish::<V>(chain, shift, glide);
 }
 
-/// One term of the recurrence and of both sums.
+/// `twice` x times one term, minus the term before it, which `next` holds.
 #[inline(always)]
-fn recur<V: Vector>(
-    [diagonal, coupling]: [&[Row]; 2],
-    terms: &[Row],
-    next: &mut [Row],
-    twice: V,
-    [cosine, sine]: [&mut [Row]; 2],
-    [even, odd]: [V; 2],
-) {
+fn recur<V: Vector>([diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: V) {
     let last = terms.len() - 1;
     let mut before = V::load(&terms[last]).to_next_lane();
     let mut here = V::load(&terms[0]);
     let last_after = here.to_lane_before();
-    let sums = cosine[..last].iter_mut().zip(&mut sine[..last]);
-    let stencil = diagonal[..last].iter().zip(&coupling[..last]);
-    for (((next, sums), stencil), after) in next[..last].iter_mut().zip(sums).zip(stencil).zip(&terms[1..]) {
+    for (((next, diagonal), coupling), after) in
+        next[..last].iter_mut().zip(&diagonal[..last]).zip(&coupling[..last]).zip(&terms[1..])
+    {
         let after = V::load(after);
-        add_term::<V>(before.plus(after), here, stencil, next, twice, sums, [even, odd]);
+        let product = here.fused(V::load(diagonal), before.plus(after).times(V::load(coupling)));
+        product.fused(twice, V::splat(0.0).minus(V::load(next))).store(next);
         (before, here) = (here, after);
     }
-    let stencil = (&diagonal[last], &coupling[last]);
-    let sums = (&mut cosine[last], &mut sine[last]);
-    add_term::<V>(before.plus(last_after), here, stencil, &mut next[last], twice, sums, [even, odd]);
+    let product = here.fused(V::load(&diagonal[last]), before.plus(last_after).times(V::load(&coupling[last])));
+    product.fused(twice, V::splat(0.0).minus(V::load(&next[last]))).store(&mut next[last]);
 }
 
+/// Adds T_k, applied to u(0) and to u'(0), to u(t) and u'(t).
 #[inline(always)]
-fn add_term<V: Vector>(
-    around: V,
-    here: V,
-    (diagonal, coupling): (&Row, &Row),
-    next: &mut Row,
-    twice: V,
-    (cosine, sine): (&mut Row, &mut Row),
-    [even, odd]: [V; 2],
-) {
-    let product = here.fused(V::load(diagonal), around.times(V::load(coupling)));
-    let term = product.fused(twice, V::splat(0.0).minus(V::load(next)));
-    term.store(next);
-    term.fused(even, V::load(cosine)).store(cosine);
-    term.fused(odd, V::load(sine)).store(sine);
-}
-
-/// u = cos u(0) + sin u'(0) and u' = cos u'(0) - A sin u(0), into `cosine`.
-#[inline(always)]
-fn finish<V: Vector>(chain: &Chain, shift: f64, glide: &mut Glide) {
-    let rows = glide.rows;
-    let [displaced, moved] = &glide.sine;
-    let mut before = V::load(&displaced[rows - 1]).to_next_lane();
-    let mut here = V::load(&displaced[0]);
-    let end = here.to_lane_before();
-    for r in 0..rows {
-        let after = if r + 1 < rows { V::load(&displaced[r + 1]) } else { end };
-        let diagonal = V::splat(shift).minus(V::load(&chain.diagonal[r]));
-        let pulled = before.plus(after).fused(V::load(&chain.coupling[r]), V::load(&glide.cosine[1][r]));
-        here.fused(diagonal, pulled).store(&mut glide.cosine[1][r]);
-        V::load(&glide.cosine[0][r]).plus(V::load(&moved[r])).store(&mut glide.cosine[0][r]);
-        (before, here) = (here, after);
+fn add_terms<V: Vector>([displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
+    let (cosine, sine, rooted) = (V::splat(cosine), V::splat(sine), V::splat(-rooted));
+    let [displacement, velocity] = sums;
+    for (((displaced, moved), x), v) in displaced.iter().zip(moved).zip(displacement).zip(velocity) {
+        let (displaced, moved) = (V::load(displaced), V::load(moved));
+        displaced.fused(cosine, moved.fused(sine, V::load(x))).store(x);
+        moved.fused(cosine, displaced.fused(rooted, V::load(v))).store(v);
     }
 }
 

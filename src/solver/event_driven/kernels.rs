@@ -12,7 +12,7 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
-    glide: unsafe fn(&Chain, f64, &mut Glide),
+    glide: unsafe fn(&Chain, f64, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
     pub name: &'static str,
@@ -41,8 +41,8 @@ macro_rules! kernels {
             }
 
             $(#[target_feature(enable = $features)])?
-            fn glide_here(chain: &Chain, seconds: f64, glide: &mut Glide) {
-                advance::<$vector>(chain, seconds, glide);
+            fn glide_here(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+                advance::<$vector>(chain, seconds, error, glide);
             }
 
             pub(super) const KERNELS: Kernels = Kernels {
@@ -99,10 +99,10 @@ impl Kernels {
         unsafe { (self.reachable)(chain, series, blocks) }
     }
 
-    /// Carries the free motion over so many seconds.
+    /// Carries the free motion over so many seconds; see [`advance`].
     #[inline]
-    pub fn glide(self, chain: &Chain, seconds: f64, glide: &mut Glide) {
+    pub fn glide(self, chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
         // SAFETY: as above.
-        unsafe { (self.glide)(chain, seconds, glide) }
+        unsafe { (self.glide)(chain, seconds, error, glide) }
     }
 }

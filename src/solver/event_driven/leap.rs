@@ -47,6 +47,9 @@ pub(super) struct DriveNow {
 /// How far ahead of a modulated glide a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
 
+/// Part of the displacement that may be left out that the terms of a glide may leave out each.
+const GLIDE_SHARE: f64 = 1e-3;
+
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
@@ -130,7 +133,7 @@ impl Leap {
             free: zeros.clone(),
             turned: zeros.clone(),
             residue: zeros,
-            glide: Glide::new(layout.rows),
+            glide: Glide::new(layout),
         }
     }
 
@@ -195,7 +198,7 @@ impl Leap {
         }
         self.follow(drive, elapsed);
         if is_short {
-            self.carry_free_motion(chain, kernels, elapsed, left);
+            self.carry_free_motion(chain, kernels, elapsed, left, GLIDE_SHARE * error / largest);
         }
         layout.fold(&self.displacement, &mut state.displacement);
         layout.fold(&self.velocity, &mut state.velocity);
@@ -237,10 +240,10 @@ impl Leap {
     }
 
     /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where `left`
-    /// is e^{-γt/2}. At the start u = y and u' = w + γ y/2.
-    fn carry_free_motion(&mut self, chain: &Chain, kernels: Kernels, elapsed: f64, left: f64) {
+    /// is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
+    fn carry_free_motion(&mut self, chain: &Chain, kernels: Kernels, elapsed: f64, left: f64, error: f64) {
         self.glide.start(chain.layout, &self.free, &self.turned);
-        kernels.glide(chain, elapsed, &mut self.glide);
+        kernels.glide(chain, elapsed, error, &mut self.glide);
         self.glide.end(chain.layout, &mut self.free, &mut self.turned);
         let half = 0.5 * chain.damping_rate;
         for j in 0..chain.layout.blocks {
