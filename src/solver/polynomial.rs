@@ -1,4 +1,4 @@
-//! Polynomials on [0, end], given by their coefficients: values, and extremes that no wiggle escapes.
+//! Polynomials on [0, 1], given by their coefficients: values, and extremes that no wiggle escapes.
 //!
 //! Method: `Σ_{p>=1} |c_p| w^p` bounds the excursion from the middle of an interval of half-width w. An interval where
 //! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most one,
@@ -48,6 +48,25 @@ pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
     (even + s * odd, odd + 2.0 * s * (even_slope + s * odd_slope))
 }
 
+/// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1].
+pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
+    let (mut sum, mut of_sums, mut of_those) = (0.0, 0.0, 0.0);
+    for c in coefficients.iter().skip(2).rev() {
+        sum += c.abs();
+        of_sums += sum;
+        of_those += of_sums;
+    }
+    2.0 * of_those
+}
+
+/// The first three coefficients in the variable s - `centre`.
+pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
+    coefficients
+        .iter()
+        .rev()
+        .fold([0.0; 3], |[value, slope, bend], c| [value * centre + c, slope * centre + value, bend * centre + slope])
+}
+
 /// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value and to
 /// the slope.
 pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
@@ -73,32 +92,23 @@ pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
     s * (sums[0] + s * sums[1])
 }
 
-/// Where the polynomial is largest on [0, `end`], and its value there.
-pub(crate) fn maximum(coefficients: &[f64], end: f64) -> (f64, f64) {
-    let mut best = (0.0, coefficients[0]);
+/// Where the polynomial is largest on [`first`, `last`], and its value there.
+pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64) {
+    let mut best = (first, value(coefficients, first));
     let mut offer = |s: f64| {
         let candidate = value(coefficients, s);
         if candidate > best.1 {
             best = (s, candidate);
         }
     };
-    offer(end);
+    offer(last);
     let order = coefficients.len() - 1;
     let mut derivative = [0.0; MOST_COEFFICIENTS];
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
     }
-    let derivative = &derivative[..order.max(1)];
-    if excursion(derivative, end) >= derivative[0].abs() {
-        for_each_root(derivative, 0.0, end, DEEPEST, &mut offer);
-    }
+    for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, &mut offer);
     best
-}
-
-/// `Σ_{p>=1} |c_p| w^p`: how far the value strays from c_0 within w.
-pub(crate) fn excursion(coefficients: &[f64], width: f64) -> f64 {
-    let terms = coefficients[1..].iter().rev();
-    width * terms.fold(0.0, |sum, c| sum * width + c.abs())
 }
 
 /// The same polynomial in the variable s - `centre`.
@@ -115,18 +125,20 @@ pub(crate) fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIE
 
 fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &mut impl FnMut(f64)) {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let about = shifted(coefficients, middle);
-    let about = &about[..coefficients.len()];
-    if about[0].abs() > excursion(about, half) {
+    // In the variable r from -1 to 1.
+    let mut about = shifted(coefficients, middle);
+    let about = &mut about[..coefficients.len()];
+    let mut power = 1.0;
+    for coefficient in about.iter_mut() {
+        *coefficient *= power;
+        power *= half;
+    }
+    let (strays, slope_varies) = beyond_linear(about);
+    let slope = about.get(1).map_or(0.0, |c| c.abs());
+    if about[0].abs() > slope + strays {
         return;
     }
-    let (mut slope_varies, mut power) = (0.0, 1.0);
-    for (p, c) in about.iter().enumerate().skip(2) {
-        power *= half;
-        slope_varies += p as f64 * c.abs() * power;
-    }
-    let is_monotone = about.len() < 3 || about[1].abs() > slope_varies;
-    if is_monotone {
+    if about.len() < 3 || slope > slope_varies {
         if let Some(root) = root_between(coefficients, low, high) {
             found(root);
         }
@@ -164,7 +176,7 @@ pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, functi
             low = s;
         }
         let newton = s - height / slope;
-        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high {
+        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs()) {
             return newton;
         }
         // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
@@ -185,7 +197,7 @@ mod tests {
     fn a_maximum_between_ends_that_both_fall_is_found() {
         // A narrow bump inside the interval, of which the ends show nothing.
         let coefficients = [0.0, -0.1, 0.0, 0.0, 16.0 * 0.5, -40.0 * 0.5, 24.5 * 0.5];
-        let (at, most) = maximum(&coefficients, 1.0);
+        let (at, most) = maximum(&coefficients, 0.0, 1.0);
         let sampled = (0..=100_000).map(|i| value(&coefficients, f64::from(i) * 1e-5)).fold(f64::MIN, f64::max);
         assert!((most - sampled).abs() < 1e-9, "{most} at {at}, sampled {sampled}");
     }
@@ -201,12 +213,13 @@ mod tests {
     proptest! {
         #[test]
         fn no_sample_lies_above_the_maximum(
-            coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), end in 0.01_f64..1.0
+            coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), first in 0.0_f64..0.9, length in 0.01_f64..0.1
         ) {
-            let (at, most) = maximum(&coefficients, end);
-            prop_assert!((0.0..=end).contains(&at));
+            let last = first + length;
+            let (at, most) = maximum(&coefficients, first, last);
+            prop_assert!((first..=last).contains(&at));
             for i in 0..=500 {
-                prop_assert!(value(&coefficients, end * f64::from(i) / 500.0) <= most + 1e-13);
+                prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= most + 1e-13);
             }
         }
     }

@@ -11,7 +11,7 @@ use super::vector::{Avx2, Avx512};
 pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
-    reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
+    reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
     glide: unsafe fn(&Chain, f64, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
@@ -36,7 +36,7 @@ macro_rules! kernels {
             }
 
             $(#[target_feature(enable = $features)])?
-            fn reachable_here(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+            fn reachable_here(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
                 reachable::<$vector>(chain, series, blocks);
             }
 
@@ -94,7 +94,7 @@ impl Kernels {
 
     /// Row and lane of every block that may reach a break position within the step.
     #[inline]
-    pub fn reachable(self, chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+    pub fn reachable(self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
         // SAFETY: as above.
         unsafe { (self.reachable)(chain, series, blocks) }
     }

@@ -13,16 +13,16 @@ mod glide;
 mod kernels;
 mod lanes;
 mod leap;
+mod step;
 mod taylor;
 mod vector;
 
-use self::crossing::first_reach;
 use self::kernels::Kernels;
 use self::lanes::Layout;
 use self::leap::{Attempt, Bounds, DriveNow, Leap};
-use self::taylor::{Chain, DriveTerms, Series, State, StepInput};
-use super::ledger::{Audit, work};
-use super::segment::{ForcePath, Segment};
+use self::taylor::{Chain, Series, State};
+use super::ledger::Audit;
+use super::segment::Segment;
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
@@ -33,10 +33,6 @@ use std::sync::atomic::Ordering;
 const LONGEST_STEP: f64 = 4.0;
 /// Steps are halved at most so often where events crowd; further only if a series does not converge.
 const MOST_HALVINGS: usize = 7;
-/// Halvings at which a series that does not converge ends the run.
-const HOPELESS_HALVINGS: usize = 60;
-/// A step aims at so many times the time that recent steps covered before an event cut them.
-const STEP_AHEAD: f64 = 2.0;
 /// A leap is tried only if no reattachment is due within so many longest steps.
 const WORTHWHILE_LEAP: f64 = 6.0;
 /// Part of the tolerance that one step's truncation may take at most.
@@ -50,8 +46,6 @@ const FRAME_SPAN: f64 = 0.0625;
 /// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
-/// A step must span so many units in the last place of the time, so that events are located to a millionth of it.
-const LEAST_RESOLUTION: f64 = 1_048_576.0;
 /// Steps between two looks at the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
@@ -94,6 +88,13 @@ struct Run<'a> {
     series: Series,
     leap: Leap,
     candidates: Vec<(usize, usize)>,
+    /// Breaks to come in the step: where in it, and the block.
+    breaks: Vec<(f64, usize)>,
+    /// Blocks whose series an event has changed.
+    amended: Vec<usize>,
+    /// How long the step could go on after the last break and after the last reattachment, in s.
+    break_window: f64,
+    attach_window: f64,
     /// Coefficients of F_S over the step, in N, and room for those of a block.
     force: Vec<f64>,
     coefficients: Vec<f64>,
@@ -138,6 +139,10 @@ impl<'a> Run<'a> {
             series: Series::new(layout),
             leap: Leap::new(layout),
             candidates: Vec::new(),
+            breaks: Vec::new(),
+            amended: Vec::new(),
+            break_window: 0.0,
+            attach_window: 0.0,
             force: Vec::new(),
             coefficients: Vec::new(),
             least_orders: [0; MOST_HALVINGS + 1],
@@ -177,7 +182,7 @@ impl<'a> Run<'a> {
                 && self.time >= self.next_leap
                 && self.try_leap(horizon, observer);
             if !leapt {
-                self.step(horizon, observer)?;
+                self.step(until_end, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
                 let (time, events) = (self.epoch + self.time, self.limits.events);
@@ -249,137 +254,15 @@ impl<'a> Run<'a> {
                 self.next_leap = 0.0;
                 self.arrive(elapsed, elapsed == horizon);
                 match reached {
-                    Some(block) => self.break_block(block, observer),
+                    Some(block) => {
+                        let x = self.chain.at(&self.state.displacement, block);
+                        self.break_block(block, x, self.shear_force(), observer);
+                    }
                     None => self.reattach_due(observer),
                 }
                 true
             }
         }
-    }
-
-    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
-    fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
-        let elapsed = shown.duration;
-        let after = std::mem::replace(&mut self.state, before);
-        let (start, mut done) = (self.time, 0.0);
-        while done < elapsed {
-            let left = elapsed - done;
-            let Ok(length) = self.expand(left) else { break };
-            let s = (left / length).min(1.0);
-            if let Some(audit) = &mut self.audit {
-                audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
-                let path = ForcePath::Polynomial { coefficients: &self.force, scale: length };
-                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
-                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
-            }
-            self.kernels.evaluate(&self.series, s, length, &mut self.state);
-            done = if s < 1.0 { elapsed } else { done + length };
-            self.set_time(start + done);
-        }
-        self.state = after;
-        self.set_time(start);
-        if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
-        }
-    }
-
-    /// One Taylor step, to the first of its end, a break, and `horizon` s.
-    fn step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
-        let length = self.expand(horizon)?;
-        if length < LEAST_RESOLUTION * f64::EPSILON * self.time.max(FRAME_SPAN) {
-            return Err(SimulationError::StepTooShort { time: self.epoch + self.time, step: length });
-        }
-        let end = (horizon / length).min(1.0);
-        let (s, reached) = self.first_break(end);
-        self.summary.steps += 1;
-        let duration = s * length;
-        observer.advance(&Segment {
-            start: self.epoch + self.time,
-            duration,
-            path: ForcePath::Polynomial { coefficients: &self.force, scale: length },
-        });
-        if let Some(audit) = &mut self.audit {
-            audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
-        }
-        self.kernels.evaluate(&self.series, s, length, &mut self.state);
-        let is_attachment = reached.is_none() && s == end && end < 1.0;
-        self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
-        self.passed_force = self.passed_force.max(self.shear_force());
-        if let Some(block) = reached {
-            self.break_block(block, observer);
-        } else if is_attachment {
-            self.reattach_due(observer);
-        }
-        self.typical_advance += 0.25 * ((if s == 1.0 { 2.0 * length } else { duration }) - self.typical_advance);
-        Ok(())
-    }
-
-    /// Expands the state into a series that reaches at least `horizon` or as far as events let it; returns its length.
-    fn expand(&mut self, horizon: f64) -> Result<f64, SimulationError> {
-        let wanted = (STEP_AHEAD * self.typical_advance).min(horizon).min(self.longest_step);
-        let mut halvings = 0;
-        let mut length = self.longest_step;
-        while halvings < MOST_HALVINGS && 0.5 * length >= wanted {
-            halvings += 1;
-            length *= 0.5;
-        }
-        loop {
-            let least_order = self.least_orders.get(halvings).copied().unwrap_or(0);
-            let drive = self.drive_terms(length);
-            let pulling = self.drive.stiffness / self.mass;
-            let input = StepInput { length, error: self.truncation, least_order, pulling, drive };
-            if self.kernels.expand(&self.chain, &self.state, &input, &mut self.series) {
-                if let Some(least_order) = self.least_orders.get_mut(halvings) {
-                    // Reached at the first look: look earlier next time.
-                    let order = self.series.order;
-                    *least_order = if order <= *least_order + 1 { order - 2 } else { order };
-                }
-                self.series.shear_force(drive, self.drive.stiffness, &mut self.force);
-                return Ok(length);
-            }
-            halvings += 1;
-            length *= 0.5;
-            if halvings > HOPELESS_HALVINGS {
-                return Err(SimulationError::NotFinite { time: self.epoch + self.time });
-            }
-        }
-    }
-
-    /// The drive's displacement over a step of so many seconds.
-    fn drive_terms(&self, length: f64) -> DriveTerms {
-        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
-        DriveTerms {
-            ramp: [ramp, self.drive.velocity * length],
-            swing: self.swing,
-            angle: self.drive.angular_frequency * length,
-        }
-    }
-
-    /// The first break in [0, `end`] of the step, and its block; ties go to the smaller block.
-    fn first_break(&mut self, end: f64) -> (f64, Option<usize>) {
-        let mut first = (end, None);
-        self.kernels.reachable(&self.chain, &self.series, &mut self.candidates);
-        for &(row, lane) in &self.candidates {
-            let block = self.chain.layout.block(row, lane);
-            let relative = &mut self.coefficients;
-            self.series.block(row, lane, relative);
-            let start = relative[0];
-            relative[0] = start - self.chain.upper[row][lane];
-            let mut reach = |relative: &[f64]| {
-                if let Some(s) = first_reach(relative, first.0)
-                    && (s < first.0 || first.1.is_none_or(|earlier| block < earlier))
-                {
-                    first = (s, Some(block));
-                }
-            };
-            reach(relative);
-            relative[0] = start - self.chain.lower[row][lane];
-            for coefficient in relative.iter_mut() {
-                *coefficient = -*coefficient;
-            }
-            reach(relative);
-        }
-        first
     }
 
     /// Moves time on, exactly to the next reattachment if that is what came.
@@ -398,12 +281,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Breaks what is reached at a block that was found at a break position.
-    fn break_block(&mut self, block: usize, observer: &mut dyn Observer) {
+    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force `force` N.
+    fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
-        let x = self.state.displacement[row][lane];
-        self.passed_force = self.shear_force();
+        self.passed_force = force;
         // Rounding may leave the block a hair before the position that it was found to reach.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
@@ -425,12 +307,16 @@ impl<'a> Run<'a> {
         while self.interface.next_reattachment() <= self.time
             && let Some(block) = self.interface.next_reattachment_block()
         {
-            let (row, lane) = self.chain.layout.slot(block);
-            let event = self.interface.reattach_next(self.state.displacement[row][lane]);
-            self.summary.reattachments += 1;
-            observer.contact(&absolute(event, self.epoch, self.origin));
-            self.chain.update(block, &self.interface);
+            self.attach_next(self.chain.at(&self.state.displacement, block), observer);
         }
+    }
+
+    /// Attaches the contact that is due next, at displacement `x` m of its block.
+    fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
+        let event = self.interface.reattach_next(x);
+        self.summary.reattachments += 1;
+        observer.contact(&absolute(event, self.epoch, self.origin));
+        self.chain.update(event.block, &self.interface);
     }
 
     /// Moves the frame to where the slider and the clock are.

@@ -129,6 +129,8 @@ pub(super) struct Series {
     rows: usize,
     /// Rows of Y_0, then of Y_1, and so on, in m.
     terms: Vec<Row>,
+    /// `Σ_{p>=1} |Y_p|/p!`: how far each block strays within the step, in m.
+    excursion: Vec<Row>,
     /// h² times the coupling and minus the diagonal.
     coupling: Vec<Row>,
     diagonal: Vec<Row>,
@@ -141,6 +143,7 @@ impl Series {
         Self {
             rows: layout.rows,
             terms: vec![Row::filled(0.0); layout.rows * MOST_COEFFICIENTS],
+            excursion: layout.filled(0.0),
             coupling: layout.filled(0.0),
             diagonal: layout.filled(0.0),
             order: 0,
@@ -155,6 +158,24 @@ impl Series {
             *coefficient = inverse * self.terms[at][lane];
             at += self.rows;
         }
+    }
+
+    /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
+    pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
+        let (mut at, mut factorial, mut order) = (row, 1.0, 0.0);
+        for coefficient in coefficients {
+            self.terms[at][lane] += factorial * coefficient;
+            self.excursion[row][lane] += coefficient.abs();
+            at += self.rows;
+            order += 1.0;
+            factorial *= order;
+        }
+    }
+
+    /// Bounds on the displacement of one block within the step, in m.
+    pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
+        let (start, excursion) = (self.terms[row][lane], self.excursion[row][lane]);
+        [start - excursion, start + excursion]
     }
 
     /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
@@ -312,7 +333,7 @@ fn evaluate_rows<V: Vector, const G: usize>(series: &Series, first: usize, s: f6
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
-pub(super) fn reachable<V: Vector>(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
+pub(super) fn reachable<V: Vector>(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
     let rows = series.rows;
     let whole = rows - rows % TOGETHER;
     blocks.clear();
@@ -327,7 +348,7 @@ pub(super) fn reachable<V: Vector>(chain: &Chain, series: &Series, blocks: &mut 
 #[inline(always)]
 fn reachable_rows<V: Vector, const G: usize>(
     chain: &Chain,
-    series: &Series,
+    series: &mut Series,
     first: usize,
     blocks: &mut Vec<(usize, usize)>,
 ) {
@@ -343,6 +364,7 @@ fn reachable_rows<V: Vector, const G: usize>(
     }
     for (g, excursion) in excursion.iter().enumerate() {
         let r = first + g;
+        excursion.store(&mut series.excursion[r]);
         let x = V::load(&series.terms[r]);
         let above = x.plus(*excursion).reaches(V::load(&chain.upper[r]));
         let below = V::load(&chain.lower[r]).reaches(x.minus(*excursion));
