@@ -11,7 +11,7 @@ use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
 use super::set::{SetSlips, sets};
 use super::{PhaseLimits, SetJobs};
 use crate::model::{Symbol, Value};
-use crate::store::commit::{Commit, create_folder};
+use crate::store::commit::{Commit, alone, create_folder};
 use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
 use crate::store::layout::Layout;
 use crate::store::storage::{Storage, StorageError};
@@ -23,6 +23,8 @@ use std::path::PathBuf;
 
 /// Slips whose intervals are held at once: 256 MB of doubles.
 const MOST_SLIPS: u64 = 1 << 25;
+/// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
+pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
 pub const SUMMARY_FORMAT: u32 = 1;
 
@@ -79,6 +81,7 @@ fn reduce_by(
     footer: &Footer,
     most_slips: u64,
 ) -> Result<ReductionSummary, ReduceError> {
+    let _alone = alone(storage, layout, WRITER)?;
     let all_jobs = read_jobs(storage, layout)?;
     let slip_files = committed_slips(storage, layout)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
@@ -94,7 +97,7 @@ fn reduce_by(
     };
 
     create_folder(storage, &layout.reduced())?;
-    let mut commit = Commit::begin(storage, &layout.staging("reduce"))?;
+    let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
     let (sets, histograms, backbone, points) = (sets(), histograms(), backbone(), points());
     let mut set_writer = TableWriter::create(storage, &stage(sets.name), sets, footer)?;
@@ -350,7 +353,7 @@ mod tests {
         let passes = reduce_by(&Disk, &layout, &Footer::default(), 1).unwrap();
         assert_eq!(passes, whole);
         assert!(reduced_bytes(&root) == bytes);
-        assert!(Disk.list(&layout.staging("reduce")).unwrap().is_empty());
+        assert!(Disk.list(&layout.staging(WRITER)).unwrap().is_empty());
     }
 
     #[test]
