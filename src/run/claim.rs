@@ -12,7 +12,7 @@ use crate::store::commit::{create_folder, token};
 use crate::store::layout::Layout;
 use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
 use std::io::{Read, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -91,6 +91,23 @@ impl Drop for Claim<'_> {
     }
 }
 
+/// Removes what dead processes left in the staging folders of other shards.
+pub(super) fn clear_leftovers(storage: &dyn Storage, layout: &Layout) -> Result<(), StorageError> {
+    let list = |folder: &Path| storage.list(folder).map_err(StorageError::at("list", folder));
+    let folders = layout.staging("");
+    for shard in list(&folders)?.iter().filter_map(|name| name.to_str()).filter(|name| name.starts_with("shard-")) {
+        // Listed before the look at the claim: whoever claims it afterwards stages under other names.
+        let left = list(&layout.staging(shard))?;
+        if !left.is_empty() && !is_claimed(storage, layout, shard)? {
+            for name in left {
+                let path = layout.staging(shard).join(name);
+                storage.remove(&path).map_err(StorageError::at("remove", &path))?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Whether a process has a claim to the shard of this name, without waiting: by its lock, or by a note of another host that
 /// has grown of late, as far as the hosts' clocks agree.
 pub(super) fn is_claimed(storage: &dyn Storage, layout: &Layout, shard: &str) -> Result<bool, StorageError> {
@@ -148,7 +165,6 @@ mod tests {
     use std::ffi::OsString;
     use std::fs::{self, File};
     use std::io;
-    use std::path::Path;
 
     const SHORT: Duration = Duration::from_millis(200);
 

@@ -27,7 +27,7 @@ pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Failure, MOST_FAILURES, Status, status};
 
-use crate::run::claim::{Claim, PATIENCE};
+use crate::run::claim::{Claim, PATIENCE, clear_leftovers};
 use crate::run::collect::Collector;
 use crate::run::log::Log;
 use crate::run::survey::{Scope, Survey};
@@ -197,6 +197,7 @@ fn run_claimed(
     settle(storage, directory.layout())?;
     let staging = directory.layout().staging(&options.shard.writer());
     clear(storage, &staging)?;
+    clear_leftovers(storage, directory.layout())?;
     let scope = Scope { storage, directory, shard: options.shard, retry_failed: options.retry_failed };
     let survey = scope.survey()?;
     let mut report = expected(&survey, options.retry_failed);
