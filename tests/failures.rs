@@ -79,7 +79,7 @@ fn a_poison_job_is_told_as_a_command_that_fails_in_the_same_way() {
         let [job_id, reason, command] = ["job_id", "reason", "command"].map(|key| failure[key].as_str().unwrap());
         assert_eq!(reasons[job_id], reason);
         for told in [&ended.stderr, &told_by_status] {
-            assert!(told.contains(&format!("{job_id}")) && told.contains(&format!("alone: {command}\n")), "{told}");
+            assert!(told.contains(job_id) && told.contains(&format!("alone: {command}\n")), "{told}");
         }
         let alone = folder.ends(1, command.strip_prefix("stickslip ").unwrap());
         assert_eq!(alone.stderr, format!("error: {reason}\n"), "{command}");

@@ -129,7 +129,7 @@ pub(super) fn is_claimed(storage: &dyn Storage, layout: &Layout, shard: &str) ->
     })
 }
 
-fn read(storage: &dyn Storage, file: &PathBuf) -> Result<Vec<u8>, StorageError> {
+fn read(storage: &dyn Storage, file: &Path) -> Result<Vec<u8>, StorageError> {
     let mut note = Vec::new();
     let read = storage.open(file).and_then(|mut file| file.read_to_end(&mut note));
     read.map(|_| note).map_err(StorageError::at("read", file))
@@ -137,7 +137,7 @@ fn read(storage: &dyn Storage, file: &PathBuf) -> Result<Vec<u8>, StorageError> 
 
 /// Whether this is a note: released claims are empty, and a power cut may leave part of one.
 fn is_whole(note: &[u8]) -> bool {
-    note.iter().filter(|&&byte| byte == SEPARATOR as u8).count() == 3
+    note.split(|&byte| byte == SEPARATOR as u8).count() == 4
 }
 
 /// Whether a process of this host wrote a note. A host without a name is like no other, nor like itself.
@@ -147,7 +147,7 @@ fn is_of_this_host(note: &[u8]) -> bool {
 }
 
 /// Watches a note for some time.
-fn grows(storage: &dyn Storage, file: &PathBuf, before: &[u8], patience: Duration) -> Result<bool, StorageError> {
+fn grows(storage: &dyn Storage, file: &Path, before: &[u8], patience: Duration) -> Result<bool, StorageError> {
     let begin = Instant::now();
     while begin.elapsed() < patience {
         std::thread::sleep(patience / 20);

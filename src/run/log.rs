@@ -81,7 +81,7 @@ pub struct Line {
 /// What a host is called that does not tell its name.
 pub(super) const UNKNOWN_HOST: &str = "unknown";
 
-/// Name of this host, or [`UNKNOWN_HOST`].
+/// Name of this host, or "unknown".
 #[must_use]
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();

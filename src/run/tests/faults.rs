@@ -163,8 +163,12 @@ impl Trial {
     fn resumes(&self, disk: &FaultyDisk, left: &BTreeMap<PathBuf, Vec<u8>>, case: &str) {
         let folder = tempfile::tempdir().unwrap();
         let real = folder.path().join("small");
-        disk.folders(&self.root).iter().for_each(|path| fs::create_dir_all(real.join(path)).unwrap());
-        left.iter().for_each(|(path, bytes)| fs::write(real.join(path), bytes).unwrap());
+        for path in disk.folders(&self.root) {
+            fs::create_dir_all(real.join(path)).unwrap();
+        }
+        for (path, bytes) in left {
+            fs::write(real.join(path), bytes).unwrap();
+        }
         let done = committed_jobs(&real);
         let report = attempt(&Disk, &real, &self.scenario, false).expect(case);
         let jobs_run = committed_jobs(&real) - done;
@@ -182,8 +186,11 @@ fn try_all(scenario: Scenario) -> Tried {
     let mut tried = Tried::new();
     for operation in Operation::ALL {
         for (column, fault) in Fault::ALL.into_iter().enumerate().filter(|(_, fault)| fault.befalls(operation)) {
-            let count = (0..).take_while(|&n| trial.befalls(operation, n, fault)).count();
-            tried.entry(operation).or_default()[column] += count;
+            let mut n = 0;
+            while trial.befalls(operation, n, fault) {
+                n += 1;
+            }
+            tried.entry(operation).or_default()[column] += n;
         }
     }
     tried
@@ -191,13 +198,13 @@ fn try_all(scenario: Scenario) -> Tried {
 
 fn markdown(tried: &Tried) -> String {
     let row = |first: &str, cells: &[String]| format!("| {first} | {} |\n", cells.join(" | "));
-    let mut text = row("", &Fault::ALL.map(|fault| fault.name().to_owned()));
-    text += &format!("|---|{}\n", "---|".repeat(Fault::ALL.len()));
-    for (operation, counts) in tried {
-        let cells = counts.map(|count| if count == 0 { String::new() } else { count.to_string() });
-        text += &row(operation.name(), &cells);
-    }
-    text
+    let head = row("", &Fault::ALL.map(|fault| fault.name().to_owned()));
+    let line = format!("|---|{}\n", "---|".repeat(Fault::ALL.len()));
+    let cells = |counts: &[usize; Fault::ALL.len()]| {
+        counts.map(|count| if count == 0 { String::new() } else { count.to_string() })
+    };
+    let rows = tried.iter().map(|(operation, counts)| row(operation.name(), &cells(counts)));
+    [head, line].into_iter().chain(rows).collect()
 }
 
 #[test]
