@@ -138,6 +138,8 @@ impl Trial {
             Fault::Killed | Fault::PowerCut | Fault::PowerCutTorn => {}
             _ => assert!(ended.is_err() || results(&left) == results(&self.after), "{case}"),
         }
+        // Nothing was damaged, so nobody is to be told to move files away.
+        assert!(!ended.is_err_and(|error| error.contains("damaged")), "{case}");
         self.is_whole(&left, &case);
         self.resumes(&disk, &left, &case);
 

@@ -114,6 +114,8 @@ impl Fault {
             Self::Refused => true,
             Self::ShortWrite => operation == Operation::Write,
             Self::Full => operation.needs_space(),
+            // It opens, and then no byte of it can be read.
+            Self::DoneButRefused if operation == Read => true,
             _ => !matches!(operation, List | Read | LookUp),
         }
     }
@@ -437,12 +439,17 @@ impl Storage for FaultyDisk {
     }
 
     fn open(&self, file: &Path) -> io::Result<File> {
-        self.act(Operation::Read, |state| {
-            let mut handle = tempfile::tempfile()?;
-            handle.write_all(&state.file(file)?.lock().unwrap().seen)?;
-            handle.rewind()?;
-            Ok(handle)
-        })
+        let verdict = self.state().meet(Operation::Read);
+        match verdict {
+            Verdict::Refused(error) => return Err(io::Error::from_raw_os_error(error)),
+            // A folder opens like a file and does not read like one.
+            Verdict::DoneButRefused(_) => return File::open(std::env::temp_dir()),
+            Verdict::Done | Verdict::HalfDone => {}
+        }
+        let mut handle = tempfile::tempfile()?;
+        handle.write_all(&self.state().file(file)?.lock().unwrap().seen)?;
+        handle.rewind()?;
+        Ok(handle)
     }
 
     fn exists(&self, file: &Path) -> io::Result<bool> {
