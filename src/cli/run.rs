@@ -67,6 +67,9 @@ fn walltime(text: &str) -> Result<Duration, String> {
             chunk.chars().last().and_then(|unit| Some((unit, [86_400.0, 3600.0, 60.0, 1.0]["dhms".find(unit)?])));
         let (unit, length) = unit.ok_or_else(refused)?;
         let number: f64 = chunk.trim_end_matches(unit).parse().map_err(|_| refused())?;
+        if number < 0.0 {
+            return Err(refused());
+        }
         seconds += number * length;
     }
     Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero()).ok_or_else(refused)
@@ -190,7 +193,7 @@ mod tests {
         for (text, seconds) in [("90s", 90.0), ("55m", 3300.0), ("1h30m", 5400.0), ("0.5d", 43_200.0), ("1.5s", 1.5)] {
             assert_eq!(walltime(text).unwrap().as_secs_f64(), seconds, "{text}");
         }
-        for text in ["", "55", "m", "1h30", "-1h", "0s", "nans", "infd", "1e300d", "5 m", "3w", "1m\u{e9}"] {
+        for text in ["", "55", "m", "1h30", "-1h", "2h-1h", "0s", "nans", "infd", "1e300d", "5 m", "3w", "1m\u{e9}"] {
             assert!(walltime(text).unwrap_err().contains("such as 55m"), "{text}");
         }
     }

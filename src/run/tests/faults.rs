@@ -1,6 +1,7 @@
 //! Every operation of small runs fails in every way, and the next run completes them to the same bytes.
 
-use super::faulty_disk::{Fault, FaultyDisk, MOUNT, Operation};
+use super::fault::{Fault, Operation};
+use super::faulty_disk::{FaultyDisk, MOUNT};
 use super::*;
 use crate::reduce::reduce;
 use crate::store::dataset::Footer;

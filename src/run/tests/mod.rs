@@ -1,5 +1,6 @@
 //! Whole runs with a fake kernel: quick, and a function of the parameters alone, as the real one.
 
+mod fault;
 mod faults;
 mod faulty_disk;
 
