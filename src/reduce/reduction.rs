@@ -82,8 +82,10 @@ fn reduce_by(
     most_slips: u64,
 ) -> Result<ReductionSummary, ReduceError> {
     let _alone = alone(storage, layout, WRITER)?;
-    let all_jobs = read_jobs(storage, layout)?;
-    let slip_files = committed_slips(storage, layout)?;
+    // Listed once: what other runs commit meanwhile is left out as a whole.
+    let job_files = files(storage, &layout.table(jobs().name))?;
+    let slip_files = committed_slips(storage, layout, &job_files)?;
+    let all_jobs = read_jobs(storage, layout, job_files)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
         format: SUMMARY_FORMAT,
@@ -147,14 +149,13 @@ pub fn reduced_file(layout: &Layout, table: &str) -> PathBuf {
 }
 
 /// The sets of all jobs, in the order of their parameters.
-fn read_jobs(storage: &dyn Storage, layout: &Layout) -> Result<Vec<SetJobs>, ReduceError> {
-    let folder = layout.table(jobs().name);
+fn read_jobs(storage: &dyn Storage, layout: &Layout, files: Vec<PathBuf>) -> Result<Vec<SetJobs>, ReduceError> {
     let mut sets = BTreeMap::new();
-    for batch in Reader::of_folder(storage, &folder, None)? {
+    for batch in Reader::new(storage, files, None) {
         gather_jobs(&batch?, &mut sets)?;
     }
     if sets.is_empty() {
-        return Err(ReduceError::NoJobs { tables: folder });
+        return Err(ReduceError::NoJobs { tables: layout.table(jobs().name) });
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     sets.sort_by(by_parameters);
@@ -174,8 +175,7 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
 }
 
 /// Files of slips that belong to committed jobs: a run killed in between leaves the slips of a part without its jobs.
-fn committed_slips(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, ReduceError> {
-    let jobs = files(storage, &layout.table(jobs().name))?;
+fn committed_slips(storage: &dyn Storage, layout: &Layout, jobs: &[PathBuf]) -> Result<Vec<PathBuf>, ReduceError> {
     let names: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
     let slips = files(storage, &layout.table(slips().name))?;
     Ok(slips.into_iter().filter(|path| path.file_name().is_some_and(|name| names.contains(name))).collect())
