@@ -19,6 +19,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use std::collections::BTreeMap;
+use std::io;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,8 @@ const GROUP_ROWS: usize = 1 << 17;
 const BATCH_ROWS: usize = 1 << 14;
 /// zstd's level: higher ones gain little on random doubles.
 const ZSTD_LEVEL: i32 = 3;
+/// What the text of an error of the operating system holds.
+const OS_ERROR: &str = "(os error ";
 /// How the names of table files end.
 const EXTENSION: &str = "parquet";
 
@@ -269,11 +272,19 @@ pub fn files(storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, Datas
     paths.map(checked).collect()
 }
 
-/// Decodes bytes of a file. The decoder panics on some damaged files, which is no more than damage to us.
+/// Decodes bytes of a file. A disk that does not read says nothing about the file, so its errors are no damage; what panics
+/// the decoder, as some damaged files do, is.
 fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result<T, E>) -> Result<T, DatasetError> {
-    catch_unwind(AssertUnwindSafe(decoder))
-        .map_err(|_| DatasetError::damaged(path)("its content makes no sense"))?
-        .map_err(DatasetError::damaged(path))
+    let problem = match catch_unwind(AssertUnwindSafe(decoder)) {
+        Ok(Ok(decoded)) => return Ok(decoded),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "its content makes no sense".to_owned(),
+    };
+    // Of the operating system's errors the decoder keeps the text alone.
+    if problem.contains(OS_ERROR) {
+        return Err(StorageError::at("read", path)(io::Error::other(problem)).into());
+    }
+    Err(DatasetError::damaged(path)(problem))
 }
 
 /// Reads the rows of files, one batch after the other, holding one of them; an error ends it.

@@ -52,6 +52,19 @@ pub fn failed_jobs(storage: &dyn Storage, layout: &Layout, part: &Part) -> Resul
     }
 }
 
+/// Positions of the jobs of a part that failed, with their reasons; none if the part is not done.
+///
+/// # Errors
+/// As [`failed_jobs`].
+pub fn failures(storage: &dyn Storage, layout: &Layout, part: &Part) -> Result<Vec<(usize, String)>, DatasetError> {
+    let Some(failed) = failed_jobs(storage, layout, part)? else { return Ok(Vec::new()) };
+    let mut reasons = Vec::with_capacity(part.jobs.len());
+    for batch in Reader::new(storage, vec![jobs_file(layout, part)], Some(&["reason"])) {
+        reasons.extend(batch?.texts("reason")?.iter().map(|reason| reason.unwrap_or_default().to_owned()));
+    }
+    Ok(failed.into_iter().filter_map(|position| Some((position, reasons.get(position)?.clone()))).collect())
+}
+
 /// Whether a part is done.
 ///
 /// # Errors
