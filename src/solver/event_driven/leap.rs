@@ -308,24 +308,27 @@ impl Leap {
 
     /// p0, p1 and q of the driven solution.
     fn solve_driven(&mut self, chain: &Chain, drive: &DriveNow) {
-        let blocks = chain.layout.blocks;
         let coupling = chain.coupling[0][0];
         let pulling = drive.stiffness / drive.mass;
-        self.rate[0] = pulling * drive.velocity * self.inverse_pivot[0];
-        for j in 1..blocks {
-            self.rate[j] = coupling * self.rate[j - 1] * self.inverse_pivot[j];
+        // What is carried from block to block waits for one product and one sum only.
+        let mut carried = pulling * drive.velocity * self.inverse_pivot[0];
+        self.rate[0] = carried;
+        for (rate, inverse) in self.rate.iter_mut().zip(&self.inverse_pivot).skip(1) {
+            carried *= coupling * inverse;
+            *rate = carried;
         }
-        // Forward from the leading edge, the right-hand side kept in `start`, then back.
+        // Forward from the leading edge, the right-hand side over the pivot kept in `start`, then back.
         let mut carried = 0.0;
-        for j in (0..blocks).rev() {
-            let own = self.pull[j] - chain.damping_rate * self.rate[j];
-            self.start[j] = own + coupling * carried;
-            carried = self.start[j] * self.inverse_pivot[j];
+        let sources = self.pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
+        for ((start, inverse), own) in self.start.iter_mut().zip(&self.inverse_pivot).zip(sources).rev() {
+            carried = own * inverse + coupling * inverse * carried;
+            *start = carried;
         }
-        self.start[0] += pulling * drive.ramp;
-        self.start[0] *= self.inverse_pivot[0];
-        for j in 1..blocks {
-            self.start[j] = (self.start[j] + coupling * self.start[j - 1]) * self.inverse_pivot[j];
+        self.start[0] += pulling * drive.ramp * self.inverse_pivot[0];
+        let mut carried = self.start[0];
+        for (start, inverse) in self.start.iter_mut().zip(&self.inverse_pivot).skip(1) {
+            carried = *start + coupling * inverse * carried;
+            *start = carried;
         }
         if drive.amplitude > 0.0 {
             self.solve_wave(chain, drive, pulling * drive.amplitude);
