@@ -12,13 +12,14 @@ use super::set::{SetSlips, sets};
 use super::{PhaseLimits, SetJobs};
 use crate::model::{Symbol, Value};
 use crate::store::commit::{Commit, create_folder};
-use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
+use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter};
 use crate::store::layout::Layout;
+use crate::store::part::committed_files;
 use crate::store::storage::{Storage, StorageError};
 use crate::store::tables::{jobs, slips};
 use serde::Serialize;
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 /// Slips whose intervals are held at once: 256 MB of doubles.
@@ -80,7 +81,7 @@ fn reduce_by(
     most_slips: u64,
 ) -> Result<ReductionSummary, ReduceError> {
     let all_jobs = read_jobs(storage, layout)?;
-    let slip_files = committed_slips(storage, layout)?;
+    let slip_files = committed_files(storage, layout, slips().name)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
         format: SUMMARY_FORMAT,
@@ -168,14 +169,6 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
         })
         .find(|order| order.is_ne())
         .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
-}
-
-/// Files of slips that belong to committed jobs: a run killed in between leaves the slips of a part without its jobs.
-fn committed_slips(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, ReduceError> {
-    let jobs = files(storage, &layout.table(jobs().name))?;
-    let names: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
-    let slips = files(storage, &layout.table(slips().name))?;
-    Ok(slips.into_iter().filter(|path| path.file_name().is_some_and(|name| names.contains(name))).collect())
 }
 
 /// Cuts the sets where their slips would exceed the most.

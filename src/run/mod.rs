@@ -8,6 +8,7 @@
 //!
 //! What is done is what is committed, so a run that was killed goes on by looking which part files are missing. Contract:
 //! the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a job in flight.
+//! upkeep.rs verifies, repairs and compacts while no shard runs.
 
 mod collect;
 mod kernel;
@@ -17,11 +18,13 @@ mod status;
 mod survey;
 #[cfg(test)]
 mod tests;
+mod upkeep;
 
 pub use kernel::{Kernel, kernel, limits};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Status, status};
+pub use upkeep::{UpkeepError, compact, repair, verify};
 
 use crate::run::collect::Collector;
 use crate::run::log::Log;
@@ -144,6 +147,9 @@ pub enum RunError {
         /// The shard.
         shard: Shard,
     },
+    /// Compacted or damaged files cannot be taken care of.
+    #[error(transparent)]
+    Upkeep(#[from] UpkeepError),
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {source}; take fewer with --threads")]
     Threads {
@@ -170,7 +176,13 @@ pub fn run(
 ) -> Result<RunReport, RunError> {
     let begin = Instant::now();
     let directory = Directory::open(storage, root, sweep)?;
+    if options.retry_failed {
+        upkeep::withdraw_failed(storage, &directory)?;
+    }
     let _lock = lock(storage, &directory, options.shard)?;
+    upkeep::absent(storage, directory.layout())?;
+    // It may have been compacted before the lock was ours.
+    let directory = directory.with_compaction(storage)?;
     let staging = directory.layout().staging(&options.shard.writer());
     clear(storage, &staging)?;
     let scope = Scope { storage, directory: &directory, shard: options.shard, retry_failed: options.retry_failed };

@@ -60,7 +60,7 @@ pub fn status(storage: &dyn Storage, directory: &Directory) -> Result<Status, Da
             predicted_so_far += predicted;
             measured_so_far += measured;
         }
-        Entry::Finished { .. } | Entry::Error { .. } => (),
+        Entry::Withdrawn { .. } | Entry::Finished { .. } | Entry::Error { .. } => (),
     })?;
     let mut running = Vec::new();
     for shard in threads.keys() {

@@ -340,6 +340,12 @@ impl Storage for FailingDisk {
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
         self.change().and_then(|()| Disk.rename(from, to))
     }
+    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.remove_folder(folder))
+    }
+    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
+        self.change().and_then(|()| Disk.exchange(one, other))
+    }
     fn sync_folder(&self, folder: &Path) -> io::Result<()> {
         self.change().and_then(|()| Disk.sync_folder(folder))
     }

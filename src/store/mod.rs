@@ -11,10 +11,15 @@
 
 pub mod columns;
 pub mod commit;
+pub mod compact;
+pub mod compaction;
 pub mod dataset;
 pub mod layout;
 pub mod manifest;
+pub mod merge;
 pub mod part;
 pub mod records;
+pub mod seal;
 pub mod storage;
 pub mod tables;
+pub mod verify;

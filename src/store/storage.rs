@@ -37,6 +37,10 @@ pub trait Storage: Sync {
     fn exists(&self, file: &Path) -> io::Result<bool>;
     /// Removes a file.
     fn remove(&self, file: &Path) -> io::Result<()>;
+    /// Removes a folder with all that is in it; nothing happens if there is none.
+    fn remove_folder(&self, folder: &Path) -> io::Result<()>;
+    /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
+    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()>;
     /// Locks a file, created if needed, until the handle is dropped or the process ends. `None`: another holds it.
     fn lock(&self, file: &Path) -> io::Result<Option<File>>;
 }
@@ -128,6 +132,17 @@ impl Storage for Disk {
         fs::remove_file(file)
     }
 
+    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+        match fs::remove_dir_all(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            removed => removed,
+        }
+    }
+
+    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
+        exchange(one, other)
+    }
+
     fn lock(&self, file: &Path) -> io::Result<Option<File>> {
         let handle = File::options().create(true).truncate(false).write(true).open(file)?;
         match handle.try_lock() {
@@ -136,6 +151,22 @@ impl Storage for Disk {
             Err(TryLockError::Error(error)) => Err(error),
         }
     }
+}
+
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+fn exchange(one: &Path, other: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).map_err(|error| match error {
+        // A file system that does not know the flag, or a kernel that does not know the call.
+        Errno::INVAL | Errno::NOSYS | Errno::NOTSUP => io::ErrorKind::Unsupported.into(),
+        error => error.into(),
+    })
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 #[cfg(test)]
