@@ -70,6 +70,9 @@ fn commands(root: &Path, verification: &Verification, with_repair: bool) -> Vec<
     for &epoch in &verification.epochs {
         commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(epoch)), quoted(root)));
     }
+    if verification.wants_compaction() {
+        commands.push(format!("stickslip compact {}", quoted(root)));
+    }
     if verification.wants_reduction() {
         commands.push(format!("stickslip reduce {}", quoted(root)));
     }

@@ -256,6 +256,7 @@ fn exchange(
     compaction: &Compaction,
 ) -> Result<(), DatasetError> {
     let (old, new) = (layout.tables(), Layout::new(staging).tables());
+    create_folder(storage, &old)?;
     for folder in [&new, staging] {
         storage.sync_folder(folder).map_err(StorageError::at("sync", folder))?;
     }

@@ -104,6 +104,12 @@ impl Verification {
         self.problems.iter().any(|problem| !matches!(problem.remedy, Remedy::Run | Remedy::Reduce))
     }
 
+    /// Whether tables that were compacted are to be compacted again.
+    #[must_use]
+    pub fn wants_compaction(&self) -> bool {
+        !self.epochs.is_empty() && self.problems.iter().any(|problem| problem.remedy == Remedy::Compacted)
+    }
+
     /// Whether reduced data are to be made anew, and no run does it.
     #[must_use]
     pub fn wants_reduction(&self) -> bool {

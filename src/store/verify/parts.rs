@@ -6,7 +6,6 @@ use crate::store::compact::Without;
 use crate::store::dataset::{DatasetError, footer, has_columns};
 use crate::store::layout::{EXTENSION, file_of, is_compacted, named_part, part_file, part_name};
 use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::part::label;
 use crate::store::seal;
 use crate::store::storage::{Storage, StorageError};
 use crate::store::tables;
@@ -19,7 +18,8 @@ enum State {
     Whole,
     /// Not committed, with files of which readers need know nothing.
     Missing,
-    Damaged(DatasetError),
+    /// One error for each file that is not right.
+    Damaged(Vec<DatasetError>),
 }
 
 /// Verifies all parts that are not compacted, and the folders of the tables.
@@ -46,11 +46,12 @@ pub(super) fn verify(
             // A retry of failed jobs may have been replacing its files.
             state = self::state(storage, directory, &part)?;
         }
+        // The first problem of a part tells its jobs.
+        let mut jobs: Vec<String> = ids(directory, &part).collect();
         let mut damaged = |path, problem, remedy| {
-            let sweep = &directory.sweeps()[part.epoch];
             verification.problems.push(Problem {
                 parts: vec![name.clone()],
-                jobs: (0..part.jobs.len()).map(|job| label(sweep, &part, job).job_id).collect(),
+                jobs: std::mem::take(&mut jobs),
                 ..Problem::of_file(path, problem, remedy)
             });
         };
@@ -62,8 +63,8 @@ pub(super) fn verify(
                     verification.count(storage, &directory.layout().table(table).join(part_file(&part)))?;
                 }
             }
-            State::Damaged(error) => {
-                damaged(error.path().to_owned(), problem_of(&error), Remedy::Part);
+            State::Damaged(errors) => {
+                errors.iter().for_each(|error| damaged(error.path().to_owned(), problem_of(error), Remedy::Part));
             }
             State::Missing if without.parts.contains(&name) => (),
             State::Missing if committed.contains(&name) => {
@@ -97,11 +98,18 @@ fn twice(
     Ok(())
 }
 
+/// The ids of the jobs of a part, in order.
+fn ids(directory: &Directory, part: &Part) -> impl Iterator<Item = String> {
+    let sweep = &directory.sweeps()[part.epoch];
+    part.jobs.iter().map(|job| sweep.job_id(&job.parameters).to_string())
+}
+
 fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<State, StorageError> {
     let path = |table: &str| directory.layout().table(table).join(part_file(part));
     let exists = |path: &Path| storage.exists(path).map_err(StorageError::at("look up", path));
     // First, as it is the last that a run puts in its place.
     let is_done = exists(&path(tables::jobs().name))?;
+    let mut errors = Vec::new();
     for table in directory.tables() {
         let path = path(table);
         if !is_done && !exists(&path)? {
@@ -109,8 +117,11 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
         }
         // What a killed run left is whole, too, and is read by those who read the folder.
         if let Err(error) = seal::check(storage, &path).and_then(|_| belongs(storage, directory, part, &path)) {
-            return Ok(State::Damaged(error));
+            errors.push(error);
         }
+    }
+    if !errors.is_empty() {
+        return Ok(State::Damaged(errors));
     }
     if !is_done {
         return Ok(State::Missing);
@@ -120,11 +131,9 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
         slips: vec![path(tables::slips().name)],
         precursors: directory.records_precursors().then(|| vec![path(tables::precursors().name)]),
     };
-    let sweep = &directory.sweeps()[part.epoch];
-    let mut position = 0;
+    let mut ids = ids(directory, part);
     let checked = check(storage, files, |job| {
-        let planned = (position < part.jobs.len()).then(|| label(sweep, part, position).job_id);
-        position += 1;
+        let planned = ids.next();
         if planned.as_ref() == Some(&job.job_id) {
             return Ok(());
         }
@@ -132,12 +141,14 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
         Err(DatasetError::damaged(&job.path)(problem))
     });
     Ok(match checked {
-        Err(error) => State::Damaged(error),
-        Ok(()) if position < part.jobs.len() => {
-            let problem = format!("it has {position} jobs where the plan has {}", part.jobs.len());
-            State::Damaged(DatasetError::damaged(&path(tables::jobs().name))(problem))
-        }
-        Ok(()) => State::Whole,
+        Err(error) => State::Damaged(vec![error]),
+        Ok(()) => match ids.next() {
+            None => State::Whole,
+            Some(id) => {
+                let problem = format!("it ends where the plan has job {id}");
+                State::Damaged(vec![DatasetError::damaged(&path(tables::jobs().name))(problem)])
+            }
+        },
     })
 }
 
