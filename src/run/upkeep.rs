@@ -3,6 +3,9 @@
 //! Upkeep takes a lock of its own and then looks that no shard holds its lock; a run takes its shard's lock and then looks
 //! that upkeep does not hold its own. So at least one of two that begin at once sees the other, and leaves.
 
+#[cfg(test)]
+mod tests;
+
 use crate::run::log::{self, Entry, Log};
 use crate::store::commit::create_folder;
 use crate::store::compact::{CompactError, Compacted, Without};

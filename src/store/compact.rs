@@ -96,6 +96,7 @@ pub fn compact(
     if without.is_empty() && sources.is_compact(storage, directory)? {
         if Compaction::records(storage, layout).ok().flatten().unwrap_or_default() != [directory.compaction().clone()] {
             publish(storage, layout, &staging, vec![directory.compaction().clone()])?;
+            storage.remove_folder(&staging).map_err(StorageError::at("remove", &staging))?;
         }
         return Ok(described(storage, directory.compaction(), layout, sources.jobs, false)?);
     }

@@ -11,7 +11,7 @@ use crate::store::seal;
 use crate::store::storage::{Storage, StorageError, StoredFile};
 use crate::sweep::Sweep;
 use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
-use arrow_schema::{ArrowError, DataType, Field, Schema};
+use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
@@ -23,7 +23,6 @@ use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -315,19 +314,13 @@ pub fn files(storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, Datas
 /// When the file cannot be read or is damaged.
 pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
     let file = storage.open(path).map_err(StorageError::at("read", path))?;
-    let metadata = decode(path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&file).map_err(DatasetError::damaged(path))?;
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
 }
 
-/// Decodes bytes of a file. The decoder panics on some damaged files, which is no more than damage to us.
-fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result<T, E>) -> Result<T, DatasetError> {
-    catch_unwind(AssertUnwindSafe(decoder))
-        .map_err(|_| DatasetError::damaged(path)("its content makes no sense"))?
-        .map_err(DatasetError::damaged(path))
-}
-
-/// Reads the rows of files, one batch after the other, holding one of them; an error ends it.
+/// Reads the rows of files, one batch after the other, holding one of them; an error ends it. Each file is held against its
+/// seal first.
 pub struct Reader<'a> {
     storage: &'a dyn Storage,
     files: std::vec::IntoIter<PathBuf>,
@@ -354,22 +347,25 @@ impl<'a> Reader<'a> {
         Ok(Self::new(storage, files(storage, folder)?, columns))
     }
 
+    /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
     fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
+        seal::check(self.storage, path)?;
         let file = self.storage.open(path).map_err(StorageError::at("read", path))?;
-        decode(path, || {
-            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
+        let built = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|builder| {
+            let mut builder = builder.with_batch_size(BATCH_ROWS);
             if let Some(columns) = self.columns {
                 let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
                 builder = builder.with_projection(mask);
             }
             builder.build()
-        })
+        });
+        built.map_err(DatasetError::damaged(path))
     }
 
     fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
         loop {
             if let Some((path, reader)) = &mut self.current {
-                match decode(path, || reader.next().transpose().map_err(|error: ArrowError| error.to_string()))? {
+                match reader.next().transpose().map_err(DatasetError::damaged(path))? {
                     Some(rows) => {
                         return Ok(Some(Batch { path: Arc::clone(path), rows }));
                     }
@@ -472,9 +468,9 @@ mod tests {
         let entries = metadata.key_value_metadata().unwrap();
         let keys: Vec<_> = entries.iter().map(|entry| entry.key.as_str()).collect();
         // The Arrow schema is appended by the format's library.
-        let expected = ["meaning", "model_version", "note", "program", "rng_scheme", "units", "ARROW:schema"];
+        let expected = ["meaning", "model_version", "note", "program", "rng_scheme", "seal", "units", "ARROW:schema"];
         assert_eq!(keys, expected);
-        assert!(entries[5].value.as_ref().unwrap().contains(r#""root":"m""#));
+        assert!(entries[6].value.as_ref().unwrap().contains(r#""root":"m""#));
     }
 
     #[test]
@@ -493,9 +489,8 @@ mod tests {
             let mut changed_bytes = bytes.clone();
             changed_bytes[changed] ^= 0x55;
             fs::write(&path, &changed_bytes).unwrap();
-            if let Err(error) = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()) {
-                assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
-            }
+            let error = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()).unwrap_err();
+            assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
         }
     }
 
