@@ -35,6 +35,12 @@ const fn damage(name: &'static str, file: &'static str, jobs: usize, to: fn(&Pat
     Damage { name, to, file, jobs }
 }
 
+fn in_all_tables(change: impl Fn(&str)) {
+    for table in TABLES {
+        change(table);
+    }
+}
+
 fn path(root: &Path, table: &str, name: &str) -> PathBuf {
     root.join("tables").join(table).join(name)
 }
@@ -118,7 +124,7 @@ const PARTS: &[Damage] = &[
         fs::remove_file(path(root, "jobs", SECOND)).unwrap();
     }),
     damage("a missing part", "tables/jobs/part-001-000000.parquet", 10, |root| {
-        TABLES.iter().for_each(|table| fs::remove_file(path(root, table, EXTENSION)).unwrap());
+        in_all_tables(|table| fs::remove_file(path(root, table, EXTENSION)).unwrap());
     }),
     damage("a missing table", "tables/precursors/part-000-000000.parquet", 4110, |root| {
         fs::remove_dir_all(root.join("tables/precursors")).unwrap();
@@ -133,7 +139,7 @@ const PARTS: &[Damage] = &[
         fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-002-000000.parquet")).unwrap();
     }),
     damage("names of two parts swapped", "tables/jobs/part-000-000000.parquet", 4100, |root| {
-        TABLES.iter().for_each(|table| swap(&path(root, table, FIRST), &path(root, table, SECOND)));
+        in_all_tables(|table| swap(&path(root, table, FIRST), &path(root, table, SECOND)));
     }),
     damage("names of two slips files swapped", "tables/slips/part-000-000001.parquet", 4100, |root| {
         swap(&path(root, "slips", FIRST), &path(root, "slips", SECOND));
@@ -148,7 +154,7 @@ const PARTS: &[Damage] = &[
         fs::rename(path(root, "slips", SECOND), path(root, "precursors", SECOND)).unwrap();
     }),
     damage("a part of another sweep", "tables/slips/part-000-000001.parquet", 4, |root| {
-        TABLES.iter().for_each(|table| {
+        in_all_tables(|table| {
             fs::copy(path(&other(root), table, FIRST), path(root, table, SECOND)).unwrap();
         });
     }),
@@ -210,7 +216,7 @@ const COMPACTED: &[Damage] = &[
         fs::remove_file(compacted(root, "jobs")).unwrap();
     }),
     damage("all compacted files missing", "tables/jobs/compact-000000-", 4110, |root| {
-        TABLES.iter().for_each(|table| fs::remove_file(compacted(root, table)).unwrap());
+        in_all_tables(|table| fs::remove_file(compacted(root, table)).unwrap());
     }),
     damage("all tables missing", "tables/jobs/compact-000000-", 4110, |root| {
         fs::remove_dir_all(root.join("tables")).unwrap();

@@ -110,7 +110,9 @@ fn apply(bytes: &mut Vec<u8>, change: &Change) {
 
 fn changed(bytes: &[u8], changes: &[Change]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    changes.iter().for_each(|change| apply(&mut bytes, change));
+    for change in changes {
+        apply(&mut bytes, change);
+    }
     bytes
 }
 

@@ -57,10 +57,10 @@ impl Exit {
         }
         if let Some(error) = cause.downcast_ref::<UpkeepError>() {
             return match error {
-                UpkeepError::Directory(error) => Self::of_cause(error),
-                UpkeepError::Compact(error) => Self::of_cause(error),
-                UpkeepError::Repair(RepairError::Directory(error)) => Self::of_cause(error),
-                UpkeepError::Repair(RepairError::Compact(error)) => Self::of_cause(error),
+                UpkeepError::Directory(error) | UpkeepError::Repair(RepairError::Directory(error)) => {
+                    Self::of_cause(error)
+                }
+                UpkeepError::Compact(error) | UpkeepError::Repair(RepairError::Compact(error)) => Self::of_cause(error),
                 UpkeepError::Repair(RepairError::Storage(_)) | UpkeepError::Storage(_) => None,
                 UpkeepError::Running { .. } | UpkeepError::Busy(_) => Some(Self::Usage),
                 UpkeepError::Damaged { .. } => Some(Self::Damaged),

@@ -261,12 +261,11 @@ impl<Row> Target<'_, Row> {
     }
 
     fn writer(&mut self) -> Result<&mut TableWriter<Row>, DatasetError> {
-        let writer = match self.writer.take() {
-            Some(writer) => writer,
-            None => {
-                let Merge { storage, table, footer, .. } = self.merge;
-                TableWriter::create(*storage, &self.path(), table(), footer)?
-            }
+        let writer = if let Some(writer) = self.writer.take() {
+            writer
+        } else {
+            let Merge { storage, table, footer, .. } = self.merge;
+            TableWriter::create(*storage, &self.path(), table(), footer)?
         };
         Ok(self.writer.insert(writer))
     }

@@ -20,7 +20,7 @@ pub const BLANK: &str = "0000000000000000000000000000000000000000000000000000000
 /// How the format writes a key of 4 and a text of 64 characters. No sweep file may hold such control characters.
 const MARK: &[u8] = b"\x18\x04seal\x18\x40";
 /// Bytes after the footer: its length in four of them, and [`MAGIC`].
-const END: u64 = 8;
+const END: usize = 8;
 /// First and last bytes of a file.
 const MAGIC: &[u8] = b"PAR1";
 /// Bytes that are read and hashed at once.
@@ -65,18 +65,19 @@ pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError>
 fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str>> {
     const CUT: &str = "it is cut off, or no Parquet file";
     let length = file.seek(SeekFrom::End(0))?;
-    if length < MAGIC.len() as u64 + END {
+    if length < (MAGIC.len() + END) as u64 {
         return Ok(Err(CUT));
     }
-    file.seek(SeekFrom::Start(length - END))?;
-    let mut end = [0; END as usize];
+    let footer_end = length - END as u64;
+    file.seek(SeekFrom::Start(footer_end))?;
+    let mut end = [0; END];
     file.read_exact(&mut end)?;
     let [a, b, c, d, magic @ ..] = end;
     let footer = u64::from(u32::from_le_bytes([a, b, c, d]));
-    if magic != MAGIC || footer > length - END {
+    if magic != MAGIC || footer > footer_end {
         return Ok(Err(CUT));
     }
-    let begin = length - END - footer;
+    let begin = footer_end - footer;
     file.seek(SeekFrom::Start(begin))?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;

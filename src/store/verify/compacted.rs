@@ -119,7 +119,7 @@ fn is_whole(storage: &dyn Storage, directory: &Directory, record: &Compaction) -
     };
     check(storage, files, |job| {
         jobs = jobs.wrapping_sub(1);
-        let id = u128::from_str_radix(&job.job_id, 16).map_err(DatasetError::damaged(&job.path))?;
+        let id = u128::from_str_radix(&job.id, 16).map_err(DatasetError::damaged(&job.path))?;
         sum = sum.wrapping_sub(id);
         Ok(())
     })?;

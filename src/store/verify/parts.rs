@@ -64,7 +64,9 @@ pub(super) fn verify(
                 }
             }
             State::Damaged(errors) => {
-                errors.iter().for_each(|error| damaged(error.path().to_owned(), problem_of(error), Remedy::Part));
+                for error in &errors {
+                    damaged(error.path().to_owned(), problem_of(error), Remedy::Part);
+                }
             }
             State::Missing if without.parts.contains(&name) => (),
             State::Missing if committed.contains(&name) => {
@@ -134,10 +136,10 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
     let mut ids = ids(directory, part);
     let checked = check(storage, files, |job| {
         let planned = ids.next();
-        if planned.as_ref() == Some(&job.job_id) {
+        if planned.as_ref() == Some(&job.id) {
             return Ok(());
         }
-        let problem = format!("it has job {} where the plan has {}", job.job_id, planned.as_deref().unwrap_or("none"));
+        let problem = format!("it has job {} where the plan has {}", job.id, planned.as_deref().unwrap_or("none"));
         Err(DatasetError::damaged(&job.path)(problem))
     });
     Ok(match checked {

@@ -24,7 +24,7 @@ pub(super) struct Group {
 /// A row of the jobs table.
 pub(super) struct Job {
     pub path: Arc<Path>,
-    pub job_id: String,
+    pub id: String,
     pub slips: u64,
     pub precursors: u64,
     /// Why it failed.
@@ -97,7 +97,7 @@ fn jobs_of(batch: &Batch) -> Result<Vec<Job>, DatasetError> {
     let (slips, precursors) = (batch.counts("slips")?, batch.counts("precursors")?);
     let job = |row| Job {
         path: Arc::clone(&batch.path),
-        job_id: job_id.value(row).to_owned(),
+        id: job_id.value(row).to_owned(),
         slips: if slips.is_valid(row) { slips.value(row).cast_unsigned() } else { 0 },
         precursors: if precursors.is_valid(row) { precursors.value(row).cast_unsigned() } else { 0 },
         failure: reason.is_valid(row).then(|| reason.value(row).to_owned()),
@@ -121,16 +121,18 @@ pub(super) fn check(
     for job in jobs(storage, files.jobs) {
         let job = job?;
         visit(&job)?;
-        expect(&mut slips, &job.job_id, job.slips, "slips", &last_slips)?;
+        expect(&mut slips, &job.id, job.slips, "slips", &last_slips)?;
         if let (Some(groups), Some(last)) = (&mut precursors, &last_precursors) {
-            expect(groups, &job.job_id, job.precursors, "precursors", last)?;
+            expect(groups, &job.id, job.precursors, "precursors", last)?;
         }
     }
-    for group in slips.chain(precursors.into_iter().flatten()) {
-        let group = group?;
-        return Err(DatasetError::damaged(&group.path)(format!("it has rows of job {} in excess", group.job_id)));
+    match slips.chain(precursors.into_iter().flatten()).next().transpose()? {
+        None => Ok(()),
+        Some(group) => {
+            let problem = format!("it has rows of job {} in excess", group.job_id);
+            Err(DatasetError::damaged(&group.path)(problem))
+        }
     }
-    Ok(())
 }
 
 /// Expects so many rows of a job next; none are no group.

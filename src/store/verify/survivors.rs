@@ -118,7 +118,7 @@ fn known(
     for job in jobs(storage, of_table(tables::jobs().name).unwrap_or_default()) {
         let job = job?;
         let precursors = if records_precursors { job.precursors } else { 0 };
-        known.insert(job.job_id, Known { is_there: true, slips: job.slips, precursors, failure: job.failure });
+        known.insert(job.id, Known { is_there: true, slips: job.slips, precursors, failure: job.failure });
     }
     for group in groups(storage, slips.unwrap_or_default(), None) {
         let group = group?;
