@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Rows that are sorted in memory: some 100 MB.
 const RUN_ROWS: usize = 1 << 18;
 /// Sources that are merged at once, each with a batch in memory.
-const FAN_IN: usize = 16;
+const FAN_IN: usize = 8;
 /// Rows of a file: 32 row groups.
 const FILE_ROWS: usize = 1 << 22;
 

@@ -172,6 +172,8 @@ fn exchange(_: &Path, _: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn a_lock_is_refused_while_held_and_free_afterwards() {
@@ -182,5 +184,32 @@ mod tests {
         assert!(Disk.lock(&file).unwrap().is_none());
         drop(held);
         assert!(Disk.lock(&file).unwrap().is_some());
+    }
+
+    #[test]
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    fn exchanged_folders_are_there_at_every_instant() {
+        let root = tempfile::tempdir().unwrap();
+        let [one, other] = ["one", "other"].map(|name| root.path().join(name));
+        for folder in [&one, &other] {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join(folder.file_name().unwrap()), "").unwrap();
+        }
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    Disk.exchange(&one, &other).unwrap();
+                }
+            });
+            let there = (0..20_000).all(|_| one.exists() && other.exists());
+            done.store(true, Ordering::Relaxed);
+            assert!(there);
+        });
+        let names = |folder| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
+        assert_eq!(
+            BTreeSet::from([names(&one), names(&other)]),
+            BTreeSet::from([["one".into()], ["other".into()]].map(Vec::from))
+        );
     }
 }
