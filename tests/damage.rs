@@ -331,3 +331,23 @@ fn every_kind_of_damage_is_found_named_and_repaired_by_what_is_printed() {
         damage_and_repair(&folder, "compacted", damage);
     }
 }
+
+#[test]
+fn what_is_not_yet_done_is_no_damage() {
+    let folder = Folder::new();
+    folder.write("a.toml", &sweep("unfinished", 4100));
+    folder.ends(0, "run a.toml --out r --shard 2/2 --no-reduce");
+    // As a run leaves it that is killed between two files of a part.
+    folder.ends(0, "run a.toml --out other --no-reduce");
+    fs::copy(path(&folder.path("other"), "slips", FIRST), path(&folder.path("r"), "slips", FIRST)).unwrap();
+    let text = folder.ends(0, "verify r").stdout;
+    assert!(text.contains("not yet done  1 part, 4096 jobs\ndamaged       nothing\n"), "{text}");
+    let report = json(&folder.ends(0, "verify r --json").stdout);
+    assert_eq!((report["parts"].as_u64(), report["jobs"].as_u64()), (Some(1), Some(4)));
+    assert!(report["commands"].as_array().unwrap().is_empty(), "{report}");
+    // Readers see that file, so it must be whole nevertheless.
+    flip(&path(&folder.path("r"), "slips", FIRST), |length| length / 2);
+    let text = folder.ends(4, "verify r").stdout;
+    assert!(text.contains(&format!("r/tables/slips/{FIRST}: ")), "{text}");
+    folder.ends(2, "verify missing");
+}
