@@ -223,7 +223,7 @@ impl<Row> TableWriter<Row> {
         self.seal().map(|_| ())
     }
 
-    /// Finishes the file and gives its [seal](seal).
+    /// Finishes the file and gives its [seal].
     ///
     /// # Errors
     /// As [`TableWriter::finish`].
