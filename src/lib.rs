@@ -20,6 +20,7 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep: canonical parameters and what is recorded, known by a hash of both |
 //! | part | consecutive jobs of the plan, committed together |
+//! | shard | a share of the parts, run by one process beside others; a claim keeps it from being run twice at once |
 //! | set | all jobs that differ in the seed alone |
 
 pub mod accuracy;

@@ -153,7 +153,8 @@ static RESULTS: LazyLock<Results> = LazyLock::new(|| {
     let sweep = Sweep::parse(TINY, Path::new("tiny.toml")).unwrap();
     for name in ["parts", "compacted"] {
         let stop = AtomicBool::new(false);
-        let options = Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default() };
+        let options =
+            Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
         let (recording, solver) = (*sweep.recording(), sweep.solver());
         let kernel = |job: &stickslip::sweep::Job, stop: &AtomicBool| kernel(&job.parameters, &recording, solver, stop);
         run(&Disk, &sweep, &folder.path().join(name), options, &kernel, &mut |_| ()).unwrap();

@@ -4,14 +4,9 @@
 
 mod program;
 
-use program::{Cell, Folder};
-use serde_json::Value;
-use std::collections::BTreeMap;
+use program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
 use std::fs;
-use std::io::Read;
 use std::path::PathBuf;
-use std::process::Child;
-use std::time::{Duration, Instant};
 
 /// Modulated and not, two velocities, two seeds, with precursors: 12 jobs, which differ in everything that is measured.
 const TINY: &str = "\
@@ -29,53 +24,6 @@ precursors = true
 ";
 /// Jobs of [`TINY`]: without modulation one frequency stands for both.
 const TINY_JOBS: u64 = 12;
-
-/// Many jobs of some 50 µs, in several parts of 4096 jobs: something to interrupt.
-const MANY: &str = "\
-name = \"many\"
-[model]
-N = 1
-Ns = 1
-[axes]
-seed = { count = 28000 }
-[record]
-slips = 2
-discard = 0
-";
-/// Parts of [`MANY`].
-const MANY_PARTS: usize = 7;
-
-/// One in three jobs needs more contact events than it may have.
-const FAILING: &str = "\
-name = \"failing\"
-[model]
-Ns = 2
-[axes]
-N = [1, 2, 30]
-seed = { count = 2 }
-[record]
-slips = 2
-discard = 0
-max_events = 300
-";
-
-const TABLES: [&str; 3] = ["slips", "precursors", "jobs"];
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
-}
-
-/// The files of all tables with their bytes.
-fn tables(folder: &Folder, directory: &str) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut files = BTreeMap::new();
-    for table in TABLES {
-        for path in folder.parts(directory, table) {
-            let bytes = fs::read(&path).unwrap();
-            files.insert(path.strip_prefix(folder.path(directory)).unwrap().to_owned(), bytes);
-        }
-    }
-    files
-}
 
 /// Every row of every table, all columns, by job and slip.
 fn sorted_rows(folder: &Folder, directory: &str) -> Vec<Vec<Vec<Cell>>> {
@@ -150,24 +98,10 @@ fn tables_do_not_depend_on_threads() {
         let [one, two] = [1, 2].map(|threads| format!("{name}-{threads}"));
         // Every column of every row, bit by bit; and what is more, the files.
         assert!(sorted_rows(&folder, &one) == sorted_rows(&folder, &two), "{name}");
-        assert!(tables(&folder, &one) == tables(&folder, &two), "{name}");
+        assert!(folder.tables(&one) == folder.tables(&two), "{name}");
     }
     assert_eq!(folder.parts("many-1", "jobs").len(), MANY_PARTS);
     assert!(!folder.table("tiny-1", "precursors").cells.is_empty());
-}
-
-#[test]
-fn shards_side_by_side_make_the_same_tables() {
-    let folder = Folder::new();
-    folder.write("many.toml", MANY);
-    folder.ends(0, "run many.toml --no-reduce --out whole");
-    let shards =
-        [1, 2].map(|shard| folder.start(&format!("run many.toml --no-reduce --out sharded --shard {shard}/2")));
-    for shard in shards {
-        let (code, _, stderr) = wait(shard);
-        assert_eq!(code, Some(0), "{stderr}");
-    }
-    assert!(tables(&folder, "sharded") == tables(&folder, "whole"));
 }
 
 #[test]
@@ -175,36 +109,31 @@ fn an_extended_axis_runs_its_new_jobs_alone() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);
     folder.ends(0, "run tiny.toml --no-reduce --out grown");
-    let before = tables(&folder, "grown");
+    let before = folder.tables("grown");
     folder.write("tiny.toml", &TINY.replace("count = 2", "count = 3"));
     let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out grown --json").stdout);
     assert_eq!(report["jobs_run"].as_u64(), Some(TINY_JOBS / 2));
-    let after = tables(&folder, "grown");
+    let after = folder.tables("grown");
     assert!(before.iter().all(|(path, bytes)| after.get(path) == Some(bytes)));
+    assert_eq!(json(&folder.ends(0, "status grown --json").stdout)["jobs_kept"].as_u64(), Some(0));
     folder.ends(0, "run tiny.toml --no-reduce --out at-once");
     assert!(sorted_rows(&folder, "grown") == sorted_rows(&folder, "at-once"));
 }
 
-/// Exit code, standard output and standard error of a program that was started.
-fn wait(mut child: Child) -> (Option<i32>, String, String) {
-    let code = child.wait().unwrap().code();
-    let (mut stdout, mut stderr) = (String::new(), String::new());
-    if let Some(mut pipe) = child.stdout.take() {
-        pipe.read_to_string(&mut stdout).unwrap();
-    }
-    if let Some(mut pipe) = child.stderr.take() {
-        pipe.read_to_string(&mut stderr).unwrap();
-    }
-    (code, stdout, stderr)
-}
-
-/// Waits until so many parts are committed, or the program has ended.
-fn wait_for_parts(folder: &Folder, directory: &str, parts: usize, child: &mut Child) {
-    let begin = Instant::now();
-    while folder.parts(directory, "jobs").len() < parts && child.try_wait().unwrap().is_none() {
-        assert!(begin.elapsed() < Duration::from_mins(1), "no part is committed");
-        std::thread::sleep(Duration::from_millis(1));
-    }
+#[test]
+fn values_that_a_sweep_no_longer_has_keep_their_data_and_the_status_says_so() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce --out r");
+    let before = folder.tables("r");
+    folder.write("tiny.toml", &TINY.replace("V0 = [1e-4, 2e-4]", "V0 = [2e-4]"));
+    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out r --json").stdout);
+    assert_eq!((report["jobs_run"].as_u64(), report["jobs_left"].as_u64()), (Some(0), Some(0)));
+    assert!(folder.tables("r") == before);
+    let status = json(&folder.ends(0, "status r --json").stdout);
+    assert_eq!((status["jobs_done"].as_u64(), status["jobs_kept"].as_u64()), (Some(TINY_JOBS), Some(TINY_JOBS / 2)));
+    let text = folder.ends(0, "status r").stdout;
+    assert!(text.contains("jobs done     12, 6 of them kept of values that the sweep no longer has\n"), "{text}");
 }
 
 #[cfg(unix)]
@@ -213,12 +142,12 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
     let folder = Folder::new();
     folder.write("many.toml", MANY);
     folder.ends(0, "run many.toml --no-reduce --out whole");
-    let whole = tables(&folder, "whole");
+    let whole = folder.tables("whole");
     for signal in ["INT", "TERM"] {
         // One thread, so that on a machine with many cores there is a middle, too.
         let command = format!("run many.toml --no-reduce --threads 1 --out {signal}");
         let mut child = folder.start(&command);
-        wait_for_parts(&folder, signal, 2, &mut child);
+        folder.wait_for_parts(signal, 2, &mut child);
         let sent = std::process::Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status();
         assert!(sent.unwrap().success());
         let (code, stdout, stderr) = wait(child);
@@ -226,79 +155,19 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
         assert!(stderr.contains("The same command goes on."), "{stderr}");
         assert!(stdout.starts_with("jobs run"), "{stdout}");
 
-        let kept = tables(&folder, signal);
+        let kept = folder.tables(signal);
         assert!((2..MANY_PARTS).contains(&folder.parts(signal, "jobs").len()), "it was to be stopped in the middle");
         assert!(kept.iter().all(|(path, bytes)| whole.get(path) == Some(bytes)));
-        let times = modified(&folder, signal);
+        let times = folder.written(signal);
         let status = json(&folder.ends(0, &format!("status {signal} --json")).stdout);
         assert_eq!(status["parts_done"].as_u64(), Some(folder.parts(signal, "jobs").len() as u64));
         assert!(status["jobs_missing"].as_u64() > Some(0));
 
         folder.ends(0, &command);
-        assert!(tables(&folder, signal) == whole, "{signal}");
-        let times_after = modified(&folder, signal);
+        assert!(folder.tables(signal) == whole, "{signal}");
+        let times_after = folder.written(signal);
         assert!(times.iter().all(|(path, time)| times_after[path] == *time), "a committed part was written again");
     }
-}
-
-/// When the committed files were written.
-fn modified(folder: &Folder, directory: &str) -> BTreeMap<PathBuf, std::time::SystemTime> {
-    let written = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
-    folder.parts(directory, "jobs").into_iter().map(written).collect()
-}
-
-#[test]
-fn a_killed_run_resumes_byte_identical_whenever_it_was_killed() {
-    let folder = Folder::new();
-    folder.write("many.toml", MANY);
-    folder.ends(0, "run many.toml --no-reduce --out whole");
-    let whole = tables(&folder, "whole");
-    // Milliseconds after the start, or after a part, so that some kills come while files are written.
-    for (round, delay) in [0_u64, 20, 0, 2, 5, 9, 14].into_iter().enumerate() {
-        let parts = folder.parts("killed", "jobs").len();
-        let mut child = folder.start("run many.toml --no-reduce --threads 2 --out killed");
-        if round >= 2 {
-            wait_for_parts(&folder, "killed", parts + 1, &mut child);
-        }
-        std::thread::sleep(Duration::from_millis(delay));
-        child.kill().unwrap();
-        wait(child);
-        // Whatever there is, is whole.
-        assert!(tables(&folder, "killed").iter().all(|(path, bytes)| whole.get(path) == Some(bytes)), "round {round}");
-    }
-    folder.ends(0, "run many.toml --no-reduce --out killed");
-    assert!(tables(&folder, "killed") == whole);
-    let staged = folder.contents("killed/run/staging");
-    assert!(staged.values().all(Option::is_none), "left in staging: {:?}", staged.keys());
-}
-
-#[test]
-fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
-    let folder = Folder::new();
-    folder.write("failing.toml", FAILING);
-    let ended = folder.ends(1, "run failing.toml --out r");
-    assert!(ended.stdout.starts_with("jobs run         6, 2 failed\n"), "{}", ended.stdout);
-    assert!(ended.stderr.contains("--retry-failed"), "{}", ended.stderr);
-    let jobs = folder.table("r", "jobs");
-    assert_eq!(jobs.counts("N"), [1, 1, 2, 2, 30, 30]);
-    assert_eq!(jobs.texts("outcome"), ["done", "done", "done", "done", "failed", "failed"]);
-    let reasons = jobs.texts("reason");
-    assert_eq!(reasons[..4], [""; 4]);
-    for (reason, id) in reasons[4..].iter().zip(&jobs.texts("job_id")[4..]) {
-        assert!(reason.contains("300 contact events") && reason.contains("record.max_events"), "{reason}");
-        assert!(ended.stderr.contains(&format!("job {id} failed: {reason}")), "{}", ended.stderr);
-    }
-    assert_eq!(jobs.counts("slips"), [2; 4]);
-
-    let status = json(&folder.ends(1, "status r --json").stdout);
-    assert_eq!((status["jobs_done"].as_u64(), status["jobs_failed"].as_u64()), (Some(4), Some(2)));
-    assert_eq!(json(&folder.ends(1, "reduce r --json").stdout)["failed_jobs"].as_u64(), Some(2));
-    let before = tables(&folder, "r");
-    let again = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json").stdout);
-    assert_eq!((again["jobs_run"].as_u64(), again["jobs_failed"].as_u64()), (Some(0), Some(2)));
-    let retried = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json --retry-failed").stdout);
-    assert_eq!((retried["jobs_run"].as_u64(), retried["jobs_failed"].as_u64()), (Some(2), Some(2)));
-    assert!(tables(&folder, "r") == before);
 }
 
 #[test]
@@ -347,7 +216,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
     let folder = Folder::new();
     folder.write("many.toml", MANY);
     folder.ends(0, "run many.toml --no-reduce --out r");
-    let whole = tables(&folder, "r");
+    let whole = folder.tables("r");
     for (table, commands) in [
         ("jobs", &["run many.toml --out r", "status r", "reduce r"][..]),
         ("slips", &["run many.toml --out r", "reduce r"]),
@@ -366,7 +235,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         folder.ends(0, "verify r --repair");
         let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);
         assert_eq!(report["jobs_run"].as_u64(), Some(4096));
-        assert!(tables(&folder, "r") == whole, "{table}");
+        assert!(folder.tables("r") == whole, "{table}");
     }
     for (file, text) in [("run/manifest.json", "{"), ("run/sweep-000.toml", "name = \"other\"")] {
         let kept = fs::read(folder.path("r").join(file)).unwrap();
@@ -377,7 +246,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         }
         fs::write(folder.path("r").join(file), kept).unwrap();
     }
-    assert!(tables(&folder, "r") == whole);
+    assert!(folder.tables("r") == whole);
 }
 
 #[test]

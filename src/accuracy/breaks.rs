@@ -142,7 +142,6 @@ impl Observer for Comparison<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::ForcePath;
 
     fn break_at(time: f64, contact: usize) -> ContactEvent {
         ContactEvent {
@@ -168,8 +167,7 @@ mod tests {
         for &(time, contact) in times {
             comparison.contact(&break_at(time, contact));
         }
-        let path = ForcePath::Polynomial { coefficients: &[0.0], scale: 1.0 };
-        comparison.advance(&Segment { start: 0.0, duration: 1.0, path });
+        comparison.advance(&Segment::polynomial(0.0, 1.0, &[0.0]));
         assert!(comparison.is_satisfied());
         comparison.errors()
     }

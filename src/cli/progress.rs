@@ -57,11 +57,12 @@ impl Progress {
                 }
             }
             RunEvent::JobDone { predicted_cost, .. } => self.advance(predicted_cost),
-            RunEvent::JobFailed { job_id, reason, predicted_cost, .. } => {
-                self.say(&format!("job {job_id} failed: {reason}"));
+            RunEvent::JobFailed { job_id, reason, command, predicted_cost, .. } => {
+                self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
                 self.advance(predicted_cost);
             }
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished parts are kept"),
+            RunEvent::OutOfTime => self.say("the time suffices for no more than what is under way"),
             RunEvent::PartCommitted { .. } => {}
             RunEvent::Finished(_) => self.bar.finish_and_clear(),
         }

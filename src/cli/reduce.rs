@@ -41,6 +41,7 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
     } else {
         output::pairs(&described(&summary, directory.layout()))?;
     }
+    tell_missing(&directory)?;
     Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
 }
 
@@ -56,6 +57,16 @@ pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
 pub fn reduce_directory(directory: &Directory) -> Result<ReductionSummary> {
     let sweep = &directory.sweeps()[directory.current()];
     Ok(reduce::reduce(&Disk, directory.layout(), &Footer::default().with_sweep(sweep))?)
+}
+
+/// Says which jobs were not there to be reduced.
+pub fn tell_missing(directory: &Directory) -> Result<()> {
+    let status = stickslip::run::status(&Disk, directory)?;
+    if status.jobs_missing > 0 {
+        let (jobs, parts) = (output::count(status.jobs_missing, "job"), output::count(status.parts_missing, "part"));
+        output::tell(&format!("reduced what is there: {jobs} in {parts} are missing; stickslip run goes on with them"));
+    }
+    Ok(())
 }
 
 /// A reduction in brief.

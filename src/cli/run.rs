@@ -7,9 +7,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use stickslip::figure::draw_all;
+use stickslip::reduce::ReduceError;
 use stickslip::run::{Options, RunReport, Shard, kernel};
 use stickslip::store::manifest::Directory;
 use stickslip::store::storage::Disk;
@@ -22,6 +24,7 @@ Examples:
   stickslip run sweeps/fig3.toml
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
   stickslip run sweeps/fig3.toml --shard 2/8     the second of eight processes on one directory
+  stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
 Ctrl-C and SIGTERM keep what is done; the same command goes on from there.")]
 pub struct Arguments {
@@ -37,6 +40,9 @@ pub struct Arguments {
     /// Run one share of N, beside other processes that run the others
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
+    /// End within this time, such as 90s, 55m or 1h30m: start only what ends by then; reduction and figures come on top
+    #[arg(long, value_name = "TIME", value_parser = walltime)]
+    walltime: Option<Duration>,
     /// Run failed jobs again
     #[arg(long)]
     retry_failed: bool,
@@ -50,6 +56,23 @@ pub struct Arguments {
 
 fn threads(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number >= 1")
+}
+
+/// A time as numbers with units.
+fn walltime(text: &str) -> Result<Duration, String> {
+    let refused = || "must be a time with units d, h, m, s, such as 55m or 1h30m".to_owned();
+    let mut seconds = 0.0;
+    for chunk in text.split_inclusive(char::is_alphabetic) {
+        let unit =
+            chunk.chars().last().and_then(|unit| Some((unit, [86_400.0, 3600.0, 60.0, 1.0]["dhms".find(unit)?])));
+        let (unit, length) = unit.ok_or_else(refused)?;
+        let number: f64 = chunk.trim_end_matches(unit).parse().map_err(|_| refused())?;
+        if number < 0.0 {
+            return Err(refused());
+        }
+        seconds += number * length;
+    }
+    Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero()).ok_or_else(refused)
 }
 
 /// Version of [`Report`] as JSON.
@@ -79,6 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         stop: &STOP,
         retry_failed: arguments.retry_failed,
         shard: arguments.shard.unwrap_or_default(),
+        walltime: arguments.walltime,
     };
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let mut progress = Progress::new();
@@ -96,20 +120,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         output::pairs(&described(&report))?;
     }
     if report.stopped {
-        let left = output::count(report.jobs_left, "job");
-        output::tell(&format!("stopped with {left} left; finished parts are kept. The same command goes on."));
+        output::tell(&way_on(&report, arguments.walltime.is_some()));
         return Ok(Exit::Stopped);
     }
     if !arguments.no_reduce {
-        let directory = Directory::read(&Disk, &root)?;
-        let summary = reduce::reduce_directory(&directory)?;
-        let figures = draw_all(&Disk, directory.layout())?;
-        if !arguments.json {
-            output::pairs(&reduce::described(&summary, directory.layout()))?;
-            for path in figures {
-                output::print(&format!("figure  {}\n", path.display()))?;
-            }
-        }
+        reduce_and_draw(&root, arguments)?;
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
@@ -117,6 +132,43 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
+}
+
+/// Reduces and draws what is there: other shards may be at work still.
+fn reduce_and_draw(root: &Path, arguments: &Arguments) -> Result<()> {
+    let directory = Directory::read(&Disk, root)?;
+    let layout = directory.layout();
+    let summary = match reduce::reduce_directory(&directory) {
+        Err(error) if matches!(error.downcast_ref(), Some(ReduceError::NoJobs { .. })) => {
+            output::tell("no part is committed yet, so there is nothing to reduce");
+            return Ok(());
+        }
+        summary => summary?,
+    };
+    let figures = draw_all(&Disk, layout)?;
+    if !arguments.json {
+        output::pairs(&reduce::described(&summary, layout))?;
+        for path in figures {
+            output::print(&format!("figure  {}\n", path.display()))?;
+        }
+    }
+    if arguments.shard.is_some() { reduce::tell_missing(&directory) } else { Ok(()) }
+}
+
+/// What to do after a run that stopped early.
+fn way_on(report: &RunReport, has_walltime: bool) -> String {
+    let left = output::count(report.jobs_left, "job");
+    let way = match report.time_wanted {
+        Some(time) if report.jobs_run == 0 => {
+            let time = output::duration(time);
+            format!("No part fits into this time, the cheapest takes about {time}: give a longer --walltime.")
+        }
+        None if has_walltime && report.jobs_run == 0 => {
+            "No part ended in this time: give a longer --walltime.".to_owned()
+        }
+        _ => "The same command goes on.".to_owned(),
+    };
+    format!("stopped with {left} left; finished parts are kept. {way}")
 }
 
 fn described(report: &RunReport) -> Vec<(&'static str, String)> {
@@ -130,4 +182,19 @@ fn described(report: &RunReport) -> Vec<(&'static str, String)> {
         pairs.push(("wall time", output::duration(report.wall)));
     }
     pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walltimes_are_numbers_with_units() {
+        for (text, seconds) in [("90s", 90.0), ("55m", 3300.0), ("1h30m", 5400.0), ("0.5d", 43_200.0), ("1.5s", 1.5)] {
+            assert_eq!(walltime(text).unwrap().as_secs_f64(), seconds, "{text}");
+        }
+        for text in ["", "55", "m", "1h30", "-1h", "2h-1h", "0s", "nans", "infd", "1e300d", "5 m", "3w", "1m\u{e9}"] {
+            assert!(walltime(text).unwrap_err().contains("such as 55m"), "{text}");
+        }
+    }
 }

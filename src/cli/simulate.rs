@@ -47,6 +47,12 @@ pub struct Arguments {
     /// Slips discarded as start-up
     #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N", default_value_t = 5)]
     discard: u64,
+    /// Fail after so many contact events
+    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
+    max_events: Option<u64>,
+    /// Least breaks of a precursor [default: Ns]
+    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
+    precursor_size: Option<u64>,
     /// Method
     #[arg(long, value_enum, default_value_t = Method::EventDriven)]
     solver: Method,
@@ -197,11 +203,17 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
     }
     // With a time alone, slips do not end the run.
     let slips = arguments.slips.unwrap_or(if arguments.time.is_some() { 1_000_000_000 } else { 20 });
-    let max_time = arguments.time.as_ref().map_or_else(String::new, |time| format!("max_time = {time}\n"));
+    let optional =
+        |key: &str, value: Option<String>| value.map_or_else(String::new, |value| format!("{key} = {value}\n"));
+    let limits = [
+        optional("max_time", arguments.time.clone()),
+        optional("max_events", arguments.max_events.map(|events| events.to_string())),
+        optional("precursor_size", arguments.precursor_size.map(|size| size.to_string())),
+    ]
+    .concat();
     let solver = match (arguments.solver, &arguments.tolerance, &arguments.dt) {
         (Method::EventDriven, tolerance, None) => {
-            let tolerance = tolerance.as_ref().map_or_else(String::new, |value| format!("tolerance = {value}\n"));
-            format!("method = \"event-driven\"\n{tolerance}")
+            format!("method = \"event-driven\"\n{}", optional("tolerance", tolerance.clone()))
         }
         (Method::FixedStep, None, Some(dt)) => format!("method = \"fixed-step\"\ndt = {dt}\n"),
         (Method::FixedStep, None, None) => "method = \"fixed-step\"\ndt = 1e-6\n".to_owned(),
@@ -213,7 +225,7 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
         }
     };
     Ok(format!(
-        "name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\nslips = {slips}\ndiscard = {}\n{max_time}[solver]\n{solver}",
+        "name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\nslips = {slips}\ndiscard = {}\n{limits}[solver]\n{solver}",
         arguments.discard
     ))
 }

@@ -5,6 +5,7 @@ use super::output;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
+use stickslip::run::Failure;
 use stickslip::store::manifest::Directory;
 use stickslip::store::storage::Disk;
 
@@ -32,15 +33,25 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             (_, None) => format!("{} of CPU time predicted", output::duration(status.predicted_cost_missing)),
         };
         let running = if status.running.is_empty() { "nothing".to_owned() } else { status.running.join(", ") };
+        let kept = match status.jobs_kept {
+            0 => String::new(),
+            kept => format!(", {kept} of them kept of values that the sweep no longer has"),
+        };
         output::pairs(&[
             ("sweep", status.name.clone()),
-            ("jobs done", status.jobs_done.to_string()),
+            ("jobs done", format!("{}{kept}", status.jobs_done)),
             ("jobs failed", status.jobs_failed.to_string()),
             ("jobs missing", status.jobs_missing.to_string()),
             ("parts", format!("{} done, {} missing", status.parts_done, status.parts_missing)),
             ("running", running),
             ("time left", left),
         ])?;
+        for Failure { job_id, reason, command } in &status.failures {
+            output::print(&format!("failed  {job_id}: {reason}\n  alone: {command}\n"))?;
+        }
+        if status.jobs_failed > status.failures.len() as u64 {
+            output::print("failed  and more: see outcome and reason in tables/jobs\n")?;
+        }
     }
     Ok(if status.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
 }

@@ -2,8 +2,8 @@
 
 use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture, backbone, histograms, intervals};
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{HistogramBin, SetLabel, read_backbone, read_few_sets, read_histograms, read_points};
-use crate::store::commit::{Commit, create_folder};
+use crate::reduce::{HistogramBin, SetLabel, WRITER, read_backbone, read_few_sets, read_histograms, read_points};
+use crate::store::commit::{Commit, alone, create_folder};
 use crate::store::layout::Layout;
 use crate::store::storage::Storage;
 use std::path::PathBuf;
@@ -16,6 +16,7 @@ use std::path::PathBuf;
 /// # Errors
 /// When the reduced data are not there, are damaged, or a figure cannot be written.
 pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, FigureError> {
+    let _alone = alone(storage, layout, WRITER)?;
     let points = read_points(storage, layout)?;
     let mut pictures = Vec::new();
     if points.iter().any(|point| point.phase.is_some()) {
@@ -36,7 +37,7 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
 fn write(storage: &dyn Storage, layout: &Layout, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
     let folder = layout.figures();
     create_folder(storage, &folder)?;
-    let mut commit = Commit::begin(storage, &layout.staging("figures"))?;
+    let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
     let mut files = Vec::new();
     for picture in pictures {
         for (extension, bytes) in [("svg", picture.svg().into_bytes()), ("png", picture.png()?)] {

@@ -66,6 +66,23 @@ impl Disorder {
 
     /// The given life of a contact; `contact` counts through all blocks, `block · N_s + i`.
     pub fn draw(&mut self, contact: usize, generation: u32) -> Contact {
+        let [for_threshold, for_delay] = self.words(contact, generation);
+        let threshold = self.threshold(contact, generation, for_threshold);
+        Contact {
+            threshold,
+            stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
+            reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
+            delay: self.delay_from(for_delay),
+        }
+    }
+
+    /// The delay of [`Self::draw`] alone, in s.
+    pub fn delay(&mut self, contact: usize, generation: u32) -> f64 {
+        let [_, for_delay] = self.words(contact, generation);
+        self.delay_from(for_delay)
+    }
+
+    fn words(&mut self, contact: usize, generation: u32) -> [u64; 2] {
         let first = generation - generation % DRAWS_PER_REFILL;
         if self.buffered_from[contact] != first {
             self.seek(contact, first, 0);
@@ -75,14 +92,11 @@ impl Disorder {
             self.buffered_from[contact] = first;
         }
         let slot = 2 * (generation - first) as usize;
-        let [for_threshold, for_delay] = [self.buffered[contact][slot], self.buffered[contact][slot + 1]];
-        let threshold = self.threshold(contact, generation, for_threshold);
-        Contact {
-            threshold,
-            stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
-            reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
-            delay: -self.reattachment_time * libm::log(uniform(for_delay)),
-        }
+        [self.buffered[contact][slot], self.buffered[contact][slot + 1]]
+    }
+
+    fn delay_from(&self, word: u64) -> f64 {
+        -self.reattachment_time * libm::log(uniform(word))
     }
 
     fn threshold(&mut self, contact: usize, generation: u32, word: u64) -> f64 {

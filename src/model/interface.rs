@@ -238,29 +238,40 @@ impl Interface {
         self.attached_stiffness[slot] = 0.0;
         self.upper[slot] = f64::INFINITY;
         self.lower[slot] = f64::NEG_INFINITY;
-        let delay = self.disorder.draw(index, self.generation[slot] + 1).delay;
+        let delay = self.disorder.delay(index, self.generation[slot] + 1);
         self.reattachments.push(Due { time: time + delay, contact: index });
     }
 
     /// Takes the sums and nearest break positions of a block anew, in fixed lanes.
     fn gather(&mut self, block: usize) {
         let slots = block * self.stride..(block + 1) * self.stride;
-        let mut stiffness = [0.0; LANES];
-        let mut pull = [0.0; LANES];
-        let mut upper = [f64::INFINITY; LANES];
-        let mut lower = [f64::NEG_INFINITY; LANES];
-        for first in slots.step_by(LANES) {
+        let rows = self.attached_stiffness[slots.clone()]
+            .as_chunks::<LANES>()
+            .0
+            .iter()
+            .zip(self.anchor[slots.clone()].as_chunks::<LANES>().0)
+            .zip(self.upper[slots.clone()].as_chunks::<LANES>().0)
+            .zip(self.lower[slots].as_chunks::<LANES>().0);
+        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
+        let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        for (((attached, anchor), above), below) in rows {
             for lane in 0..LANES {
-                let slot = first + lane;
-                stiffness[lane] += self.attached_stiffness[slot];
-                pull[lane] += self.attached_stiffness[slot] * self.anchor[slot];
-                upper[lane] = if self.upper[slot] < upper[lane] { self.upper[slot] } else { upper[lane] };
-                lower[lane] = if self.lower[slot] > lower[lane] { self.lower[slot] } else { lower[lane] };
+                stiffness[lane] += attached[lane];
+                pull[lane] += attached[lane] * anchor[lane];
+                upper[lane] = if above[lane] < upper[lane] { above[lane] } else { upper[lane] };
+                lower[lane] = if below[lane] > lower[lane] { below[lane] } else { lower[lane] };
             }
         }
-        self.block_stiffness[block] = stiffness.iter().sum();
-        self.block_pull[block] = pull.iter().sum();
-        self.block_upper[block] = upper.into_iter().fold(f64::INFINITY, f64::min);
-        self.block_lower[block] = lower.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        self.block_stiffness[block] = across(stiffness, |a, b| a + b);
+        self.block_pull[block] = across(pull, |a, b| a + b);
+        self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
+        self.block_lower[block] = across(lower, |a, b| if a > b { a } else { b });
     }
+}
+
+/// Puts lanes together in pairs.
+#[inline(always)]
+fn across(l: [f64; LANES], together: impl Fn(f64, f64) -> f64) -> f64 {
+    let halves: [f64; LANES / 2] = std::array::from_fn(|i| together(l[i], l[i + LANES / 2]));
+    together(together(halves[0], halves[2]), together(halves[1], halves[3]))
 }

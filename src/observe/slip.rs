@@ -298,7 +298,7 @@ impl Observer for SlipObserver {
             active.least = force;
         }
         self.impulse += segment.impulse();
-        self.now = Peak { time: segment.end(), force: segment.force_after(segment.duration) };
+        self.now = Peak { time: segment.end(), force: segment.end_force() };
         if self.rupture.as_ref().is_some_and(|active| self.now.time - active.rupture.last_time > self.crossing_time) {
             self.finish_rupture();
         }

@@ -11,8 +11,8 @@ use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
 use super::set::{SetSlips, sets};
 use super::{PhaseLimits, SetJobs};
 use crate::model::{Symbol, Value};
-use crate::store::commit::{Commit, create_folder};
-use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter};
+use crate::store::commit::{Commit, alone, create_folder};
+use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
 use crate::store::layout::Layout;
 use crate::store::part::committed_files;
 use crate::store::storage::{Storage, StorageError};
@@ -24,6 +24,8 @@ use std::path::PathBuf;
 
 /// Slips whose intervals are held at once: 256 MB of doubles.
 const MOST_SLIPS: u64 = 1 << 25;
+/// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
+pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
 pub const SUMMARY_FORMAT: u32 = 1;
 
@@ -80,8 +82,11 @@ fn reduce_by(
     footer: &Footer,
     most_slips: u64,
 ) -> Result<ReductionSummary, ReduceError> {
-    let all_jobs = read_jobs(storage, layout)?;
-    let slip_files = committed_files(storage, layout, slips().name)?;
+    let _alone = alone(storage, layout, WRITER)?;
+    // Listed once: what other runs commit meanwhile is left out as a whole.
+    let job_files = files(storage, &layout.table(jobs().name))?;
+    let slip_files = committed_files(storage, layout, slips().name, &job_files)?;
+    let all_jobs = read_jobs(storage, layout, job_files)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
         format: SUMMARY_FORMAT,
@@ -95,7 +100,7 @@ fn reduce_by(
     };
 
     create_folder(storage, &layout.reduced())?;
-    let mut commit = Commit::begin(storage, &layout.staging("reduce"))?;
+    let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
     let (sets, histograms, backbone, points) = (sets(), histograms(), backbone(), points());
     let mut set_writer = TableWriter::create(storage, &stage(sets.name), sets, footer)?;
@@ -145,14 +150,13 @@ pub fn reduced_file(layout: &Layout, table: &str) -> PathBuf {
 }
 
 /// The sets of all jobs, in the order of their parameters.
-fn read_jobs(storage: &dyn Storage, layout: &Layout) -> Result<Vec<SetJobs>, ReduceError> {
-    let folder = layout.table(jobs().name);
+fn read_jobs(storage: &dyn Storage, layout: &Layout, files: Vec<PathBuf>) -> Result<Vec<SetJobs>, ReduceError> {
     let mut sets = BTreeMap::new();
-    for batch in Reader::of_folder(storage, &folder, None)? {
+    for batch in Reader::new(storage, files, None) {
         gather_jobs(&batch?, &mut sets)?;
     }
     if sets.is_empty() {
-        return Err(ReduceError::NoJobs { tables: folder });
+        return Err(ReduceError::NoJobs { tables: layout.table(jobs().name) });
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     sets.sort_by(by_parameters);
@@ -343,7 +347,7 @@ mod tests {
         let passes = reduce_by(&Disk, &layout, &Footer::default(), 1).unwrap();
         assert_eq!(passes, whole);
         assert!(reduced_bytes(&root) == bytes);
-        assert!(Disk.list(&layout.staging("reduce")).unwrap().is_empty());
+        assert!(Disk.list(&layout.staging(WRITER)).unwrap().is_empty());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::run::kernel::Kernel;
 use crate::run::log::{Entry, Log};
 use crate::run::survey::{Scope, Task};
+use crate::run::walltime::Walltime;
 use crate::run::{RunError, RunEvent, RunReport};
 use crate::solver::SimulationError;
 use crate::store::dataset::DatasetError;
@@ -47,6 +48,7 @@ struct OpenPart {
 pub(super) struct Collector<'a> {
     scope: Scope<'a>,
     staging: &'a Path,
+    walltime: &'a Walltime,
     log: &'a mut Log,
     report: &'a mut RunReport,
     progress: &'a mut dyn FnMut(RunEvent<'_>),
@@ -57,15 +59,16 @@ impl<'a> Collector<'a> {
     pub fn new(
         scope: Scope<'a>,
         staging: &'a Path,
+        walltime: &'a Walltime,
         log: &'a mut Log,
         report: &'a mut RunReport,
         progress: &'a mut dyn FnMut(RunEvent<'_>),
     ) -> Self {
-        Self { scope, staging, log, report, progress, open: HashMap::new() }
+        Self { scope, staging, walltime, log, report, progress, open: HashMap::new() }
     }
 
-    /// Runs all tasks of the scope, until they are done, the flag turns true, or something fails that is not a job. Tells
-    /// whether the flag did.
+    /// Runs the tasks of the scope, until they are done, the flag turns true, the time is over, or something fails that is
+    /// not a job. Tells whether all were run.
     pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, RunError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -74,7 +77,7 @@ impl<'a> Collector<'a> {
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let tasks = self.scope.tasks().take_while(|_| !interrupt.load(Ordering::Relaxed));
+        let tasks = self.scope.tasks(self.walltime).take_while(|_| !interrupt.load(Ordering::Relaxed));
         pool.in_place_scope(|workers| {
             workers.spawn(move |_| tasks.par_bridge().for_each(|task| work(task, kernel, interrupt, &sender)));
             let collected = self.collect(&receiver, stop, interrupt);
@@ -91,27 +94,39 @@ impl<'a> Collector<'a> {
         stop: &AtomicBool,
         interrupt: &AtomicBool,
     ) -> Result<bool, RunError> {
+        let mut is_told = false;
         loop {
-            if stop.load(Ordering::Relaxed) && !interrupt.swap(true, Ordering::Relaxed) {
+            let must_end = stop.load(Ordering::Relaxed) || self.walltime.is_over();
+            if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 (self.progress)(RunEvent::Stopping);
+            }
+            if !is_told && self.walltime.refused().is_some() {
+                is_told = true;
+                (self.progress)(RunEvent::OutOfTime);
             }
             match receiver.recv_timeout(STOP_POLL) {
                 Ok(Message::Ended { task, outcome, wall }) => self.take(&task, outcome, wall)?,
                 Ok(Message::Broken(error)) => return Err(error.into()),
                 Err(RecvTimeoutError::Timeout) => (),
-                Err(RecvTimeoutError::Disconnected) => return Ok(interrupt.load(Ordering::Relaxed)),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Ok(!interrupt.load(Ordering::Relaxed) && self.walltime.refused().is_none());
+                }
             }
         }
     }
 
     fn take(&mut self, task: &Task, outcome: Outcome, wall: f64) -> Result<(), RunError> {
-        let predicted_cost = task.part.jobs[task.position].cost;
+        let job = &task.part.jobs[task.position];
+        let predicted_cost = job.cost;
+        self.walltime.ended(predicted_cost, wall);
         match &outcome {
             Ok(result) => (self.progress)(RunEvent::JobDone { slips: result.slips.len(), predicted_cost, wall }),
             Err(reason) => {
                 let sweep = &self.scope.directory.sweeps()[task.part.epoch];
-                let job_id = part::label(sweep, &task.part, task.position).job_id;
-                (self.progress)(RunEvent::JobFailed { job_id: &job_id, reason, predicted_cost, wall });
+                let (job_id, command) = (sweep.job_id(&job.parameters).to_string(), sweep.command(job));
+                let failed = RunEvent::JobFailed { job_id: &job_id, reason, command: &command, predicted_cost, wall };
+                (self.progress)(failed);
+                self.log.write(Entry::Failed { job_id, reason: reason.clone(), command })?;
             }
         }
         let key = (task.part.epoch, task.part.index);
@@ -134,7 +149,9 @@ impl<'a> Collector<'a> {
     }
 
     fn commit(&mut self, whole: &OpenPart) -> Result<(), RunError> {
+        let begin = Instant::now();
         part::commit(self.scope.storage, self.scope.directory, self.staging, &whole.part, &whole.outcomes)?;
+        self.walltime.committed(begin.elapsed().as_secs_f64());
         let (name, jobs) = (part_name(&whole.part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
         let (predicted, measured) = (whole.predicted, whole.measured);

@@ -32,6 +32,15 @@ pub enum Entry {
         /// Their predicted CPU time, in s.
         predicted: f64,
     },
+    /// A job failed.
+    Failed {
+        /// Its id.
+        job_id: String,
+        /// Why.
+        reason: String,
+        /// The command that does the same.
+        command: String,
+    },
     /// A part is committed.
     Part {
         /// Name of the part.
@@ -74,13 +83,16 @@ pub struct Line {
     pub entry: Entry,
 }
 
-/// Name of this host, if it tells.
+/// What a host is called that does not tell its name.
+pub(super) const UNKNOWN_HOST: &str = "unknown";
+
+/// Name of this host, or "unknown".
 #[must_use]
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
     let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
-    name.unwrap_or_else(|| "unknown".to_owned())
+    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
 }
 
 fn now() -> f64 {
@@ -146,6 +158,21 @@ pub fn read(storage: &dyn Storage, layout: &Layout, mut visit: impl FnMut(Line))
         }
     }
     Ok(())
+}
+
+/// Measured over predicted cost of all parts that the logs of a directory tell of; `None` before the first.
+///
+/// # Errors
+/// When a log cannot be read.
+pub fn pace(storage: &dyn Storage, layout: &Layout) -> Result<Option<f64>, StorageError> {
+    let (mut predicted_so_far, mut measured_so_far) = (0.0, 0.0);
+    read(storage, layout, |line| {
+        if let Entry::Part { predicted, measured, .. } = line.entry {
+            predicted_so_far += predicted;
+            measured_so_far += measured;
+        }
+    })?;
+    Ok((predicted_so_far > 0.0).then(|| measured_so_far / predicted_so_far))
 }
 
 #[cfg(test)]

@@ -3,13 +3,15 @@
 //! ```text
 //! survey.rs  parts that are not there -> tasks, lazily
 //!            -> rayon -> kernel -> bounded channel ->
+//!            walltime.rs: those that end in time
 //! collect.rs on the calling thread: outcomes -> whole parts -> store::part::commit, and events for a display
 //! ```
 //!
 //! What is done is what is committed, so a run that was killed goes on by looking which part files are missing. Contract:
 //! the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a job in flight.
-//! upkeep.rs verifies, repairs and compacts while no shard runs.
+//! claim.rs keeps two processes from running the same shard; upkeep.rs verifies, repairs and compacts while no shard runs.
 
+mod claim;
 mod collect;
 mod kernel;
 mod log;
@@ -19,30 +21,29 @@ mod survey;
 #[cfg(test)]
 mod tests;
 mod upkeep;
+mod walltime;
 
 pub use kernel::{Kernel, kernel, limits};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
-pub use status::{Status, status};
+pub use status::{Failure, MOST_FAILURES, Status, status};
 pub use upkeep::{UpkeepError, compact, repair, verify};
 
+use crate::run::claim::{Claim, PATIENCE, clear_leftovers};
 use crate::run::collect::Collector;
 use crate::run::log::Log;
 use crate::run::survey::{Scope, Survey};
-use crate::store::commit::{clear, create_folder};
+use crate::run::walltime::Walltime;
+use crate::store::commit::{clear, settle};
 use crate::store::dataset::DatasetError;
 use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::storage::{Storage, StorageError, wait_for_lock};
+use crate::store::storage::{Storage, StorageError};
 use crate::sweep::Sweep;
 use serde::Serialize;
-use std::fs::File;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-
-/// How long to wait for a shard's lock: a look at the status holds it for an instant.
-const LONGEST_WAIT: Duration = Duration::from_millis(500);
 
 /// How to run.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +56,8 @@ pub struct Options<'a> {
     pub retry_failed: bool,
     /// The share of the parts to look after.
     pub shard: Shard,
+    /// Starts nothing that would not end within this time after the run's beginning, and ends by then.
+    pub walltime: Option<Duration>,
 }
 
 /// What happens during a run, for a display.
@@ -86,6 +89,8 @@ pub enum RunEvent<'a> {
         job_id: &'a str,
         /// Why.
         reason: &'a str,
+        /// The command that does the same, to look at it alone.
+        command: &'a str,
         /// Predicted CPU time, in s.
         predicted_cost: f64,
         /// Its wall time, in s.
@@ -100,8 +105,10 @@ pub enum RunEvent<'a> {
         /// Those that failed.
         failed: usize,
     },
-    /// The run was told to stop; jobs in flight end.
+    /// The run was told to stop, or its time is over; jobs in flight are interrupted.
     Stopping,
+    /// Not all parts would end in time; what is under way does.
+    OutOfTime,
     /// The run ends.
     Finished(&'a RunReport),
 }
@@ -117,8 +124,10 @@ pub struct RunReport {
     pub jobs_left: u64,
     /// Parts committed.
     pub parts_committed: u64,
-    /// Whether the run was stopped before all was done.
+    /// Whether the run was stopped, or its time did not suffice, before all was done.
     pub stopped: bool,
+    /// Predicted wall time of the cheapest part that was not started for want of time, in s.
+    pub time_wanted: Option<f64>,
     /// Predicted CPU time of the jobs run, in s.
     pub predicted_cost: f64,
     /// Sum of their wall times, in s.
@@ -179,32 +188,50 @@ pub fn run(
     if options.retry_failed {
         upkeep::withdraw_failed(storage, &directory)?;
     }
-    let _lock = lock(storage, &directory, options.shard)?;
+    let claim = Claim::take(storage, directory.layout(), &options.shard.writer(), PATIENCE)?
+        .ok_or_else(|| RunError::Locked { directory: root.to_owned(), shard: options.shard })?;
     upkeep::absent(storage, directory.layout())?;
-    // It may have been compacted before the lock was ours.
+    // It may have been compacted before the shard was ours.
     let directory = directory.with_compaction(storage)?;
+    claim.while_held(|| run_claimed(storage, &directory, begin, options, kernel, progress))
+}
+
+/// Runs a shard that no other process has.
+fn run_claimed(
+    storage: &dyn Storage,
+    directory: &Directory,
+    begin: Instant,
+    options: Options<'_>,
+    kernel: &Kernel<'_>,
+    progress: &mut dyn FnMut(RunEvent<'_>),
+) -> Result<RunReport, RunError> {
+    settle(storage, directory.layout())?;
     let staging = directory.layout().staging(&options.shard.writer());
     clear(storage, &staging)?;
-    let scope = Scope { storage, directory: &directory, shard: options.shard, retry_failed: options.retry_failed };
+    clear_leftovers(storage, directory.layout())?;
+    let scope = Scope { storage, directory, shard: options.shard, retry_failed: options.retry_failed };
     let survey = scope.survey()?;
     let mut report = expected(&survey, options.retry_failed);
     if report.jobs_left > 0 {
         let threads =
             options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
         let predicted_cost = survey.cost_missing + if options.retry_failed { survey.cost_failed } else { 0.0 };
+        let earlier_pace = log::pace(storage, directory.layout())?;
+        let walltime = Walltime::new(begin, options.walltime, threads, earlier_pace);
         let mut log = Log::create(storage, directory.layout())?;
         log.write(Entry::started(options.shard.to_string(), threads, report.jobs_left, predicted_cost))?;
         progress(RunEvent::Started { jobs: report.jobs_left, predicted_cost, jobs_there: survey.jobs_done, threads });
-        let mut collector = Collector::new(scope, &staging, &mut log, &mut report, progress);
+        let mut collector = Collector::new(scope, &staging, &walltime, &mut log, &mut report, progress);
         let ended = collector.run(threads, options.stop, kernel);
         report.wall = begin.elapsed().as_secs_f64();
-        let stopped = ended.inspect_err(|error| {
+        let all_run = ended.inspect_err(|error| {
             // The disk may be what failed: the first error counts.
             let _ = log.write(Entry::Error { error: error.to_string() });
         })?;
-        if !stopped {
+        if all_run {
             report.jobs_left = 0;
         }
+        report.time_wanted = walltime.refused();
         report.stopped = report.jobs_left > 0;
         log.write(Entry::Finished { stopped: report.stopped, wall: report.wall })?;
     }
@@ -216,12 +243,4 @@ pub fn run(
 fn expected(survey: &Survey, retry_failed: bool) -> RunReport {
     let again = if retry_failed { survey.jobs_failed } else { 0 };
     RunReport { jobs_failed: survey.jobs_failed, jobs_left: survey.jobs_missing + again, ..RunReport::default() }
-}
-
-/// Takes the lock of a shard, so that no other process runs the same one.
-fn lock(storage: &dyn Storage, directory: &Directory, shard: Shard) -> Result<File, RunError> {
-    let folder = directory.layout().locks();
-    create_folder(storage, &folder)?;
-    let held = wait_for_lock(storage, &folder.join(shard.writer()), LONGEST_WAIT)?;
-    held.ok_or_else(|| RunError::Locked { directory: directory.layout().root().to_owned(), shard })
 }

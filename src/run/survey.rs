@@ -1,6 +1,7 @@
 //! Surveys: which parts of a directory are done, and which of their jobs remain to be run.
 
 use crate::run::shard::Shard;
+use crate::run::walltime::Walltime;
 use crate::store::dataset::DatasetError;
 use crate::store::manifest::Directory;
 use crate::store::part::{failed_jobs, is_done};
@@ -27,6 +28,8 @@ pub(super) struct Survey {
     pub jobs_done: u64,
     pub jobs_failed: u64,
     pub jobs_missing: u64,
+    /// Of the jobs done, those that the sweep asked for last does not have.
+    pub jobs_kept: u64,
     /// Predicted CPU times, in s.
     pub cost_done: f64,
     pub cost_failed: f64,
@@ -47,19 +50,29 @@ pub(super) struct Task {
 impl<'a> Scope<'a> {
     fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
         let Self { directory, shard, .. } = self;
-        Plan::new(directory.sweeps()).parts().filter(move |part| shard.owns(part))
+        shard.parts(Plan::new(directory.sweeps()).parts())
     }
 
     /// Looks at every part. Parts that are missing and no longer asked for are left out.
     pub fn survey(self) -> Result<Survey, DatasetError> {
+        self.survey_with(|_, _| Ok(()))
+    }
+
+    /// The same, and visits each part that is done, with the positions of its failed jobs.
+    pub fn survey_with(
+        self,
+        mut visit: impl FnMut(&Part, &[usize]) -> Result<(), DatasetError>,
+    ) -> Result<Survey, DatasetError> {
         let mut survey = Survey::default();
         for part in self.parts() {
             if let Some(failed) = failed_jobs(self.storage, self.directory, &part)? {
                 survey.parts_done += 1;
                 survey.jobs_done += part.jobs.len() as u64;
                 survey.jobs_failed += failed.len() as u64;
+                survey.jobs_kept += self.directory.unwanted_jobs(&part);
                 survey.cost_done += part.cost;
                 survey.cost_failed += failed.iter().map(|&position| part.jobs[position].cost).sum::<f64>();
+                visit(&part, &failed)?;
             } else if self.directory.wants(&part) {
                 survey.parts_missing += 1;
                 survey.jobs_missing += part.jobs.len() as u64;
@@ -69,9 +82,14 @@ impl<'a> Scope<'a> {
         Ok(survey)
     }
 
-    /// The jobs to be run, in the order of the plan, looked up part by part.
-    pub fn tasks(self) -> impl Iterator<Item = Result<Task, DatasetError>> + Send + use<'a> {
+    /// The jobs to be run, in the order of the plan, looked up part by part; without the parts that would not end in time.
+    pub fn tasks(self, walltime: &'a Walltime) -> impl Iterator<Item = Result<Task, DatasetError>> + Send + use<'a> {
         self.parts().flat_map(move |part| match self.remaining(&part) {
+            Ok((positions, _))
+                if !positions.is_empty() && !walltime.admits(positions.iter().map(|&job| part.jobs[job].cost)) =>
+            {
+                Vec::new()
+            }
             Ok((positions, again)) => {
                 let (part, together) = (Arc::new(part), positions.len());
                 positions

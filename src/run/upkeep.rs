@@ -1,27 +1,30 @@
 //! Upkeep: verify, repair and compact a directory. What changes committed files happens while no shard runs.
 //!
-//! Upkeep takes a lock of its own and then looks that no shard holds its lock; a run takes its shard's lock and then looks
-//! that upkeep does not hold its own. So at least one of two that begin at once sees the other, and leaves.
+//! Upkeep makes a claim of its own and then looks that no shard is claimed; a run claims its shard and then looks that upkeep
+//! is not claimed. So at least one of two that begin at once sees the other, and leaves.
 
 #[cfg(test)]
 mod tests;
 
+use crate::run::claim::{Claim, PATIENCE, is_claimed};
 use crate::run::log::{self, Entry, Log};
-use crate::store::commit::create_folder;
 use crate::store::compact::{CompactError, Compacted, Without};
 use crate::store::layout::Layout;
 use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::storage::{Storage, StorageError, wait_for_lock};
+use crate::store::storage::{Storage, StorageError};
 use crate::store::verify::{Remedy, RepairError, Repaired, Verification};
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// Name of the lock.
-const LOCK: &str = "upkeep";
-/// How long to wait for it: runs that begin hold it for an instant.
+/// Name of the claim.
+const NAME: &str = "upkeep";
+/// What the names of the claims of shards begin with.
+const SHARD: &str = "shard-";
+/// How long to look for a claim to go: who looks at it holds its lock for an instant.
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
+/// How often to look.
+const POLL: Duration = Duration::from_millis(20);
 
 /// Why a directory cannot be taken care of.
 #[derive(Debug, thiserror::Error)]
@@ -39,12 +42,12 @@ pub enum UpkeepError {
     #[error(transparent)]
     Compact(#[from] CompactError),
     /// A shard runs.
-    #[error("{}: is being run ({lock}); wait for it or stop it, then try again", .directory.display())]
+    #[error("{}: is being run ({shard}); wait for it or stop it, then try again", .directory.display())]
     Running {
         /// The directory.
         directory: PathBuf,
-        /// Name of the lock that is held.
-        lock: String,
+        /// Name of the claim.
+        shard: String,
     },
     /// Another process takes care of it.
     #[error("{}: is being repaired or compacted by another process; try again when it has ended", .0.display())]
@@ -76,10 +79,11 @@ pub fn repair(storage: &dyn Storage, root: &Path) -> Result<Repaired, UpkeepErro
     let layout = Layout::new(root);
     // Tells what is no results directory before anything is written.
     verify(storage, root)?;
-    let _alone = alone(storage, &layout)?;
-    let repaired = crate::store::verify::repair(storage, root, &committed(storage, &layout)?)?;
-    withdrawn(storage, &layout, &repaired.parts)?;
-    Ok(repaired)
+    alone(storage, &layout, || -> Result<_, UpkeepError> {
+        let repaired = crate::store::verify::repair(storage, root, &committed(storage, &layout)?)?;
+        withdrawn(storage, &layout, &repaired.parts)?;
+        Ok(repaired)
+    })
 }
 
 /// Compacts a directory: see [`crate::store::compact::compact`].
@@ -88,13 +92,14 @@ pub fn repair(storage: &dyn Storage, root: &Path) -> Result<Repaired, UpkeepErro
 /// When a shard runs, something is damaged, or the file system cannot do it.
 pub fn compact(storage: &dyn Storage, root: &Path) -> Result<Compacted, UpkeepError> {
     let layout = Directory::read(storage, root)?.layout().clone();
-    let _alone = alone(storage, &layout)?;
-    let problems = verify(storage, root)?.problems;
-    if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
-        return Err(UpkeepError::Damaged { path: problem.path, problem: problem.problem });
-    }
-    let directory = Directory::read(storage, root)?;
-    Ok(crate::store::compact::compact(storage, &directory, &Without::default(), None)?)
+    alone(storage, &layout, || {
+        let problems = verify(storage, root)?.problems;
+        if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
+            return Err(UpkeepError::Damaged { path: problem.path, problem: problem.problem });
+        }
+        let directory = Directory::read(storage, root)?;
+        Ok(crate::store::compact::compact(storage, &directory, &Without::default(), None)?)
+    })
 }
 
 /// Takes parts with failed jobs out of the compacted files, so that they are run again.
@@ -108,12 +113,13 @@ pub(super) fn withdraw_failed(storage: &dyn Storage, directory: &Directory) -> R
         return Ok(());
     }
     let layout = directory.layout();
-    let _alone = alone(storage, layout)?;
-    let directory = directory.clone().with_compaction(storage)?;
-    let without = Without { parts: failed(&directory), ..Without::default() };
-    withdrawn(storage, layout, &without.parts)?;
-    crate::store::compact::compact(storage, &directory, &without, None)?;
-    Ok(())
+    alone(storage, layout, || -> Result<_, UpkeepError> {
+        let directory = directory.clone().with_compaction(storage)?;
+        let without = Without { parts: failed(&directory), ..Without::default() };
+        withdrawn(storage, layout, &without.parts)?;
+        crate::store::compact::compact(storage, &directory, &without, None)?;
+        Ok(())
+    })
 }
 
 /// Makes sure that nobody takes care of a directory whose shard is ours.
@@ -121,23 +127,35 @@ pub(super) fn withdraw_failed(storage: &dyn Storage, directory: &Directory) -> R
 /// # Errors
 /// When somebody does.
 pub(super) fn absent(storage: &dyn Storage, layout: &Layout) -> Result<(), UpkeepError> {
-    let held = wait_for_lock(storage, &layout.locks().join(LOCK), LONGEST_WAIT)?;
-    held.map(|_| ()).ok_or_else(|| UpkeepError::Busy(layout.root().to_owned()))
+    if stays_claimed(storage, layout, NAME)? { Err(UpkeepError::Busy(layout.root().to_owned())) } else { Ok(()) }
 }
 
-/// Keeps runs out until it is dropped.
-fn alone(storage: &dyn Storage, layout: &Layout) -> Result<File, UpkeepError> {
-    let folder = layout.locks();
-    create_folder(storage, &folder)?;
-    let ours = wait_for_lock(storage, &folder.join(LOCK), LONGEST_WAIT)?
-        .ok_or_else(|| UpkeepError::Busy(layout.root().to_owned()))?;
-    for name in storage.list(&folder).map_err(StorageError::at("list", &folder))? {
-        if name != LOCK && wait_for_lock(storage, &folder.join(&name), LONGEST_WAIT)?.is_none() {
-            let (directory, lock) = (layout.root().to_owned(), name.to_string_lossy().into_owned());
-            return Err(UpkeepError::Running { directory, lock });
+/// Does something while no shard runs.
+fn alone<T, E>(storage: &dyn Storage, layout: &Layout, body: impl FnOnce() -> Result<T, E>) -> Result<T, UpkeepError>
+where
+    UpkeepError: From<E>,
+{
+    let claim = Claim::take(storage, layout, NAME, PATIENCE)?;
+    let claim = claim.ok_or_else(|| UpkeepError::Busy(layout.root().to_owned()))?;
+    let locks = layout.locks();
+    for name in storage.list(&locks).map_err(StorageError::at("list", &locks))? {
+        let shard = name.to_string_lossy().into_owned();
+        if shard.starts_with(SHARD) && stays_claimed(storage, layout, &shard)? {
+            return Err(UpkeepError::Running { directory: layout.root().to_owned(), shard });
         }
     }
-    Ok(ours)
+    Ok(claim.while_held(body)?)
+}
+
+fn stays_claimed(storage: &dyn Storage, layout: &Layout, name: &str) -> Result<bool, StorageError> {
+    let begin = Instant::now();
+    while is_claimed(storage, layout, name)? {
+        if begin.elapsed() >= LONGEST_WAIT {
+            return Ok(true);
+        }
+        std::thread::sleep(POLL);
+    }
+    Ok(false)
 }
 
 /// Names of the parts that were committed, by the logs, and not taken away since.

@@ -113,11 +113,9 @@ pub(super) fn run(
         }
         let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
         let coefficients = hermite(force, next_force, time_step * force_rate, time_step * next_rate);
-        observer.advance(&Segment {
-            start,
-            duration: time_step,
-            path: ForcePath::Polynomial { coefficients: &coefficients, scale: time_step },
-        });
+        let (ends, scale) = ([force, next_force], time_step);
+        let path = ForcePath::Polynomial { coefficients: &coefficients, first: 0.0, scale, ends };
+        observer.advance(&Segment { start, duration: time_step, path });
         (force, force_rate) = (next_force, next_rate);
         summary.end_time = time;
 

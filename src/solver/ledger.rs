@@ -178,13 +178,11 @@ mod tests {
     fn work_along_a_polynomial_is_that_of_its_halves() {
         let (drive, quadrature) = modulated();
         let coefficients = [100.0, 20.0, -7.0, 3.0];
-        let path = ForcePath::Polynomial { coefficients: &coefficients, scale: 0.01 };
-        let whole = work(&drive, &quadrature, &Segment { start: 0.2, duration: 0.01, path });
+        let whole = work(&drive, &quadrature, &Segment::polynomial(0.2, 0.01, &coefficients));
         let halved = [50.0 * 2.0, 20.0 / 2.0, -7.0 / 4.0, 3.0 / 8.0];
         let moved = [100.0 + 10.0 - 1.75 + 0.375, 10.0 - 3.5 + 1.125, -1.75 + 1.125, 0.375];
         let half = |start: f64, coefficients: &[f64]| {
-            let path = ForcePath::Polynomial { coefficients, scale: 0.005 };
-            work(&drive, &quadrature, &Segment { start, duration: 0.005, path })
+            work(&drive, &quadrature, &Segment::polynomial(start, 0.005, coefficients))
         };
         let parts = half(0.2, &halved) + half(0.205, &moved);
         assert!((whole - parts).abs() < 1e-13 * whole.abs(), "{whole} against {parts}");

@@ -1,8 +1,8 @@
-//! Polynomials on [0, end], given by their coefficients: values, and extremes that no wiggle escapes.
+//! Polynomials on [0, 1], given by their coefficients: values, and extremes that no wiggle escapes.
 //!
 //! Method: `Σ_{p>=1} |c_p| w^p` bounds the excursion from the middle of an interval of half-width w. An interval where
 //! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most one,
-//! found by bisection; any other is halved.
+//! found by Newton's method; any other is halved.
 
 /// Largest number of coefficients that [`maximum`] takes.
 pub(crate) const MOST_COEFFICIENTS: usize = 33;
@@ -10,48 +10,105 @@ pub(crate) const MOST_COEFFICIENTS: usize = 33;
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
 
-/// `Σ c_p s^p`.
+/// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
+const QUADRATIC: f64 = 1e-9;
+
+/// 1/p; 0 for p = 0.
+pub(crate) const INVERSE: [f64; MOST_COEFFICIENTS] = {
+    let mut inverse = [0.0; MOST_COEFFICIENTS];
+    let mut p = 1;
+    while p < MOST_COEFFICIENTS {
+        inverse[p] = 1.0 / p as f64;
+        p += 1;
+    }
+    inverse
+};
+
+/// `Σ c_p s^p`. Even and odd orders are summed side by side, since each sum waits for its last term.
 pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, c| sum * s + c)
+    let square = s * s;
+    let pairs = coefficients.chunks_exact(2);
+    let last = pairs.remainder().first().copied().unwrap_or(0.0);
+    let (even, odd) =
+        pairs.rev().fold((last, 0.0), |(even, odd), pair| (even * square + pair[0], odd * square + pair[1]));
+    even + s * odd
 }
 
 /// `Σ c_p s^p` and its derivative.
 pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
-    coefficients.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * s + c, slope * s + value))
-}
-
-/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s.
-pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
-    let terms = coefficients.iter().enumerate().rev();
-    s * terms.fold(0.0, |sum, (p, c)| sum * s + c / (p + 1) as f64)
-}
-
-/// Where the polynomial is largest on [0, `end`], and its value there.
-pub(crate) fn maximum(coefficients: &[f64], end: f64) -> (f64, f64) {
-    let order = coefficients.len() - 1;
-    let mut derivative = [0.0; MOST_COEFFICIENTS];
-    for p in 1..=order {
-        derivative[p - 1] = p as f64 * coefficients[p];
+    let square = s * s;
+    let pairs = coefficients.chunks_exact(2);
+    let last = pairs.remainder().first().copied().unwrap_or(0.0);
+    let (mut even, mut odd, mut even_slope, mut odd_slope) = (last, 0.0, 0.0, 0.0);
+    for pair in pairs.rev() {
+        (even_slope, odd_slope) = (even_slope * square + even, odd_slope * square + odd);
+        (even, odd) = (even * square + pair[0], odd * square + pair[1]);
     }
-    let derivative = &derivative[..order.max(1)];
-    let mut best = (0.0, coefficients[0]);
+    // Slopes of the sums are by s².
+    (even + s * odd, odd + 2.0 * s * (even_slope + s * odd_slope))
+}
+
+/// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1].
+pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
+    let (mut sum, mut of_sums, mut of_those) = (0.0, 0.0, 0.0);
+    for c in coefficients.iter().skip(2).rev() {
+        sum += c.abs();
+        of_sums += sum;
+        of_those += of_sums;
+    }
+    2.0 * of_those
+}
+
+/// The first three coefficients in the variable s - `centre`.
+pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
+    coefficients
+        .iter()
+        .rev()
+        .fold([0.0; 3], |[value, slope, bend], c| [value * centre + c, slope * centre + value, bend * centre + slope])
+}
+
+/// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value and to
+/// the slope.
+pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
+    let (mut strays, mut slope_varies) = (0.0, 0.0);
+    for c in coefficients.iter().skip(2).rev() {
+        strays += c.abs();
+        slope_varies += strays;
+    }
+    (strays, slope_varies + strays)
+}
+
+/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s. Takes one coefficient less than [`MOST_COEFFICIENTS`].
+pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
+    let square = s * s;
+    let mut sums = [0.0, 0.0];
+    let pairs = coefficients.chunks_exact(2).zip(INVERSE[1..].chunks_exact(2));
+    if let [last] = coefficients.chunks_exact(2).remainder() {
+        sums[0] = last / coefficients.len() as f64;
+    }
+    for (pair, inverse) in pairs.rev() {
+        sums = [sums[0] * square + pair[0] * inverse[0], sums[1] * square + pair[1] * inverse[1]];
+    }
+    s * (sums[0] + s * sums[1])
+}
+
+/// Where the polynomial is largest on [`first`, `last`], and its value there.
+pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64) {
+    let mut best = (first, value(coefficients, first));
     let mut offer = |s: f64| {
         let candidate = value(coefficients, s);
         if candidate > best.1 {
             best = (s, candidate);
         }
     };
-    offer(end);
-    if excursion(derivative, end) >= derivative[0].abs() {
-        for_each_root(derivative, 0.0, end, DEEPEST, &mut offer);
+    offer(last);
+    let order = coefficients.len() - 1;
+    let mut derivative = [0.0; MOST_COEFFICIENTS];
+    for p in 1..=order {
+        derivative[p - 1] = p as f64 * coefficients[p];
     }
+    for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, &mut offer);
     best
-}
-
-/// `Σ_{p>=1} |c_p| w^p`: how far the value strays from c_0 within w.
-pub(crate) fn excursion(coefficients: &[f64], width: f64) -> f64 {
-    let terms = coefficients[1..].iter().rev();
-    width * terms.fold(0.0, |sum, c| sum * width + c.abs())
 }
 
 /// The same polynomial in the variable s - `centre`.
@@ -68,19 +125,21 @@ pub(crate) fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIE
 
 fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &mut impl FnMut(f64)) {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let about = shifted(coefficients, middle);
-    let about = &about[..coefficients.len()];
-    if about[0].abs() > excursion(about, half) {
+    // In the variable r from -1 to 1.
+    let mut about = shifted(coefficients, middle);
+    let about = &mut about[..coefficients.len()];
+    let mut power = 1.0;
+    for coefficient in about.iter_mut() {
+        *coefficient *= power;
+        power *= half;
+    }
+    let (strays, slope_varies) = beyond_linear(about);
+    let slope = about.get(1).map_or(0.0, |c| c.abs());
+    if about[0].abs() > slope + strays {
         return;
     }
-    let (mut slope_varies, mut power) = (0.0, 1.0);
-    for (p, c) in about.iter().enumerate().skip(2) {
-        power *= half;
-        slope_varies += p as f64 * c.abs() * power;
-    }
-    let is_monotone = about.len() < 3 || about[1].abs() > slope_varies;
-    if is_monotone {
-        if let Some(root) = bisect(coefficients, low, high) {
+    if about.len() < 3 || slope > slope_varies {
+        if let Some(root) = root_between(coefficients, low, high) {
             found(root);
         }
     } else if depth == 0 {
@@ -91,17 +150,41 @@ fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &
     }
 }
 
-fn bisect(coefficients: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
+/// The root of a polynomial that is monotone on [low, high], if it has one there.
+fn root_between(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
     let rises = value(coefficients, high) > 0.0;
     if (value(coefficients, low) > 0.0) == rises {
         return None;
     }
+    let sign = if rises { 1.0 } else { -1.0 };
+    Some(safeguarded_newton(low, high, 0.5 * (low + high), |s| {
+        let (value, slope) = value_and_slope(coefficients, s);
+        (sign * value, sign * slope)
+    }))
+}
+
+/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
+/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
+/// the bracket.
+pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
     loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return Some(middle);
+        let (height, slope) = function(s);
+        if height >= 0.0 {
+            high = s;
+        } else {
+            low = s;
         }
-        if (value(coefficients, middle) > 0.0) == rises { high = middle } else { low = middle }
+        let newton = s - height / slope;
+        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs()) {
+            return newton;
+        }
+        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if next <= low || next >= high {
+            return next;
+        }
+        s = next;
     }
 }
 
@@ -114,20 +197,29 @@ mod tests {
     fn a_maximum_between_ends_that_both_fall_is_found() {
         // A narrow bump inside the interval, of which the ends show nothing.
         let coefficients = [0.0, -0.1, 0.0, 0.0, 16.0 * 0.5, -40.0 * 0.5, 24.5 * 0.5];
-        let (at, most) = maximum(&coefficients, 1.0);
+        let (at, most) = maximum(&coefficients, 0.0, 1.0);
         let sampled = (0..=100_000).map(|i| value(&coefficients, f64::from(i) * 1e-5)).fold(f64::MIN, f64::max);
         assert!((most - sampled).abs() < 1e-9, "{most} at {at}, sampled {sampled}");
+    }
+
+    #[test]
+    fn newton_does_not_go_to_and_fro_between_the_ends() {
+        // The arc tangent sends 1.39 to -1.39 and back.
+        let swing = 1.391_745_200_270_735;
+        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
+        assert!(root.abs() < 1e-9, "{root}");
     }
 
     proptest! {
         #[test]
         fn no_sample_lies_above_the_maximum(
-            coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), end in 0.01_f64..1.0
+            coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), first in 0.0_f64..0.9, length in 0.01_f64..0.1
         ) {
-            let (at, most) = maximum(&coefficients, end);
-            prop_assert!((0.0..=end).contains(&at));
+            let last = first + length;
+            let (at, most) = maximum(&coefficients, first, last);
+            prop_assert!((first..=last).contains(&at));
             for i in 0..=500 {
-                prop_assert!(value(&coefficients, end * f64::from(i) / 500.0) <= most + 1e-13);
+                prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= most + 1e-13);
             }
         }
     }

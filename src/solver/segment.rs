@@ -6,12 +6,16 @@ use std::f64::consts::{PI, TAU};
 /// How F_S runs along a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum ForcePath<'a> {
-    /// `Σ c_p s^p` newtons, with s = (time since the start)/`scale`.
+    /// `Σ c_p s^p` newtons, with s = `first` + (time since the start)/`scale`. s lies in [0, 1].
     Polynomial {
         /// Coefficients c_p, in N.
         coefficients: &'a [f64],
+        /// Where the segment starts.
+        first: f64,
         /// Time that s = 1 stands for, in s.
         scale: f64,
+        /// The shear force at both ends of the segment, in N.
+        ends: [f64; 2],
     },
     /// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ since the start.
     Harmonic {
@@ -39,7 +43,23 @@ pub struct Segment<'a> {
     pub path: ForcePath<'a>,
 }
 
+impl<'a> Segment<'a> {
+    /// A segment along a polynomial from s = 0, with s = 1 after `duration` s.
+    pub fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
+        let ends = [0.0, 1.0].map(|s| polynomial::value(coefficients, s));
+        Self { start, duration, path: ForcePath::Polynomial { coefficients, first: 0.0, scale: duration, ends } }
+    }
+}
+
 impl Segment<'_> {
+    /// F_S at its end, in N.
+    pub fn end_force(&self) -> f64 {
+        match self.path {
+            ForcePath::Polynomial { ends: [_, end], .. } => end,
+            ForcePath::Harmonic { .. } => self.force_after(self.duration),
+        }
+    }
+
     /// Its last instant, in s.
     pub fn end(&self) -> f64 {
         self.start + self.duration
@@ -48,7 +68,9 @@ impl Segment<'_> {
     /// F_S in N, at a time in s after the start.
     pub fn force_after(&self, elapsed: f64) -> f64 {
         match self.path {
-            ForcePath::Polynomial { coefficients, scale } => polynomial::value(coefficients, elapsed / scale),
+            ForcePath::Polynomial { coefficients, first, scale, .. } => {
+                polynomial::value(coefficients, first + elapsed / scale)
+            }
             ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
                 let ramp = start + rate * elapsed;
                 if amplitude == 0.0 {
@@ -75,8 +97,9 @@ impl Segment<'_> {
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial { coefficients, scale } => {
-                scale * polynomial::integral(coefficients, self.duration / scale)
+            ForcePath::Polynomial { coefficients, first, scale, .. } => {
+                let until = |s: f64| if s > 0.0 { polynomial::integral(coefficients, s) } else { 0.0 };
+                scale * (until(first + self.duration / scale) - until(first))
             }
             ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
                 let ramp = self.duration * (start + 0.5 * rate * self.duration);
@@ -93,17 +116,28 @@ impl Segment<'_> {
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial { coefficients, scale } => {
-                let stray: f64 = coefficients[1..].iter().map(|c| c.abs()).sum();
-                if self.duration <= scale && sign * coefficients[0] + stray <= floor {
+            ForcePath::Polynomial { coefficients, first, scale, ends } => {
+                let [at_first, at_last] = ends.map(|force| sign * force);
+                let last = first + self.duration / scale;
+                let (s, extreme) = if at_last > at_first { (last, at_last) } else { (first, at_first) };
+                // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
+                let (bend, width) = (polynomial::second_derivative_bound(coefficients), last - first);
+                if extreme + 0.125 * bend * width * width <= floor {
                     return None;
                 }
-                let mut signed = [0.0; polynomial::MOST_COEFFICIENTS];
-                for (s, c) in signed.iter_mut().zip(coefficients) {
-                    *s = sign * c;
-                }
-                let (s, extreme) = polynomial::maximum(&signed[..coefficients.len()], self.duration / scale);
-                (s * scale, extreme)
+                let (_, slope_varies) = polynomial::beyond_linear(coefficients);
+                let slope = coefficients.get(1).map_or(0.0, |c| c.abs());
+                let is_monotone = slope >= slope_varies || (at_last - at_first).abs() >= bend * width * width;
+                let (s, extreme) = if is_monotone {
+                    (s, extreme)
+                } else {
+                    let mut signed = [0.0; polynomial::MOST_COEFFICIENTS];
+                    for (s, c) in signed.iter_mut().zip(coefficients) {
+                        *s = sign * c;
+                    }
+                    polynomial::maximum(&signed[..coefficients.len()], first, last)
+                };
+                ((s - first) * scale, extreme)
             }
             ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
                 let turns = harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);

@@ -22,7 +22,9 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::io;
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -35,6 +37,8 @@ const GROUP_ROWS: usize = 1 << 17;
 const BATCH_ROWS: usize = 1 << 14;
 /// zstd's level: higher ones gain little on random doubles.
 const ZSTD_LEVEL: i32 = 3;
+/// What the text of an error of the operating system holds.
+const OS_ERROR: &str = "(os error ";
 
 /// A table file that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -314,9 +318,24 @@ pub fn files(storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, Datas
 /// When the file cannot be read or is damaged.
 pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
     let file = storage.open(path).map_err(StorageError::at("read", path))?;
-    let metadata = ParquetMetaDataReader::new().parse_and_finish(&file).map_err(DatasetError::damaged(path))?;
+    let metadata = decode(path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
+}
+
+/// Decodes bytes of a file. A disk that does not read says nothing about the file, so its errors are no damage; what panics
+/// the decoder, as some damaged files do, is.
+fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result<T, E>) -> Result<T, DatasetError> {
+    let problem = match catch_unwind(AssertUnwindSafe(decoder)) {
+        Ok(Ok(decoded)) => return Ok(decoded),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "its content makes no sense".to_owned(),
+    };
+    // Of the operating system's errors the decoder keeps the text alone.
+    if problem.contains(OS_ERROR) {
+        return Err(StorageError::at("read", path)(io::Error::other(problem)).into());
+    }
+    Err(DatasetError::damaged(path)(problem))
 }
 
 /// Reads the rows of files, one batch after the other, holding one of them; an error ends it. Each file is held against its
@@ -351,21 +370,20 @@ impl<'a> Reader<'a> {
     fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
         seal::check(self.storage, path)?;
         let file = self.storage.open(path).map_err(StorageError::at("read", path))?;
-        let built = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|builder| {
-            let mut builder = builder.with_batch_size(BATCH_ROWS);
+        decode(path, || {
+            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
             if let Some(columns) = self.columns {
                 let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
                 builder = builder.with_projection(mask);
             }
             builder.build()
-        });
-        built.map_err(DatasetError::damaged(path))
+        })
     }
 
     fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
         loop {
             if let Some((path, reader)) = &mut self.current {
-                match reader.next().transpose().map_err(DatasetError::damaged(path))? {
+                match decode(path, || reader.next().transpose())? {
                     Some(rows) => {
                         return Ok(Some(Batch { path: Arc::clone(path), rows }));
                     }

@@ -13,6 +13,7 @@
 //! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
 //! folders: a stray file of any name there breaks some reader.
 
+use crate::store::tables;
 use crate::sweep::Part;
 use std::path::{Path, PathBuf};
 
@@ -72,6 +73,14 @@ impl Layout {
     #[must_use]
     pub fn run(&self) -> PathBuf {
         self.root.join(RUN)
+    }
+
+    /// The folders in which names are results.
+    #[must_use]
+    pub fn result_folders(&self) -> Vec<PathBuf> {
+        let tables = [tables::slips().name, tables::precursors().name, tables::jobs().name];
+        let folders = [self.root.clone(), self.run(), self.root.join(TABLES)];
+        folders.into_iter().chain(tables.map(|table| self.table(table))).collect()
     }
 
     /// The manifest.

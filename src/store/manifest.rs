@@ -10,9 +10,9 @@ use crate::store::compaction::Compaction;
 use crate::store::dataset::{DatasetError, PROGRAM};
 use crate::store::layout::{Layout, RUN, RUN_FOLDERS};
 use crate::store::seal;
-use crate::store::storage::{Storage, StorageError, wait_for_lock};
+use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
 use crate::store::tables;
-use crate::sweep::{PLAN_VERSION, Part, Sweep, SweepError};
+use crate::sweep::{Job, PLAN_VERSION, Part, Sweep, SweepError};
 use arrow_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -175,8 +175,10 @@ impl Directory {
         }
         create_folder(storage, &layout.locks())?;
         let lock = layout.locks().join(WRITER);
-        let _held =
-            wait_for_lock(storage, &lock, LONGEST_WAIT)?.ok_or_else(|| DirectoryError::Busy(root.to_owned()))?;
+        let lock = wait_for_lock(storage, &lock, LONGEST_WAIT)?;
+        if matches!(lock, Lock::Taken) {
+            return Err(DirectoryError::Busy(root.to_owned()));
+        }
         // Another run may have written the manifest before the lock was ours.
         match Self::compare(storage, &layout, sweep)? {
             Opened::Ready(directory) => directory.with_compaction(storage),
@@ -268,6 +270,14 @@ impl Directory {
     pub fn wants(&self, part: &Part) -> bool {
         let current = &self.sweeps[self.current];
         part.epoch == self.current || part.jobs.iter().any(|job| current.contains(&job.parameters))
+    }
+
+    /// How many jobs of a part are not of the sweep that was asked for last.
+    #[must_use]
+    pub fn unwanted_jobs(&self, part: &Part) -> u64 {
+        let current = &self.sweeps[self.current];
+        let is_wanted = |job: &&Job| part.epoch == self.current || current.contains(&job.parameters);
+        (part.jobs.len() - part.jobs.iter().filter(is_wanted).count()) as u64
     }
 
     fn compare(storage: &dyn Storage, layout: &Layout, sweep: &Sweep) -> Result<Opened, DirectoryError> {

@@ -13,7 +13,6 @@ use crate::store::tables::{self, FAILED, JobLabel, JobResult, JobRow, PrecursorR
 use crate::sweep::{Part, Sweep};
 use arrow_array::Array;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -90,16 +89,18 @@ pub fn is_done(storage: &dyn Storage, directory: &Directory, part: &Part) -> Res
     storage.exists(&path).map_err(StorageError::at("look up", &path))
 }
 
-/// Files of a table that count: compacted ones, and those of parts that are done. A run killed in between leaves the slips
-/// of a part without its jobs.
+/// Files of a table that count beside these of `jobs`: compacted ones, and those of parts that are done. A run killed in
+/// between leaves the slips of a part without its jobs.
 ///
 /// # Errors
 /// As [`files`].
-pub fn committed_files(storage: &dyn Storage, layout: &Layout, table: &str) -> Result<Vec<PathBuf>, DatasetError> {
-    let done: HashSet<_> = files(storage, &layout.table(tables::jobs().name))?
-        .into_iter()
-        .filter_map(|path| path.file_name().map(OsStr::to_owned))
-        .collect();
+pub fn committed_files(
+    storage: &dyn Storage,
+    layout: &Layout,
+    table: &str,
+    jobs: &[PathBuf],
+) -> Result<Vec<PathBuf>, DatasetError> {
+    let done: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
     let counts = |path: &PathBuf| {
         path.file_name().is_some_and(|name| done.contains(name) || name.to_str().is_some_and(is_compacted))
     };

@@ -41,8 +41,18 @@ pub trait Storage: Sync {
     fn remove_folder(&self, folder: &Path) -> io::Result<()>;
     /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
     fn exchange(&self, one: &Path, other: &Path) -> io::Result<()>;
-    /// Locks a file, created if needed, until the handle is dropped or the process ends. `None`: another holds it.
-    fn lock(&self, file: &Path) -> io::Result<Option<File>>;
+    /// Tries to lock a file, created if needed.
+    fn lock(&self, file: &Path) -> io::Result<Lock>;
+}
+
+/// What trying for a lock says.
+pub enum Lock {
+    /// It is ours, until this is dropped or the process ends.
+    Ours(Box<dyn Send + Sync>),
+    /// Another process holds it.
+    Taken,
+    /// The file system has no locks.
+    Unknown,
 }
 
 /// A file operation that failed.
@@ -64,16 +74,16 @@ impl StorageError {
     }
 }
 
-/// Takes a lock as soon as it is free; `None` if it was not after the longest wait.
+/// Tries for a lock until it is free or the longest wait is over.
 ///
 /// # Errors
-/// When the file cannot be locked at all.
-pub fn wait_for_lock(storage: &dyn Storage, file: &Path, longest_wait: Duration) -> Result<Option<File>, StorageError> {
+/// When the file cannot be opened or locked.
+pub fn wait_for_lock(storage: &dyn Storage, file: &Path, longest_wait: Duration) -> Result<Lock, StorageError> {
     let begin = Instant::now();
     loop {
-        let held = storage.lock(file).map_err(StorageError::at("lock", file))?;
-        if held.is_some() || begin.elapsed() >= longest_wait {
-            return Ok(held);
+        let lock = storage.lock(file).map_err(StorageError::at("lock", file))?;
+        if !matches!(lock, Lock::Taken) || begin.elapsed() >= longest_wait {
+            return Ok(lock);
         }
         std::thread::sleep(LOCK_POLL);
     }
@@ -143,11 +153,17 @@ impl Storage for Disk {
         exchange(one, other)
     }
 
-    fn lock(&self, file: &Path) -> io::Result<Option<File>> {
+    fn lock(&self, file: &Path) -> io::Result<Lock> {
         let handle = File::options().create(true).truncate(false).write(true).open(file)?;
         match handle.try_lock() {
-            Ok(()) => Ok(Some(handle)),
-            Err(TryLockError::WouldBlock) => Ok(None),
+            Ok(()) => Ok(Lock::Ours(Box::new(handle))),
+            Err(TryLockError::WouldBlock) => Ok(Lock::Taken),
+            // Network file systems that are mounted without locks.
+            Err(TryLockError::Error(error))
+                if error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(libc::ENOLCK) =>
+            {
+                Ok(Lock::Unknown)
+            }
             Err(TryLockError::Error(error)) => Err(error),
         }
     }
@@ -180,10 +196,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("lock");
         let held = Disk.lock(&file).unwrap();
-        assert!(held.is_some());
-        assert!(Disk.lock(&file).unwrap().is_none());
+        assert!(matches!(held, Lock::Ours(_)));
+        assert!(matches!(Disk.lock(&file).unwrap(), Lock::Taken));
         drop(held);
-        assert!(Disk.lock(&file).unwrap().is_some());
+        assert!(matches!(Disk.lock(&file).unwrap(), Lock::Ours(_)));
     }
 
     #[test]

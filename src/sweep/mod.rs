@@ -11,6 +11,7 @@
 
 mod axes;
 mod check;
+mod command;
 mod cost;
 mod file;
 mod filter;

@@ -8,14 +8,47 @@ use arrow_schema::{DataType, SchemaRef};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime};
 
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_stickslip");
 /// After so long a command hangs: the longest takes seconds.
 const LONGEST: Duration = Duration::from_mins(2);
+
+/// The tables of a sweep.
+pub const TABLES: [&str; 3] = ["slips", "precursors", "jobs"];
+
+/// Many jobs of some 50 µs, in several parts of 4096 jobs: something to interrupt.
+pub const MANY: &str = "\
+name = \"many\"
+[model]
+N = 1
+Ns = 1
+[axes]
+seed = { count = 28000 }
+[record]
+slips = 2
+discard = 0
+";
+/// Parts of [`MANY`].
+pub const MANY_PARTS: usize = 7;
+
+/// One in three jobs needs more contact events than it may have.
+pub const FAILING: &str = "\
+name = \"failing\"
+[model]
+Ns = 2
+[axes]
+N = [1, 2, 30]
+seed = { count = 2 }
+[record]
+slips = 2
+discard = 0
+max_events = 300
+";
 
 /// A temporary folder in which commands run.
 pub struct Folder(tempfile::TempDir);
@@ -99,6 +132,31 @@ impl Folder {
         parts
     }
 
+    /// The files of all tables with their bytes.
+    pub fn tables(&self, directory: &str) -> BTreeMap<PathBuf, Vec<u8>> {
+        let paths = TABLES.iter().flat_map(|table| self.parts(directory, table));
+        let files = paths.map(|path| {
+            let bytes = fs::read(&path).unwrap();
+            (path.strip_prefix(self.path(directory)).unwrap().to_owned(), bytes)
+        });
+        files.collect()
+    }
+
+    /// Waits until so many parts are committed, or the program has ended.
+    pub fn wait_for_parts(&self, directory: &str, parts: usize, child: &mut Child) {
+        let begin = Instant::now();
+        while self.parts(directory, "jobs").len() < parts && child.try_wait().unwrap().is_none() {
+            assert!(begin.elapsed() < Duration::from_mins(1), "no part is committed");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// When the committed files were written.
+    pub fn written(&self, directory: &str) -> BTreeMap<PathBuf, SystemTime> {
+        let written = |path: PathBuf| (path.clone(), fs::metadata(path).unwrap().modified().unwrap());
+        self.parts(directory, "jobs").into_iter().map(written).collect()
+    }
+
     /// All rows of one table of a results directory.
     pub fn table(&self, directory: &str, table: &str) -> Rows {
         let mut rows = Rows::default();
@@ -112,6 +170,24 @@ impl Folder {
         rows.read(&self.path(name));
         rows
     }
+}
+
+/// What the program printed as JSON.
+pub fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// Exit code, standard output and standard error of a program that was started.
+pub fn wait(mut child: Child) -> (Option<i32>, String, String) {
+    let code = child.wait().unwrap().code();
+    let (mut stdout, mut stderr) = (String::new(), String::new());
+    if let Some(mut pipe) = child.stdout.take() {
+        pipe.read_to_string(&mut stdout).unwrap();
+    }
+    if let Some(mut pipe) = child.stderr.take() {
+        pipe.read_to_string(&mut stderr).unwrap();
+    }
+    (code, stdout, stderr)
 }
 
 /// A cell, compared bit by bit.

@@ -29,12 +29,18 @@ precursors = true
 
 
 @pytest.fixture(scope="session")
-def stickslip():
-    """Runs the program with some arguments; it must succeed."""
+def program():
+    """The built program."""
     target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
     program = Path(os.environ.get("STICKSLIP", target / "release" / "stickslip"))
     if not program.exists():
         pytest.fail(f"{program} is missing: run cargo build --release, or set STICKSLIP to the program")
+    return program
+
+
+@pytest.fixture(scope="session")
+def stickslip(program):
+    """Runs the program with some arguments; it must succeed."""
 
     def run(*arguments):
         done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=300)

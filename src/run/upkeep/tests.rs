@@ -4,12 +4,12 @@ use super::*;
 use crate::run::{Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
 use crate::store::dataset::Reader;
-use crate::store::storage::{Disk, StoredFile};
+use crate::store::storage::{Disk, Lock, StoredFile};
 use crate::store::tables::{JobRecord, JobResult};
 use crate::sweep::{Job, Sweep};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -90,7 +90,7 @@ impl Storage for Dying {
         }
         self.change().and_then(|()| Disk.exchange(one, other))
     }
-    fn lock(&self, file: &Path) -> io::Result<Option<File>> {
+    fn lock(&self, file: &Path) -> io::Result<Lock> {
         Disk.lock(file)
     }
 }
@@ -116,7 +116,13 @@ fn kernel(job: &Job, _: &AtomicBool) -> Result<JobResult, SimulationError> {
 
 fn run_all(root: &Path, seeds: u64) -> u64 {
     let stop = AtomicBool::new(false);
-    let options = Options { threads: NonZeroUsize::new(1), stop: &stop, retry_failed: false, shard: Shard::default() };
+    let options = Options {
+        threads: NonZeroUsize::new(1),
+        stop: &stop,
+        retry_failed: false,
+        shard: Shard::default(),
+        walltime: None,
+    };
     run(&Disk, &sweep(seeds), root, options, &kernel, &mut |_| ()).unwrap().jobs_run
 }
 
@@ -223,13 +229,14 @@ fn upkeep_and_runs_keep_each_other_out() {
     let root = extended();
     let layout = Layout::new(root.path());
     let stop = AtomicBool::new(false);
-    let options = Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default() };
+    let options = Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
     let begin = |seeds| run(&Disk, &sweep(seeds), root.path(), options, &kernel, &mut |_| ());
-    let upkeep = alone(&Disk, &layout).unwrap();
+    let upkeep = Claim::take(&Disk, &layout, NAME, PATIENCE).unwrap();
+    assert!(upkeep.is_some());
     let error = begin(SEEDS + 1).unwrap_err();
     assert!(error.to_string().contains("being repaired or compacted"), "{error}");
     drop(upkeep);
-    let shard = Disk.lock(&layout.locks().join(Shard::default().writer())).unwrap();
+    let shard = Claim::take(&Disk, &layout, &Shard::default().writer(), PATIENCE).unwrap();
     for ended in [compact(&Disk, root.path()).map(|_| ()), repair(&Disk, root.path()).map(|_| ())] {
         let error = ended.unwrap_err();
         assert!(error.to_string().contains("is being run (shard-1-of-1)"), "{error}");

@@ -1,23 +1,34 @@
 //! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
 
+use super::Run;
+use super::kernels::Kernels;
 use super::leap::{DriveNow, Driving};
-use super::taylor::{Chain, Kernels, Series, State};
+use super::taylor::{Chain, Series, State};
 use crate::model::Interface;
-use crate::solver::ledger::Audit;
+use crate::solver::ledger::{Audit, work};
+use crate::solver::polynomial;
+use crate::solver::segment::{ForcePath, Segment};
 
 impl Audit {
-    /// Enters the damping loss over [0, s] of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
-    pub(super) fn follow_series(&mut self, kernels: Kernels, chain: &Chain, series: &Series, end: f64, length: f64) {
+    /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
+    pub(super) fn follow_series(
+        &mut self,
+        kernels: Kernels,
+        chain: &Chain,
+        series: &Series,
+        [first, last]: [f64; 2],
+        length: f64,
+    ) {
         let mut probe = State { displacement: chain.layout.filled(0.0), velocity: chain.layout.filled(0.0) };
         let nodes = self.quadrature.nodes(series.order);
         let mean_square: f64 = nodes
             .iter()
             .map(|&(s, weight)| {
-                kernels.evaluate(series, s * end, length, &mut probe);
+                kernels.evaluate(series, first + s * (last - first), length, &mut probe);
                 weight * probe.velocity.iter().flat_map(|row| row.iter()).map(|v| v * v).sum::<f64>()
             })
             .sum();
-        self.damping += chain.mass * chain.damping_rate * end * length * mean_square;
+        self.damping += chain.mass * chain.damping_rate * (last - first) * length * mean_square;
     }
 
     /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and the
@@ -79,6 +90,40 @@ impl Audit {
         self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
         self.elastic =
             0.5 * (chain.mass * chain.coupling[0][0] * stretched + sprung) + interface.elastic_energy(&displacements);
+    }
+}
+
+impl Run<'_> {
+    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
+    pub(super) fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
+        let elapsed = shown.duration;
+        let after = std::mem::replace(&mut self.state, before);
+        let (start, least_orders, mut done) = (self.time, self.least_orders, 0.0);
+        while done < elapsed {
+            let left = elapsed - done;
+            let Ok(length) = self.expand(left) else { break };
+            let s = (left / length).min(1.0);
+            if let Some(audit) = &mut self.audit {
+                audit.follow_series(self.kernels, &self.chain, &self.series, [0.0, s], length);
+                let path = ForcePath::Polynomial {
+                    coefficients: &self.force,
+                    first: 0.0,
+                    scale: length,
+                    ends: [0.0, s].map(|s| polynomial::value(&self.force, s)),
+                };
+                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
+                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
+            }
+            self.kernels.evaluate(&self.series, s, length, &mut self.state);
+            done = if s < 1.0 { elapsed } else { done + length };
+            self.set_time(start + done);
+        }
+        self.state = after;
+        self.least_orders = least_orders;
+        self.set_time(start);
+        if let Some(audit) = &mut self.audit {
+            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
+        }
     }
 }
 

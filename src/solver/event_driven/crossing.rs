@@ -3,53 +3,68 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
-use crate::solver::polynomial::{excursion, shifted, value, value_and_slope};
+use crate::solver::polynomial::{beyond_linear, safeguarded_newton, shifted, value, value_and_slope};
 use std::f64::consts::{PI, TAU};
-
-/// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
-const QUADRATIC: f64 = 1e-9;
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
 const DEEPEST: u32 = 40;
 
-/// First s in [0, `end`], with `end` <= 1, at which the polynomial is not below zero.
-pub(super) fn first_reach(coefficients: &[f64], end: f64) -> Option<f64> {
-    if coefficients[0] >= 0.0 {
-        return Some(0.0);
+/// First s in [`from`, `end`], within [0, 1], at which the polynomial leaves the open interval between two levels. The
+/// coefficients are changed.
+pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], from: f64, end: f64) -> Option<f64> {
+    let (start, slope) = (coefficients[0], coefficients[1]);
+    let (strays, slope_varies) = beyond_linear(coefficients);
+    let mut first = None;
+    if start + slope.max(0.0) + strays >= upper {
+        coefficients[0] = start - upper;
+        first = first_reach(coefficients, slope_varies, from, end);
     }
-    // The common cases in one pass over the coefficients: out of reach, or monotone throughout.
-    let (mut strays, mut slope_varies) = (0.0, 0.0);
-    for (p, c) in coefficients.iter().enumerate().skip(2) {
-        strays += c.abs();
-        slope_varies += p as f64 * c.abs();
+    if start + slope.min(0.0) - strays <= lower {
+        coefficients[0] = start - lower;
+        for coefficient in &mut *coefficients {
+            *coefficient = -*coefficient;
+        }
+        first = first_reach(coefficients, slope_varies, from, first.unwrap_or(end)).or(first);
     }
-    if coefficients[0] + coefficients[1].max(0.0) + strays < 0.0 {
-        return None;
+    first
+}
+
+/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the slope by
+/// at most `slope_varies`.
+fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> Option<f64> {
+    let here = if from > 0.0 { value(coefficients, from) } else { coefficients[0] };
+    if here >= 0.0 {
+        return Some(from);
     }
-    if coefficients[1].abs() > slope_varies {
-        return if coefficients[1] > 0.0 { rising_root(coefficients, 0.0, end) } else { None };
+    let slope = coefficients[1];
+    if slope.abs() > slope_varies {
+        return if slope > 0.0 { rising_root(coefficients, from, end, from - here / slope) } else { None };
     }
-    first_in(coefficients, 0.0, end, DEEPEST)
+    first_in(coefficients, from, end, DEEPEST)
 }
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let about = shifted(coefficients, middle);
-    let about = &about[..coefficients.len()];
-    if about[0] + excursion(about, half) < 0.0 {
+    // In the variable r from -1 to 1.
+    let mut about = shifted(coefficients, middle);
+    let about = &mut about[..coefficients.len()];
+    let mut power = 1.0;
+    for coefficient in about.iter_mut() {
+        *coefficient *= power;
+        power *= half;
+    }
+    let (strays, slope_varies) = beyond_linear(about);
+    let slope = about[1];
+    if about[0] + slope.abs() + strays < 0.0 {
         return None;
     }
-    let (mut slope_varies, mut power) = (0.0, 1.0);
-    for (p, c) in about.iter().enumerate().skip(2) {
-        power *= half;
-        slope_varies += p as f64 * c.abs() * power;
-    }
-    if about.len() > 1 && about[1].abs() > slope_varies {
+    if slope.abs() > slope_varies {
         // It may start at or above the level only if the interval before ended there.
-        if value(coefficients, low) >= 0.0 {
+        if value(about, -1.0) >= 0.0 {
             return Some(low);
         }
-        return if about[1] > 0.0 { rising_root(coefficients, low, high) } else { None };
+        let root = if slope > 0.0 { rising_root(about, -1.0, 1.0, -about[0] / slope) } else { None };
+        return root.map(|r| (middle + half * r).clamp(low, high));
     }
     if depth == 0 {
         return (about[0] >= 0.0).then_some(middle);
@@ -57,36 +72,11 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
     first_in(coefficients, low, middle, depth - 1).or_else(|| first_in(coefficients, middle, high, depth - 1))
 }
 
-/// The root of a polynomial that rises from below zero throughout [low, high]; `None` if it stays below.
-fn rising_root(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
-    let first = low - value(coefficients, low) / coefficients[1];
+/// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
+/// below.
+fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
     (value(coefficients, high) >= 0.0)
         .then(|| safeguarded_newton(low, high, first, |s| value_and_slope(coefficients, s)))
-}
-
-/// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave
-/// the bracket. A step so small that its square is rounding is the last. Returns the last iterate, never a stale end of
-/// the bracket.
-fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
-    loop {
-        let (height, slope) = function(s);
-        if height >= 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - height / slope;
-        if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high {
-            return newton;
-        }
-        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if next <= low || next >= high {
-            return next;
-        }
-        s = next;
-    }
 }
 
 /// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
@@ -186,36 +176,37 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn newton_does_not_go_to_and_fro_between_the_ends() {
-        // The arc tangent sends 1.39 to -1.39 and back.
-        let swing = 1.391_745_200_270_735;
-        let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
-        assert!(root.abs() < 1e-9, "{root}");
-    }
-
-    #[test]
     fn a_bump_that_just_reaches_the_level_is_not_missed() {
         // -(s - 0.3)² + 1e-10: above zero for 2e-5 of the step only.
         let coefficients = [-0.09 + 1e-10, 0.6, -1.0];
-        let reached = first_reach(&coefficients, 1.0).unwrap();
+        let reached = first_exit(&mut coefficients.clone(), [f64::NEG_INFINITY, 0.0], 0.0, 1.0).unwrap();
         assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
-        assert_eq!(first_reach(&[-0.09 - 1e-10, 0.6, -1.0], 1.0), None);
+        assert_eq!(first_exit(&mut [-0.09 - 1e-10, 0.6, -1.0], [f64::NEG_INFINITY, 0.0], 0.0, 1.0), None);
+        // The same from above, past its foot.
+        let reached = first_exit(&mut coefficients.map(|c| -c), [0.0, f64::INFINITY], 0.2, 1.0).unwrap();
+        assert!((reached - (0.3 - 1e-5)).abs() < 1e-9, "{reached}");
     }
 
     proptest! {
         #[test]
         fn the_first_crossing_of_a_polynomial_is_the_first(
-            coefficients in prop::collection::vec(-1.0_f64..1.0, 2..14), end in 0.05_f64..1.0
+            coefficients in prop::collection::vec(-1.0_f64..1.0, 2..14),
+            from in 0.0_f64..0.5,
+            length in 0.05_f64..0.5,
+            levels in (0.001_f64..1.0, 0.001_f64..1.0),
         ) {
-            let found = first_reach(&coefficients, end);
-            prop_assume!(found != Some(0.0));
-            let until = found.unwrap_or(end);
+            let start = value(&coefficients, from);
+            let (lower, upper) = (start - levels.0, start + levels.1);
+            let found = first_exit(&mut coefficients.clone(), [lower, upper], from, from + length);
+            let until = found.unwrap_or(from + length);
             for i in 0..400 {
-                let s = until * f64::from(i) / 400.0;
-                prop_assert!(value(&coefficients, s * (1.0 - 1e-9)) < 1e-12, "missed at {}", s);
+                let s = from + (until - from) * (1.0 - 1e-9) * f64::from(i) / 400.0;
+                let here = value(&coefficients, s);
+                prop_assert!(here < upper + 1e-12 && here > lower - 1e-12, "missed at {}", s);
             }
-            if let Some(s) = found.filter(|s| *s > 0.0) {
-                prop_assert!(value(&coefficients, s).abs() < 1e-12);
+            if let Some(s) = found {
+                let here = value(&coefficients, s);
+                prop_assert!((here - upper).abs().min((here - lower).abs()) < 1e-12);
             }
         }
 

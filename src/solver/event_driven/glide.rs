@@ -9,65 +9,97 @@
 //!
 //! The spectrum of A lies in (0, Λ]. In x = 2A/Λ - 1 and θ = t√Λ, the Jacobi-Anger expansion gives
 //! cos(t√A) = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x) and √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x) with
-//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ). The Bessel functions vanish fast beyond their argument: some θ/2 products with A carry the
-//! motion over θ, a third of what Taylor steps need, and nothing is evaluated on the way. Contract: errors of rounding
-//! only.
+//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ); with A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel
+//! functions vanish fast beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor
+//! steps need, and nothing is evaluated on the way. Contract: the terms left out are a given part of the motion.
 
-use super::lanes::{LANES, Row, flat, flat_mut, ghost_after, ghost_before};
+use super::lanes::{LANES, Layout, Row};
 use super::taylor::Chain;
+use super::vector::Vector;
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
 const TAIL: f64 = 12.0;
 const LEAST_TAIL: f64 = 10.0;
 
-/// Work space: vectors of the recurrence with a ghost row before and after.
+/// Two vectors: u(0) and u'(0), or what became of them.
+type Pair = [Vec<Row>; 2];
+
+/// Work space of the recurrence.
 #[derive(Clone, Debug)]
 pub(super) struct Glide {
-    rows: usize,
     /// T_{k-1} and T_k applied to u(0) and to u'(0).
-    before: [Vec<Row>; 2],
-    here: [Vec<Row>; 2],
-    /// Sums with the coefficients of the cosine and of the sine, for u(0) and u'(0).
-    cosine: [Vec<Row>; 2],
-    sine: [Vec<Row>; 2],
-    /// Diagonal and coupling of 2A/Λ - 1.
+    before: Pair,
+    here: Pair,
+    /// u(t) and u'(t).
+    sums: Pair,
+    /// Diagonal and neighbours' entries of 2A/Λ - 1.
     diagonal: Vec<Row>,
     coupling: Vec<Row>,
     bessel: Vec<f64>,
+    /// Coefficients of T_k: of the cosine, of the sine over √A, of the sine times √A.
+    weights: Vec<[f64; 3]>,
 }
 
 impl Glide {
-    pub fn new(rows: usize) -> Self {
-        let ghosted = || [vec![Row::filled(0.0); rows + 2], vec![Row::filled(0.0); rows + 2]];
-        let plain = || vec![Row::filled(0.0); rows];
+    pub fn new(layout: Layout) -> Self {
+        let rows = || layout.filled(0.0);
+        let pair = || [rows(), rows()];
         Self {
-            rows,
-            before: ghosted(),
-            here: ghosted(),
-            cosine: [plain(), plain()],
-            sine: [plain(), plain()],
-            diagonal: plain(),
-            coupling: plain(),
+            before: pair(),
+            here: pair(),
+            sums: pair(),
+            diagonal: rows(),
+            coupling: rows(),
             bessel: Vec::new(),
+            weights: Vec::new(),
         }
     }
 
-    /// Where u(0) and u'(0) of a block are put before [`advance`].
-    pub fn start(&mut self, row: usize, lane: usize, displacement: f64, velocity: f64) {
-        self.here[0][row + 1][lane] = displacement;
-        self.here[1][row + 1][lane] = velocity;
+    /// Takes u(0) and u'(0), one entry a block.
+    pub fn start(&mut self, layout: Layout, displacement: &[f64], velocity: &[f64]) {
+        layout.fold(displacement, &mut self.here[0]);
+        layout.fold(velocity, &mut self.here[1]);
     }
 
-    /// u(t) and u'(t) of a block after [`advance`].
-    pub fn end(&self, row: usize, lane: usize) -> (f64, f64) {
-        (self.cosine[0][row][lane], self.cosine[1][row][lane])
+    /// Tells u(t) and u'(t) after [`advance`], one entry a block.
+    pub fn end(&self, layout: Layout, displacement: &mut [f64], velocity: &mut [f64]) {
+        layout.unfold(&self.sums[0], displacement);
+        layout.unfold(&self.sums[1], velocity);
+    }
+
+    /// The coefficients for a spectrum up to Λ and θ = t√Λ, as far as they exceed `error`.
+    fn weigh(&mut self, widest: f64, angle: f64, error: f64) {
+        bessel(angle, &mut self.bessel);
+        let (pairs, _) = self.bessel.as_chunks::<2>();
+        let terms = pairs.iter().rposition(|pair| pair[0].abs().max(pair[1].abs()) > error).map_or(1, |last| last + 1);
+        self.weights.clear();
+        self.weights.resize(terms + 1, [0.0; 3]);
+        let mut sum = 0.0;
+        for (k, [even, odd]) in pairs.iter().enumerate().rev() {
+            sum += 2.0 * odd;
+            if k < terms {
+                let twice = [1.0, -2.0, 2.0][if k == 0 { 0 } else { 2 - k % 2 }];
+                self.weights[k] = [twice * even, twice * sum / widest.sqrt(), 0.0];
+            }
+        }
+        // (x + 1) Λ/2 times the sine's series, with x T_0 = T_1 and x T_k = (T_{k-1} + T_{k+1})/2.
+        for k in 0..terms {
+            let below = match k {
+                0 => 0.0,
+                1 => 2.0 * self.weights[0][1],
+                _ => self.weights[k - 1][1],
+            };
+            let [_, here, _] = self.weights[k];
+            self.weights[k][2] = 0.5 * widest * (here + 0.5 * (below + self.weights[k + 1][1]));
+        }
+        self.weights.truncate(terms);
     }
 }
 
-/// Carries u and u' over so many seconds.
+/// Carries u and u' over so many seconds; `error` is the part of them that may be left out.
 #[inline(always)]
-pub(super) fn advance(chain: &Chain, seconds: f64, glide: &mut Glide) {
-    let rows = glide.rows;
+pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+    let rows = glide.diagonal.len();
     let shift = 0.25 * chain.damping_rate * chain.damping_rate;
     let mut widest = 0.0_f64;
     for (diagonal, coupling) in chain.diagonal.iter().zip(&chain.coupling) {
@@ -80,96 +112,56 @@ pub(super) fn advance(chain: &Chain, seconds: f64, glide: &mut Glide) {
         for l in 0..LANES {
             // In padding both are zero there, and zeros stay zero.
             glide.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
-            glide.coupling[r][l] = scale * chain.coupling[r][l];
+            glide.coupling[r][l] = -scale * chain.coupling[r][l];
         }
     }
-    let root = widest.sqrt();
-    bessel(seconds * root, &mut glide.bessel);
-    let terms = glide.bessel.len() / 2;
-    // s_k √Λ⁻¹ in place of the odd Bessel functions, from the far end.
-    let mut sum = 0.0;
-    for k in (0..terms).rev() {
-        sum += 2.0 * glide.bessel[2 * k + 1];
-        glide.bessel[2 * k + 1] = sum / root;
-    }
-    for which in 0..2 {
-        close(&mut glide.here[which]);
-        let (even, odd) = (glide.bessel[0], glide.bessel[1]);
-        for r in 0..rows {
-            let start = glide.here[which][r + 1];
-            glide.cosine[which][r] = Row(start.map(|x| even * x));
-            glide.sine[which][r] = Row(start.map(|x| odd * x));
+    glide.weigh(widest, seconds * widest.sqrt(), error);
+    for pair in [&mut glide.before, &mut glide.sums] {
+        for rows in pair {
+            rows.fill(Row::filled(0.0));
         }
     }
-    for k in 1..terms {
-        let sign = if k % 2 == 0 { 2.0 } else { -2.0 };
-        let (even, odd) = (sign * glide.bessel[2 * k], sign * glide.bessel[2 * k + 1]);
+    add_terms::<V>(&glide.here, &mut glide.sums, glide.weights[0]);
+    for k in 1..glide.weights.len() {
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let (twice, keep) = if k == 1 { (1.0, 0.0) } else { (2.0, 1.0) };
-        for which in 0..2 {
-            recur(
-                [&glide.diagonal, &glide.coupling],
-                &glide.here[which],
-                &mut glide.before[which],
-                [twice, keep],
-                [&mut glide.cosine[which], &mut glide.sine[which]],
-                [even, odd],
-            );
-            close(&mut glide.before[which]);
+        let twice = V::splat(if k == 1 { 1.0 } else { 2.0 });
+        for (here, before) in glide.here.iter().zip(&mut glide.before) {
+            recur::<V>([&glide.diagonal, &glide.coupling], here, before, twice);
         }
+        add_terms::<V>(&glide.before, &mut glide.sums, glide.weights[k]);
         std::mem::swap(&mut glide.before, &mut glide.here);
     }
-    finish(chain, shift, glide);
 }
 
-/// One term of the recurrence and of both sums.
+/// `twice` x times one term, minus the term before it, which `next` holds.
 #[inline(always)]
-fn recur(
-    [diagonal, coupling]: [&[Row]; 2],
-    here: &[Row],
-    next: &mut [Row],
-    [twice, keep]: [f64; 2],
-    [cosine, sine]: [&mut [Row]; 2],
-    [even, odd]: [f64; 2],
-) {
-    let entries = diagonal.len() * LANES;
-    let (diagonal, coupling) = (&flat(diagonal)[..entries], &flat(coupling)[..entries]);
-    let (left, middle, right) = (&flat(here)[..entries], &flat(&here[1..])[..entries], &flat(&here[2..])[..entries]);
-    let next = &mut flat_mut(&mut next[1..])[..entries];
-    let (cosine, sine) = (&mut flat_mut(cosine)[..entries], &mut flat_mut(sine)[..entries]);
-    for i in 0..entries {
-        let product = diagonal[i] * middle[i] - coupling[i] * (left[i] + right[i]);
-        let term = twice * product - keep * next[i];
-        next[i] = term;
-        cosine[i] += even * term;
-        sine[i] += odd * term;
+fn recur<V: Vector>([diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: V) {
+    let last = terms.len() - 1;
+    let mut before = V::load(&terms[last]).to_next_lane();
+    let mut here = V::load(&terms[0]);
+    let last_after = here.to_lane_before();
+    for (((next, diagonal), coupling), after) in
+        next[..last].iter_mut().zip(&diagonal[..last]).zip(&coupling[..last]).zip(&terms[1..])
+    {
+        let after = V::load(after);
+        let product = here.fused(V::load(diagonal), before.plus(after).times(V::load(coupling)));
+        product.fused(twice, V::splat(0.0).minus(V::load(next))).store(next);
+        (before, here) = (here, after);
     }
+    let product = here.fused(V::load(&diagonal[last]), before.plus(last_after).times(V::load(&coupling[last])));
+    product.fused(twice, V::splat(0.0).minus(V::load(&next[last]))).store(&mut next[last]);
 }
 
-/// u = cos u(0) + sin u'(0) and u' = cos u'(0) - A sin u(0), into `cosine`.
+/// Adds T_k, applied to u(0) and to u'(0), to u(t) and u'(t).
 #[inline(always)]
-fn finish(chain: &Chain, shift: f64, glide: &mut Glide) {
-    let rows = glide.rows;
-    for r in 0..rows {
-        glide.here[0][r + 1] = glide.sine[0][r];
+fn add_terms<V: Vector>([displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
+    let (cosine, sine, rooted) = (V::splat(cosine), V::splat(sine), V::splat(-rooted));
+    let [displacement, velocity] = sums;
+    for (((displaced, moved), x), v) in displaced.iter().zip(moved).zip(displacement).zip(velocity) {
+        let (displaced, moved) = (V::load(displaced), V::load(moved));
+        displaced.fused(cosine, moved.fused(sine, V::load(x))).store(x);
+        moved.fused(cosine, displaced.fused(rooted, V::load(v))).store(v);
     }
-    close(&mut glide.here[0]);
-    for r in 0..rows {
-        let (left, middle, right) = (glide.here[0][r], glide.here[0][r + 1], glide.here[0][r + 2]);
-        for l in 0..LANES {
-            let stiff = (chain.diagonal[r][l] - shift) * middle[l] - chain.coupling[r][l] * (left[l] + right[l]);
-            glide.cosine[1][r][l] -= stiff;
-            glide.cosine[0][r][l] += glide.sine[1][r][l];
-        }
-    }
-}
-
-/// Fills the ghost rows.
-#[inline(always)]
-fn close(rows: &mut [Row]) {
-    let last = rows.len() - 2;
-    rows[0] = ghost_before(&rows[last]);
-    rows[last + 1] = ghost_after(&rows[1]);
 }
 
 /// J_0(θ), J_1(θ), ... in pairs as far as they matter, by Miller's backward recurrence.

@@ -1,8 +1,7 @@
 //! The chain in lanes: block j lies in row j mod R of lane j div R, with R = ceil(N/8).
 //!
-//! The neighbours of a block are then the rows above and below in the same lane, and a loop over rows of eight doubles
-//! runs in whatever vectors the processor has. Slots beyond the last block keep a coupling, a stiffness and a force of
-//! zero and stay at rest. Contract: no fused and no reassociated operations, so that results do not depend on the width.
+//! The neighbours of a block are then the rows above and below in the same lane; beyond the first and the last row they
+//! lie in the next lane. Slots beyond the last block keep a coupling, a stiffness and a force of zero and stay at rest.
 
 use std::ops::{Deref, DerefMut};
 
@@ -37,21 +36,6 @@ impl DerefMut for Row {
     }
 }
 
-/// The doubles of some rows, one after the other: the neighbours of entry i are i - 8 and i + 8, and a plain loop over
-/// them runs in vectors.
-#[inline(always)]
-pub(super) fn flat(rows: &[Row]) -> &[f64] {
-    // SAFETY: a `Row` is eight doubles and nothing else: 64 bytes, as its alignment asks, laid out as in C.
-    unsafe { std::slice::from_raw_parts(rows.as_ptr().cast(), rows.len() * LANES) }
-}
-
-/// The same, to be written.
-#[inline(always)]
-pub(super) fn flat_mut(rows: &mut [Row]) -> &mut [f64] {
-    // SAFETY: as above.
-    unsafe { std::slice::from_raw_parts_mut(rows.as_mut_ptr().cast(), rows.len() * LANES) }
-}
-
 /// Where blocks lie.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
@@ -74,20 +58,26 @@ impl Layout {
         lane * self.rows + row
     }
 
-    /// A row for each, filled with one value.
+    /// Rows for all blocks, filled with one value.
     pub fn filled(self, value: f64) -> Vec<Row> {
         vec![Row::filled(value); self.rows]
     }
-}
 
-/// The row before the first: each lane's left neighbour is the last row of the lane before.
-#[inline(always)]
-pub(super) fn ghost_before(last: &Row) -> Row {
-    Row([0.0, last[0], last[1], last[2], last[3], last[4], last[5], last[6]])
-}
+    /// Writes the entries of all blocks, one after the other.
+    pub fn unfold(self, rows: &[Row], blocks: &mut [f64]) {
+        for (lane, run) in blocks.chunks_mut(self.rows).enumerate() {
+            for (entry, row) in run.iter_mut().zip(rows) {
+                *entry = row[lane];
+            }
+        }
+    }
 
-/// The row after the last: each lane's right neighbour is the first row of the lane after.
-#[inline(always)]
-pub(super) fn ghost_after(first: &Row) -> Row {
-    Row([first[1], first[2], first[3], first[4], first[5], first[6], first[7], 0.0])
+    /// The reverse of [`Self::unfold`]; padding keeps what it holds.
+    pub fn fold(self, blocks: &[f64], rows: &mut [Row]) {
+        for (lane, run) in blocks.chunks(self.rows).enumerate() {
+            for (entry, row) in run.iter().zip(&mut *rows) {
+                row[lane] = *entry;
+            }
+        }
+    }
 }

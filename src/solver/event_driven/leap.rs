@@ -17,8 +17,9 @@
 
 use super::crossing::Driven;
 use super::glide::Glide;
+use super::kernels::Kernels;
 use super::lanes::Layout;
-use super::taylor::{Chain, Kernels, State};
+use super::taylor::{Chain, State};
 use crate::solver::ledger::Audit;
 use crate::solver::segment::{ForcePath, Segment};
 use std::f64::consts::TAU;
@@ -45,6 +46,9 @@ pub(super) struct DriveNow {
 
 /// How far ahead of a modulated glide a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
+
+/// Part of the displacement that may be left out that the terms of a glide may leave out each.
+const GLIDE_SHARE: f64 = 1e-3;
 
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
@@ -79,9 +83,19 @@ pub(super) struct Leap {
     shifted_before: Vec<f64>,
     /// Inverse complex pivots of (S - mω² + imγω)/m.
     inverse_complex: Vec<[f64; 2]>,
+    /// The chain and its state: as they are at the start, the state in the end as it is after the leap.
+    diagonal: Vec<f64>,
+    pull: Vec<f64>,
+    upper: Vec<f64>,
+    lower: Vec<f64>,
+    displacement: Vec<f64>,
+    velocity: Vec<f64>,
     start: Vec<f64>,
     rate: Vec<f64>,
     wave: Vec<[f64; 2]>,
+    /// The free motion: y, w + a y, and the bound on |y|.
+    free: Vec<f64>,
+    turned: Vec<f64>,
     residue: Vec<f64>,
     glide: Glide,
 }
@@ -107,11 +121,19 @@ impl Leap {
             inverse_shifted: zeros.clone(),
             shifted_before: zeros.clone(),
             inverse_complex: vec![[0.0; 2]; blocks],
+            diagonal: zeros.clone(),
+            pull: zeros.clone(),
+            upper: zeros.clone(),
+            lower: zeros.clone(),
+            displacement: zeros.clone(),
+            velocity: zeros.clone(),
             start: zeros.clone(),
             rate: zeros.clone(),
             wave: vec![[0.0; 2]; blocks],
+            free: zeros.clone(),
+            turned: zeros.clone(),
             residue: zeros,
-            glide: Glide::new(layout.rows),
+            glide: Glide::new(layout),
         }
     }
 
@@ -129,6 +151,13 @@ impl Leap {
         emit: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
+        let layout = chain.layout;
+        layout.unfold(&chain.diagonal, &mut self.diagonal);
+        layout.unfold(&chain.pull, &mut self.pull);
+        layout.unfold(&chain.upper, &mut self.upper);
+        layout.unfold(&chain.lower, &mut self.lower);
+        layout.unfold(&state.displacement, &mut self.displacement);
+        layout.unfold(&state.velocity, &mut self.velocity);
         // Worth another try after so many e-foldings of the free motion, or after the next event.
         if !self.find_decay(chain) {
             return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
@@ -136,7 +165,8 @@ impl Leap {
         let decay_rate = self.decay_rate;
         let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(horizon) };
         self.solve_driven(chain, drive);
-        let energy = self.free_energy(chain, drive, state);
+        self.split_free_motion(drive.angular_frequency);
+        let energy = self.free_energy(chain);
         let largest = self.bound_free_motion(chain, energy);
         let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
         let is_short = decay >= horizon;
@@ -162,17 +192,16 @@ impl Leap {
             return wait(0.7);
         }
         emit(segment);
-        if is_short {
-            self.set_free_motion(chain, drive, state);
-            kernels.glide(chain, elapsed, &mut self.glide);
-        } else if let Some(audit) = audit {
+        if !is_short && let Some(audit) = audit {
             let driven = Driving { start: &self.start, rate: &self.rate, wave: &self.wave };
             audit.follow_leap(chain, drive, driven, state, elapsed);
         }
-        self.follow(chain, drive, elapsed, state);
+        self.follow(drive, elapsed);
         if is_short {
-            self.add_free_motion(chain, left, state);
+            self.carry_free_motion(chain, kernels, elapsed, left, GLIDE_SHARE * error / largest);
         }
+        layout.fold(&self.displacement, &mut state.displacement);
+        layout.fold(&self.velocity, &mut state.velocity);
         Attempt::Leapt { elapsed, reached, glided: is_short }
     }
 
@@ -210,31 +239,28 @@ impl Leap {
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
     }
 
-    /// Puts u(0) = y and u'(0) = w + γ y/2 of the free motion into the work space.
-    fn set_free_motion(&mut self, chain: &Chain, drive: &DriveNow, state: &State) {
+    /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where `left`
+    /// is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
+    fn carry_free_motion(&mut self, chain: &Chain, kernels: Kernels, elapsed: f64, left: f64, error: f64) {
+        self.glide.start(chain.layout, &self.free, &self.turned);
+        kernels.glide(chain, elapsed, error, &mut self.glide);
+        self.glide.end(chain.layout, &mut self.free, &mut self.turned);
+        let half = 0.5 * chain.damping_rate;
         for j in 0..chain.layout.blocks {
-            let (y, turned) = self.free_motion(chain, drive, state, j);
-            let (row, lane) = chain.layout.slot(j);
-            self.glide.start(row, lane, y, turned);
+            self.displacement[j] += left * self.free[j];
+            self.velocity[j] += left * (self.turned[j] - half * self.free[j]);
         }
     }
 
-    /// Adds y and w = u' e^{-γt/2} - γ y/2, where `left` is e^{-γt/2}.
-    fn add_free_motion(&self, chain: &Chain, left: f64, state: &mut State) {
-        for j in 0..chain.layout.blocks {
-            let (row, lane) = chain.layout.slot(j);
-            let (u, rate) = self.glide.end(row, lane);
-            state.displacement[row][lane] += left * u;
-            state.velocity[row][lane] += left * (rate - 0.5 * chain.damping_rate * u);
+    /// Splits off the free motion: y and w + a y of each block.
+    fn split_free_motion(&mut self, frequency: f64) {
+        for j in 0..self.free.len() {
+            let y = self.displacement[j] - self.start[j] - self.wave[j][0];
+            // d/dt Re(q e^{iωt}) = -ω Im q at the start.
+            let w = self.velocity[j] - self.rate[j] + frequency * self.wave[j][1];
+            self.free[j] = y;
+            self.turned[j] = w + self.decay_rate * y;
         }
-    }
-
-    /// y and w + a y of a block.
-    fn free_motion(&self, chain: &Chain, drive: &DriveNow, state: &State, j: usize) -> (f64, f64) {
-        let y = chain.at(&state.displacement, j) - self.start[j] - self.wave[j][0];
-        // d/dt Re(q e^{iωt}) = -ω Im q at the start.
-        let w = chain.at(&state.velocity, j) - self.rate[j] + drive.angular_frequency * self.wave[j][1];
-        (y, w + self.decay_rate * y)
     }
 
     /// Finds the decay rate, from that of the last time, and eliminates; false if there is none.
@@ -265,10 +291,10 @@ impl Leap {
         let mut least = f64::INFINITY;
         for count in 0..blocks {
             let (far, near) = (blocks - 1 - count, count);
-            let diagonal = chain.at(&chain.diagonal, far);
+            let diagonal = self.diagonal[far];
             let pivot = diagonal - coupling_squared * ahead;
             let pivot_shifted = diagonal - shift - coupling_squared * ahead_shifted;
-            let pivot_before = chain.at(&chain.diagonal, near) - shift - coupling_squared * before_shifted;
+            let pivot_before = self.diagonal[near] - shift - coupling_squared * before_shifted;
             least = least.min(pivot_shifted).min(pivot_before);
             ahead = 1.0 / pivot;
             ahead_shifted = 1.0 / pivot_shifted;
@@ -292,7 +318,7 @@ impl Leap {
         // Forward from the leading edge, the right-hand side kept in `start`, then back.
         let mut carried = 0.0;
         for j in (0..blocks).rev() {
-            let own = chain.at(&chain.pull, j) - chain.damping_rate * self.rate[j];
+            let own = self.pull[j] - chain.damping_rate * self.rate[j];
             self.start[j] = own + coupling * carried;
             carried = self.start[j] * self.inverse_pivot[j];
         }
@@ -315,7 +341,7 @@ impl Leap {
         let mut ahead = [0.0, 0.0];
         for j in (0..blocks).rev() {
             let squared = coupling * coupling;
-            let pivot = [chain.at(&chain.diagonal, j) - shift - squared * ahead[0], loss - squared * ahead[1]];
+            let pivot = [self.diagonal[j] - shift - squared * ahead[0], loss - squared * ahead[1]];
             let scale = 1.0 / (pivot[0] * pivot[0] + pivot[1] * pivot[1]);
             ahead = [pivot[0] * scale, -pivot[1] * scale];
             self.inverse_complex[j] = ahead;
@@ -330,15 +356,13 @@ impl Leap {
     }
 
     /// E/m of the free motion, in m²/s².
-    fn free_energy(&self, chain: &Chain, drive: &DriveNow, state: &State) -> f64 {
-        let blocks = chain.layout.blocks;
-        let coupling = chain.coupling[0][0];
+    fn free_energy(&self, chain: &Chain) -> f64 {
+        let twice_coupling = 2.0 * chain.coupling[0][0];
         let shift = self.shift(chain);
         let (mut energy, mut before) = (0.0, 0.0);
-        for j in 0..blocks {
-            let (y, turned) = self.free_motion(chain, drive, state, j);
-            energy += turned * turned + y * ((chain.at(&chain.diagonal, j) - shift) * y - 2.0 * coupling * before);
-            before = y;
+        for ((y, turned), diagonal) in self.free.iter().zip(&self.turned).zip(&self.diagonal) {
+            energy += turned * turned + y * ((diagonal - shift) * y - twice_coupling * before);
+            before = *y;
         }
         0.5 * energy.max(0.0)
     }
@@ -349,7 +373,7 @@ impl Leap {
         let mut largest = 0.0_f64;
         for j in 0..chain.layout.blocks {
             let ahead = 1.0 / self.inverse_shifted[j];
-            let compliance = 1.0 / (ahead + self.shifted_before[j] - (chain.at(&chain.diagonal, j) - shift));
+            let compliance = 1.0 / (ahead + self.shifted_before[j] - (self.diagonal[j] - shift));
             self.residue[j] = (2.0 * energy * compliance).sqrt();
             largest = largest.max(self.residue[j]);
         }
@@ -366,7 +390,7 @@ impl Leap {
             let late = self.start[j] + self.rate[j] * seconds + left * self.residue[j];
             let highest = late.max(self.start[j] + self.residue[j]) + swing;
             let lowest = self.start[j] - self.residue[j] - swing;
-            highest < chain.at(&chain.upper, j) && lowest > chain.at(&chain.lower, j)
+            highest < self.upper[j] && lowest > self.lower[j]
         })
     }
 
@@ -375,7 +399,7 @@ impl Leap {
         let mut first = (horizon, None);
         for j in 0..chain.layout.blocks {
             let [real, imaginary] = self.wave[j];
-            let (upper, lower) = (chain.at(&chain.upper, j), chain.at(&chain.lower, j));
+            let (upper, lower) = (self.upper[j], self.lower[j]);
             if drive.amplitude == 0.0 {
                 // The rate is positive, so the ramp alone only rises.
                 let elapsed = ((upper - self.start[j]) / self.rate[j]).max(decay);
@@ -420,15 +444,14 @@ impl Leap {
         }
     }
 
-    /// Writes the driven solution after so many seconds into the state.
-    fn follow(&self, chain: &Chain, drive: &DriveNow, elapsed: f64, state: &mut State) {
+    /// Puts the driven solution after so many seconds in place of the state.
+    fn follow(&mut self, drive: &DriveNow, elapsed: f64) {
         let turn = TAU * (elapsed * drive.angular_frequency / TAU).fract();
         let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(turn) } else { (0.0, 1.0) };
-        for j in 0..chain.layout.blocks {
+        for j in 0..self.start.len() {
             let [real, imaginary] = product(self.wave[j], [cosine, sine]);
-            let (row, lane) = chain.layout.slot(j);
-            state.displacement[row][lane] = self.start[j] + self.rate[j] * elapsed + real;
-            state.velocity[row][lane] = self.rate[j] - drive.angular_frequency * imaginary;
+            self.displacement[j] = self.start[j] + self.rate[j] * elapsed + real;
+            self.velocity[j] = self.rate[j] - drive.angular_frequency * imaginary;
         }
     }
 }

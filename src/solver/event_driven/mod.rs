@@ -10,17 +10,19 @@
 mod audit;
 mod crossing;
 mod glide;
+mod kernels;
 mod lanes;
 mod leap;
+mod step;
 mod taylor;
+mod vector;
 
-use self::crossing::first_reach;
+use self::kernels::Kernels;
 use self::lanes::Layout;
 use self::leap::{Attempt, Bounds, DriveNow, Leap};
-use self::taylor::{Chain, Kernels, Series, State, StepInput};
-use super::ledger::{Audit, work};
-use super::polynomial::{self, MOST_COEFFICIENTS};
-use super::segment::{ForcePath, Segment};
+use self::taylor::{Chain, Series, State};
+use super::ledger::Audit;
+use super::segment::Segment;
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::slider::largest_frequency;
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
@@ -30,11 +32,7 @@ use std::sync::atomic::Ordering;
 /// would lose digits.
 const LONGEST_STEP: f64 = 4.0;
 /// Steps are halved at most so often where events crowd; further only if a series does not converge.
-const MOST_HALVINGS: i32 = 7;
-/// Halvings at which a series that does not converge ends the run.
-const HOPELESS_HALVINGS: i32 = 60;
-/// A step aims at so many times the time that recent steps covered before an event cut them.
-const STEP_AHEAD: f64 = 2.5;
+const MOST_HALVINGS: usize = 7;
 /// A leap is tried only if no reattachment is due within so many longest steps.
 const WORTHWHILE_LEAP: f64 = 6.0;
 /// Part of the tolerance that one step's truncation may take at most.
@@ -48,8 +46,6 @@ const FRAME_SPAN: f64 = 0.0625;
 /// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
-/// A step must span so many units in the last place of the time, so that events are located to a millionth of it.
-const LEAST_RESOLUTION: f64 = 1_048_576.0;
 /// Steps between two looks at the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
@@ -92,6 +88,18 @@ struct Run<'a> {
     series: Series,
     leap: Leap,
     candidates: Vec<(usize, usize)>,
+    /// Breaks to come in the step: where in it, and the block.
+    breaks: Vec<(f64, usize)>,
+    /// Blocks whose series an event has changed.
+    amended: Vec<usize>,
+    /// How long the step could go on after the last break and after the last reattachment, in s.
+    break_window: f64,
+    attach_window: f64,
+    /// Coefficients of F_S over the step, in N, and room for those of a block.
+    force: Vec<f64>,
+    coefficients: Vec<f64>,
+    /// Order from which on terms are checked, by the number of halvings.
+    least_orders: [usize; MOST_HALVINGS + 1],
     /// Largest error left in one step and by one leap, in m.
     truncation: f64,
     left_out: f64,
@@ -101,6 +109,8 @@ struct Run<'a> {
     time: f64,
     /// Displacement of the drive's ramp at the epoch.
     ramp_at_epoch: f64,
+    /// Δ cos θ and -Δ sin θ at the phase θ of now.
+    swing: [f64; 2],
     longest_step: f64,
     typical_advance: f64,
     next_leap: f64,
@@ -129,6 +139,13 @@ impl<'a> Run<'a> {
             series: Series::new(layout),
             leap: Leap::new(layout),
             candidates: Vec::new(),
+            breaks: Vec::new(),
+            amended: Vec::new(),
+            break_window: 0.0,
+            attach_window: 0.0,
+            force: Vec::new(),
+            coefficients: Vec::new(),
+            least_orders: [0; MOST_HALVINGS + 1],
             truncation: truncation_share(parameters, longest_step) * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),
             epoch: 0.0,
@@ -136,6 +153,7 @@ impl<'a> Run<'a> {
             time: 0.0,
             // The cosine is counted from its own zero, so the ramp starts Δ below.
             ramp_at_epoch: -drive.amplitude,
+            swing: [drive.amplitude, 0.0],
             longest_step,
             typical_advance: longest_step,
             next_leap: 0.0,
@@ -164,7 +182,7 @@ impl<'a> Run<'a> {
                 && self.time >= self.next_leap
                 && self.try_leap(horizon, observer);
             if !leapt {
-                self.step(horizon, observer)?;
+                self.step(until_end, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
                 let (time, events) = (self.epoch + self.time, self.limits.events);
@@ -236,7 +254,10 @@ impl<'a> Run<'a> {
                 self.next_leap = 0.0;
                 self.arrive(elapsed, elapsed == horizon);
                 match reached {
-                    Some(block) => self.break_block(block, observer),
+                    Some(block) => {
+                        let x = self.chain.at(&self.state.displacement, block);
+                        self.break_block(block, x, self.shear_force(), observer);
+                    }
                     None => self.reattach_due(observer),
                 }
                 true
@@ -244,157 +265,27 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
-    fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
-        let elapsed = shown.duration;
-        let after = std::mem::replace(&mut self.state, before);
-        let (start, mut done) = (self.time, 0.0);
-        while done < elapsed {
-            let left = elapsed - done;
-            let Ok(length) = self.expand(left) else { break };
-            let s = (left / length).min(1.0);
-            let coefficients = self.force_coefficients(length);
-            if let Some(audit) = &mut self.audit {
-                audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
-                let path = ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length };
-                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
-                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
-            }
-            self.kernels.evaluate(&self.series, s, length, &mut self.state);
-            done = if s < 1.0 { elapsed } else { done + length };
-            self.time = start + done;
-        }
-        self.state = after;
-        self.time = start;
-        if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
-        }
-    }
-
-    /// One Taylor step, to the first of its end, a break, and `horizon` s.
-    fn step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
-        let length = self.expand(horizon)?;
-        if length < LEAST_RESOLUTION * f64::EPSILON * self.time.max(FRAME_SPAN) {
-            return Err(SimulationError::StepTooShort { time: self.epoch + self.time, step: length });
-        }
-        let end = (horizon / length).min(1.0);
-        let (s, reached) = self.first_break(end);
-        self.summary.steps += 1;
-        let coefficients = self.force_coefficients(length);
-        let duration = s * length;
-        observer.advance(&Segment {
-            start: self.epoch + self.time,
-            duration,
-            path: ForcePath::Polynomial { coefficients: &coefficients[..=self.series.order], scale: length },
-        });
-        if let Some(audit) = &mut self.audit {
-            audit.follow_series(self.kernels, &self.chain, &self.series, s, length);
-        }
-        self.kernels.evaluate(&self.series, s, length, &mut self.state);
-        self.passed_force = self.passed_force.max(polynomial::value(&coefficients[..=self.series.order], s));
-        let is_attachment = reached.is_none() && s == end && end < 1.0;
-        self.arrive(if is_attachment { horizon } else { duration }, is_attachment);
-        if let Some(block) = reached {
-            self.break_block(block, observer);
-        } else if is_attachment {
-            self.reattach_due(observer);
-        }
-        self.typical_advance += 0.25 * ((if s == 1.0 { 2.0 * length } else { duration }) - self.typical_advance);
-        Ok(())
-    }
-
-    /// Expands the state into a series that reaches at least `horizon` or as far as events let it; returns its length.
-    fn expand(&mut self, horizon: f64) -> Result<f64, SimulationError> {
-        let wanted = (STEP_AHEAD * self.typical_advance).min(horizon).min(self.longest_step);
-        let mut halvings = 0;
-        let mut length = self.longest_step;
-        while halvings < MOST_HALVINGS && 0.5 * length >= wanted {
-            halvings += 1;
-            length *= 0.5;
-        }
-        loop {
-            let input = StepInput { length, error: self.truncation, drive: self.drive_series(length) };
-            if self.kernels.expand(&self.chain, &self.state, &input, &mut self.series) {
-                return Ok(length);
-            }
-            halvings += 1;
-            length *= 0.5;
-            if halvings > HOPELESS_HALVINGS {
-                return Err(SimulationError::NotFinite { time: self.epoch + self.time });
-            }
-        }
-    }
-
-    /// `K_d/m` times the scaled coefficients of the drive's displacement.
-    fn drive_series(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
-        let mut series = [0.0; MOST_COEFFICIENTS];
-        series[0] = self.ramp_at_epoch + self.drive.velocity * self.time;
-        series[1] = self.drive.velocity * length;
-        if self.drive.is_modulated() {
-            let (sine, cosine) = libm::sincos(self.phase());
-            let angle = self.drive.angular_frequency * length;
-            let mut power = self.drive.amplitude;
-            for (p, term) in series.iter_mut().enumerate() {
-                *term += power * [cosine, -sine, -cosine, sine][p % 4];
-                power *= angle / (p + 1) as f64;
-            }
-        }
-        let pulling = self.drive.stiffness / self.mass;
-        series.map(|term| pulling * term)
-    }
-
-    /// Coefficients of F_S over the step.
-    fn force_coefficients(&self, length: f64) -> [f64; MOST_COEFFICIENTS] {
-        let driven = self.drive_series(length);
-        let edge = self.series.block(0, 0);
-        let mut force = [0.0; MOST_COEFFICIENTS];
-        for p in 0..=self.series.order {
-            force[p] = self.mass * driven[p] - self.drive.stiffness * edge[p];
-        }
-        force
-    }
-
-    /// The first break in [0, `end`] of the step, and its block; ties go to the smaller block.
-    fn first_break(&mut self, end: f64) -> (f64, Option<usize>) {
-        let mut first = (end, None);
-        self.kernels.reachable(&self.chain, &self.series, &mut self.candidates);
-        for &(row, lane) in &self.candidates {
-            let block = self.chain.layout.block(row, lane);
-            let coefficients = self.series.block(row, lane);
-            let coefficients = &coefficients[..=self.series.order];
-            let mut relative = [0.0; MOST_COEFFICIENTS];
-            let relative = &mut relative[..coefficients.len()];
-            for (level, sign) in [(self.chain.upper[row][lane], 1.0), (-self.chain.lower[row][lane], -1.0)] {
-                if level == f64::INFINITY {
-                    continue;
-                }
-                for (r, c) in relative.iter_mut().zip(coefficients) {
-                    *r = sign * c;
-                }
-                relative[0] -= level;
-                if let Some(s) = first_reach(relative, first.0)
-                    && (s < first.0 || first.1.is_none_or(|earlier| block < earlier))
-                {
-                    first = (s, Some(block));
-                }
-            }
-        }
-        first
-    }
-
     /// Moves time on, exactly to the next reattachment if that is what came.
     fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
         let due = self.interface.next_reattachment();
         let reached = self.time + elapsed;
-        self.time = if at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached { due } else { reached };
+        let is_due = at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached;
+        self.set_time(if is_due { due } else { reached });
     }
 
-    /// Breaks what is reached at a block that was found at a break position.
-    fn break_block(&mut self, block: usize, observer: &mut dyn Observer) {
+    fn set_time(&mut self, time: f64) {
+        self.time = time;
+        if self.drive.is_modulated() {
+            let (sine, cosine) = libm::sincos(self.phase());
+            self.swing = [self.drive.amplitude * cosine, -self.drive.amplitude * sine];
+        }
+    }
+
+    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force `force` N.
+    fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
-        let x = self.state.displacement[row][lane];
-        self.passed_force = self.shear_force();
+        self.passed_force = force;
         // Rounding may leave the block a hair before the position that it was found to reach.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
@@ -408,8 +299,7 @@ impl<'a> Run<'a> {
     /// F_S now, in N.
     fn shear_force(&self) -> f64 {
         let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
-        let cosine = if self.drive.is_modulated() { libm::cos(self.phase()) } else { 0.0 };
-        self.drive.stiffness * (ramp + self.drive.amplitude * cosine - self.state.displacement[0][0])
+        self.drive.stiffness * (ramp + self.swing[0] - self.state.displacement[0][0])
     }
 
     /// Reattaches what is due now.
@@ -417,12 +307,16 @@ impl<'a> Run<'a> {
         while self.interface.next_reattachment() <= self.time
             && let Some(block) = self.interface.next_reattachment_block()
         {
-            let (row, lane) = self.chain.layout.slot(block);
-            let event = self.interface.reattach_next(self.state.displacement[row][lane]);
-            self.summary.reattachments += 1;
-            observer.contact(&absolute(event, self.epoch, self.origin));
-            self.chain.update(block, &self.interface);
+            self.attach_next(self.chain.at(&self.state.displacement, block), observer);
         }
+    }
+
+    /// Attaches the contact that is due next, at displacement `x` m of its block.
+    fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
+        let event = self.interface.reattach_next(x);
+        self.summary.reattachments += 1;
+        observer.contact(&absolute(event, self.epoch, self.origin));
+        self.chain.update(event.block, &self.interface);
     }
 
     /// Moves the frame to where the slider and the clock are.

@@ -1,21 +1,29 @@
-//! Taylor steps of the chain: x(t + s h) = Σ X_p s^p for s in [0, 1].
+//! Taylor steps of the chain: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p).
 //!
-//! With scaled coefficients X_p = h^p x^(p)/p! the equation of motion gives each order from the two before,
-//! X_{p+2} = [ h² (A X_p + forces) - γ h (p+1) X_{p+1} ] / ((p+1)(p+2)), one sweep of a tridiagonal stencil. Orders are
-//! added until two successive terms, times their order, fall under the wanted error. The sum of magnitudes bounds how
-//! far each block strays within the step.
-//!
-//! Every path of [`Kernels`] compiles the same plain code for another set of processor features; since nothing is fused
-//! or reassociated, all give the same bits.
+//! The equation of motion gives each order from the two before,
+//! Y_{p+2} = h² (A Y_p + forces) - γ h Y_{p+1}, one sweep of a tridiagonal stencil. Orders are added until two successive
+//! terms, times their order, fall under the wanted error. The sum of the terms' magnitudes bounds how far each block
+//! strays within the step.
 
-use super::glide::{Glide, advance};
-use super::lanes::{LANES, Layout, Row, flat, flat_mut, ghost_after, ghost_before};
+use super::lanes::{LANES, Layout, Row};
+use super::vector::Vector;
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
-use crate::solver::polynomial::MOST_COEFFICIENTS;
+use crate::solver::polynomial::{INVERSE, MOST_COEFFICIENTS};
 
 /// Largest order of a step.
-pub(super) const MOST_ORDER: usize = MOST_COEFFICIENTS - 1;
+const MOST_ORDER: usize = MOST_COEFFICIENTS - 1;
+
+/// 1/p!.
+const INVERSE_FACTORIAL: [f64; MOST_COEFFICIENTS] = {
+    let mut inverse = [1.0; MOST_COEFFICIENTS];
+    let mut p = 1;
+    while p < MOST_COEFFICIENTS {
+        inverse[p] = inverse[p - 1] / p as f64;
+        p += 1;
+    }
+    inverse
+};
 
 /// The chain's coefficients in lanes, all divided by the block mass.
 #[derive(Clone, Debug)]
@@ -78,25 +86,54 @@ impl Chain {
     }
 }
 
+/// The drive's displacement U over a step: h^p U^(p), order after order, in m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DriveTerms {
+    /// Ramp now, and its rise over the step.
+    pub ramp: [f64; 2],
+    /// Δ cos θ and -Δ sin θ at the phase of now.
+    pub swing: [f64; 2],
+    /// ω h, in rad.
+    pub angle: f64,
+}
+
+impl DriveTerms {
+    /// The term of this order; the next call gives the next.
+    #[inline(always)]
+    pub fn take(&mut self) -> f64 {
+        let term = self.ramp[0] + self.swing[0];
+        self.ramp = [self.ramp[1], 0.0];
+        self.swing = [self.angle * self.swing[1], -self.angle * self.swing[0]];
+        term
+    }
+}
+
 /// What a step needs to know about its length and the drive.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct StepInput {
     /// Length h, in s.
     pub length: f64,
     /// Wanted bound on the last terms, in m.
     pub error: f64,
-    /// Scaled coefficients of the drive's acceleration at block 1, `K_d/m` U_p, in m/s².
-    pub drive: [f64; MOST_COEFFICIENTS],
+    /// Order from which on the terms are compared with it.
+    pub least_order: usize,
+    /// `K_d/m`, in 1/s².
+    pub pulling: f64,
+    /// The drive's displacement.
+    pub drive: DriveTerms,
 }
 
 /// The series of one step.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
     rows: usize,
-    /// Rows of X_0, then of X_1, and so on, each with a ghost row before and after.
+    /// Rows of Y_0, then of Y_1, and so on, in m.
     terms: Vec<Row>,
-    /// `Σ_{p>=1} |X_p|` per block, in m.
-    pub excursion: Vec<Row>,
+    /// `Σ_{p>=1} |Y_p|/p!`: how far each block strays within the step, in m.
+    excursion: Vec<Row>,
+    /// h² times the coupling and minus the diagonal.
+    coupling: Vec<Row>,
+    diagonal: Vec<Row>,
     /// Order of the last step.
     pub order: usize,
 }
@@ -105,24 +142,50 @@ impl Series {
     pub fn new(layout: Layout) -> Self {
         Self {
             rows: layout.rows,
-            terms: vec![Row::filled(0.0); (layout.rows + 2) * MOST_COEFFICIENTS],
+            terms: vec![Row::filled(0.0); layout.rows * MOST_COEFFICIENTS],
             excursion: layout.filled(0.0),
+            coupling: layout.filled(0.0),
+            diagonal: layout.filled(0.0),
             order: 0,
         }
     }
 
-    #[inline(always)]
-    fn term(&self, order: usize, row: usize) -> &Row {
-        &self.terms[order * (self.rows + 2) + row + 1]
+    /// The coefficients Y_p/p! of one block, in m, written over what is there.
+    pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
+        coefficients.resize(self.order + 1, 0.0);
+        let mut at = row;
+        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
+            *coefficient = inverse * self.terms[at][lane];
+            at += self.rows;
+        }
     }
 
-    /// The coefficients of one block.
-    pub fn block(&self, row: usize, lane: usize) -> [f64; MOST_COEFFICIENTS] {
-        let mut coefficients = [0.0; MOST_COEFFICIENTS];
-        for (p, coefficient) in coefficients.iter_mut().enumerate().take(self.order + 1) {
-            *coefficient = self.term(p, row)[lane];
+    /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
+    pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
+        let (mut at, mut factorial, mut order) = (row, 1.0, 0.0);
+        for coefficient in coefficients {
+            self.terms[at][lane] += factorial * coefficient;
+            self.excursion[row][lane] += coefficient.abs();
+            at += self.rows;
+            order += 1.0;
+            factorial *= order;
         }
-        coefficients
+    }
+
+    /// Bounds on the displacement of one block within the step, in m.
+    pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
+        let (start, excursion) = (self.terms[row][lane], self.excursion[row][lane]);
+        [start - excursion, start + excursion]
+    }
+
+    /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
+    pub fn shear_force(&self, mut drive: DriveTerms, stiffness: f64, coefficients: &mut Vec<f64>) {
+        coefficients.resize(self.order + 1, 0.0);
+        let mut at = 0;
+        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
+            *coefficient = stiffness * inverse * (drive.take() - self.terms[at][0]);
+            at += self.rows;
+        }
     }
 }
 
@@ -135,146 +198,40 @@ pub(super) struct State {
     pub velocity: Vec<Row>,
 }
 
-/// The hot loops, compiled for the features of one kind of processor.
-#[derive(Clone, Copy)]
-pub(super) struct Kernels {
-    expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
-    evaluate: unsafe fn(&Series, f64, f64, &mut State),
-    reachable: unsafe fn(&Chain, &Series, &mut Vec<(usize, usize)>),
-    glide: unsafe fn(&Chain, f64, &mut Glide),
-    /// Name of the processor features, for tests and reports.
-    #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
-    pub name: &'static str,
-}
-
-/// Compiles the loops for one set of processor features.
-macro_rules! kernels {
-    ($module:ident, $name:literal $(, $features:literal)?) => {
-        mod $module {
-            use super::{Chain, Glide, Kernels, Series, State, StepInput, advance, evaluate, expand, reachable};
-
-            $(#[target_feature(enable = $features)])?
-            fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-                expand(chain, state, input, series)
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn evaluate_here(series: &Series, s: f64, length: f64, state: &mut State) {
-                evaluate(series, s, length, state);
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn reachable_here(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
-                reachable(chain, series, blocks);
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn glide_here(chain: &Chain, seconds: f64, glide: &mut Glide) {
-                advance(chain, seconds, glide);
-            }
-
-            pub(super) const KERNELS: Kernels = Kernels {
-                expand: expand_here,
-                evaluate: evaluate_here,
-                reachable: reachable_here,
-                glide: glide_here,
-                name: $name,
-            };
-        }
-    };
-}
-
-kernels!(baseline, "baseline");
-#[cfg(target_arch = "x86_64")]
-kernels!(avx2, "avx2", "avx2");
-#[cfg(target_arch = "x86_64")]
-kernels!(avx512, "avx512", "avx512f,avx512vl,avx512dq");
-
-impl Kernels {
-    /// Every path that this processor can run, the fastest last.
-    pub fn available() -> Vec<Self> {
-        let mut paths = vec![baseline::KERNELS];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") {
-                paths.push(avx2::KERNELS);
-            }
-            if is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512dq")
-            {
-                paths.push(avx512::KERNELS);
-            }
-        }
-        paths
-    }
-
-    /// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
-    #[inline]
-    pub fn expand(self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-        // SAFETY: `available` yields only paths whose features this processor has.
-        unsafe { (self.expand)(chain, state, input, series) }
-    }
-
-    /// State at s in [0, 1] of a step of so many seconds.
-    #[inline]
-    pub fn evaluate(self, series: &Series, s: f64, length: f64, state: &mut State) {
-        // SAFETY: as above.
-        unsafe { (self.evaluate)(series, s, length, state) }
-    }
-
-    /// Row and lane of every block that may reach a break position within the step.
-    #[inline]
-    pub fn reachable(self, chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
-        // SAFETY: as above.
-        unsafe { (self.reachable)(chain, series, blocks) }
-    }
-
-    /// Carries the free motion over so many seconds.
-    #[inline]
-    pub fn glide(self, chain: &Chain, seconds: f64, glide: &mut Glide) {
-        // SAFETY: as above.
-        unsafe { (self.glide)(chain, seconds, glide) }
-    }
-}
-
+/// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
 #[inline(always)]
-fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+pub(super) fn expand<V: Vector>(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
     let rows = series.rows;
-    let stride = rows + 2;
-    let h = input.length;
-    let (x, rest) = series.terms.split_at_mut(stride);
-    x[1..=rows].copy_from_slice(&state.displacement[..rows]);
-    close(&mut x[..stride], 0.0);
-    let rate = &mut rest[..stride];
+    let length = V::splat(input.length);
+    let square = input.length * input.length;
+    let damping = V::splat(-chain.damping_rate * input.length);
     for r in 0..rows {
-        rate[r + 1] = Row(state.velocity[r].map(|v| h * v));
+        V::load(&chain.coupling[r]).times(V::splat(square)).store(&mut series.coupling[r]);
+        V::load(&chain.diagonal[r]).times(V::splat(-square)).store(&mut series.diagonal[r]);
+        series.terms[r] = state.displacement[r];
+        V::load(&state.velocity[r]).times(length).store(&mut series.terms[rows + r]);
     }
-    close(rate, 0.0);
-    for r in 0..rows {
-        series.excursion[r] = Row(rate[r + 1].map(f64::abs));
-    }
+    let mut drive = input.drive;
     for p in 0..MOST_ORDER - 1 {
-        let next = (p + 2) as f64;
-        let for_force = h * h / ((p + 1) as f64 * next);
-        let for_damping = chain.damping_rate * h / next;
-        stencil(chain, &mut series.terms[p * stride..(p + 3) * stride], for_force, for_damping);
-        let added = &mut series.terms[(p + 2) * stride..(p + 3) * stride];
+        let terms = &mut series.terms[p * rows..(p + 3) * rows];
+        sweep::<V>(&series.coupling, &series.diagonal, damping, terms);
+        let added = &mut terms[2 * rows..];
         if p == 0 {
-            for (row, pull) in added[1..=rows].iter_mut().zip(&chain.pull) {
-                for l in 0..LANES {
-                    row[l] += for_force * pull[l];
-                }
+            for (row, pull) in added.iter_mut().zip(&chain.pull) {
+                V::load(pull).fused(V::splat(square), V::load(row)).store(row);
             }
         }
-        close(added, for_force * input.drive[p]);
+        let push = square * input.pulling * drive.take();
+        if push != 0.0 {
+            V::load(&FIRST_LANE).fused(V::splat(push), V::load(&added[0])).store(&mut added[0]);
+        }
         // Two orders at a time: every second one may vanish by symmetry.
-        if p % 2 == 1 {
-            let added = &series.terms[(p + 1) * stride..(p + 3) * stride];
-            let (lower, upper) = added.split_at(stride);
-            let largest = stray(&lower[1..=rows], &upper[1..=rows], &mut series.excursion);
-            series.order = p + 2;
-            if next * largest <= input.error {
+        let order = p + 2;
+        if p % 2 == 1 && order >= input.least_order {
+            let (lower, higher) = terms[rows..].split_at(rows);
+            let weights = [order - 1, order].map(|p| order as f64 * INVERSE_FACTORIAL[p]);
+            if largest::<V>(lower, higher, weights).within(V::splat(input.error)) {
+                series.order = order;
                 return true;
             }
         }
@@ -282,92 +239,138 @@ fn expand(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) 
     false
 }
 
-/// X_{p+2} without pull and drive, for every row: `terms` holds X_p, X_{p+1} and room for it.
+/// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
 #[inline(always)]
-fn stencil(chain: &Chain, terms: &mut [Row], for_force: f64, for_damping: f64) {
-    let stride = terms.len() / 3;
-    let rows = stride - 2;
-    let (x, rest) = terms.split_at_mut(stride);
-    let (rate, next) = rest.split_at_mut(stride);
-    let entries = rows * LANES;
-    let (coupling, diagonal) = (&flat(&chain.coupling)[..entries], &flat(&chain.diagonal)[..entries]);
-    let (before, here, after) = (&flat(x)[..entries], &flat(&x[1..])[..entries], &flat(&x[2..])[..entries]);
-    let rate = &flat(&rate[1..])[..entries];
-    let next = &mut flat_mut(&mut next[1..])[..entries];
-    for i in 0..entries {
-        let force = coupling[i] * (before[i] + after[i]) - diagonal[i] * here[i];
-        next[i] = for_force * force - for_damping * rate[i];
+fn sweep<V: Vector>(coupling: &[Row], diagonal: &[Row], damping: V, terms: &mut [Row]) {
+    let rows = terms.len() / 3;
+    let (y, rest) = terms.split_at_mut(rows);
+    let (rate, next) = rest.split_at_mut(rows);
+    let (coupling, diagonal) = (&coupling[..rows], &diagonal[..rows]);
+    let (rate, next) = (&rate[..rows], &mut next[..rows]);
+    let mut before = V::load(&y[rows - 1]).to_next_lane();
+    let mut here = V::load(&y[0]);
+    let last_after = here.to_lane_before();
+    let last = rows - 1;
+    for ((((next, rate), coupling), diagonal), after) in
+        next[..last].iter_mut().zip(&rate[..last]).zip(&coupling[..last]).zip(&diagonal[..last]).zip(&y[1..])
+    {
+        let after = V::load(after);
+        let coupled = before.plus(after).times(V::load(coupling));
+        let forced = here.fused(V::load(diagonal), coupled);
+        V::load(rate).fused(damping, forced).store(next);
+        (before, here) = (here, after);
     }
+    let coupled = before.plus(last_after).times(V::load(&coupling[last]));
+    let forced = here.fused(V::load(&diagonal[last]), coupled);
+    V::load(&rate[last]).fused(damping, forced).store(&mut next[last]);
 }
 
-/// Adds the drive's share to block 1 and fills the ghost rows.
-#[inline(always)]
-fn close(rows: &mut [Row], drive: f64) {
-    let last = rows.len() - 2;
-    let mut first = rows[1];
-    first[0] += drive;
-    rows[1] = first;
-    rows[0] = ghost_before(&rows[last]);
-    rows[last + 1] = ghost_after(&rows[1]);
-}
+/// Block 1, at which the drive pulls.
+const FIRST_LANE: Row = {
+    let mut row = Row::filled(0.0);
+    row.0[0] = 1.0;
+    row
+};
 
-/// Adds the magnitudes of two orders to the excursions and returns the largest.
+/// In each lane, the largest weighted magnitude in the rows of two orders.
 #[inline(always)]
-fn stray(lower: &[Row], upper: &[Row], excursion: &mut [Row]) -> f64 {
-    let mut largest = Row::filled(0.0);
-    for ((lower, upper), excursion) in lower.iter().zip(upper).zip(excursion) {
-        let (one, other, before, most) = (lower.map(f64::abs), upper.map(f64::abs), *excursion, largest);
-        let (mut total, mut more) = (before, most);
-        for l in 0..LANES {
-            total[l] = before[l] + (one[l] + other[l]);
-            let size = if one[l] > other[l] { one[l] } else { other[l] };
-            more[l] = if size > most[l] { size } else { most[l] };
-        }
-        (*excursion, largest) = (total, more);
+fn largest<V: Vector>(lower: &[Row], higher: &[Row], weights: [f64; 2]) -> V {
+    let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
+    for (lower, higher) in lower.iter().zip(higher) {
+        in_lower = V::load(lower).magnitude().larger(in_lower);
+        in_higher = V::load(higher).magnitude().larger(in_higher);
     }
-    let larger = |a: f64, b: f64| if a > b { a } else { b };
-    let pairs = |l: usize| larger(largest[l], largest[l + 4]);
-    larger(larger(pairs(0), pairs(1)), larger(pairs(2), pairs(3)))
+    in_lower.times(V::splat(weights[0])).larger(in_higher.times(V::splat(weights[1])))
 }
 
+/// Rows that are taken through all orders together: their sums need not wait for each other.
+const TOGETHER: usize = 3;
+
+/// State at s in [0, 1] of a step of so many seconds.
 #[inline(always)]
-fn evaluate(series: &Series, s: f64, length: f64, state: &mut State) {
+pub(super) fn evaluate<V: Vector>(series: &Series, s: f64, length: f64, state: &mut State) {
     let rows = series.rows;
-    let inverse_length = 1.0 / length;
-    for r in 0..rows {
-        let mut value = *series.term(series.order, r);
-        let mut slope = Row::filled(0.0);
-        for p in (0..series.order).rev() {
-            let term = series.term(p, r);
-            for l in 0..LANES {
-                slope[l] = slope[l] * s + value[l];
-                value[l] = value[l] * s + term[l];
-            }
+    let whole = rows - rows % TOGETHER;
+    for r in (0..whole).step_by(TOGETHER) {
+        evaluate_rows::<V, TOGETHER>(series, r, s, length, state);
+    }
+    for r in whole..rows {
+        evaluate_rows::<V, 1>(series, r, s, length, state);
+    }
+}
+
+/// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
+#[inline(always)]
+fn evaluate_rows<V: Vector, const G: usize>(series: &Series, first: usize, s: f64, length: f64, state: &mut State) {
+    let (rows, order) = (series.rows, series.order);
+    let inverse_length = V::splat(1.0 / length);
+    let mut at = order * rows + first;
+    let mut value = [V::splat(0.0); G];
+    for (value, term) in value.iter_mut().zip(&series.terms[at..at + G]) {
+        *value = V::load(term);
+    }
+    let mut slope = value;
+    let mut for_value = V::splat(s * INVERSE[order]);
+    for inverse in INVERSE[1..order].iter().rev() {
+        at -= rows;
+        let for_slope = V::splat(s * inverse);
+        for ((value, slope), term) in value.iter_mut().zip(&mut slope).zip(&series.terms[at..at + G]) {
+            let term = V::load(term);
+            *value = value.fused(for_value, term);
+            *slope = slope.fused(for_slope, term);
         }
-        state.displacement[r] = value;
-        for l in 0..LANES {
-            state.velocity[r][l] = slope[l] * inverse_length;
-        }
+        for_value = for_slope;
+    }
+    for ((value, term), x) in
+        value.iter().zip(&series.terms[first..first + G]).zip(&mut state.displacement[first..first + G])
+    {
+        value.fused(for_value, V::load(term)).store(x);
+    }
+    for (slope, v) in slope.iter().zip(&mut state.velocity[first..first + G]) {
+        slope.times(inverse_length).store(v);
+    }
+}
+
+/// Row and lane of every block that may reach a break position within the step.
+#[inline(always)]
+pub(super) fn reachable<V: Vector>(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
+    let rows = series.rows;
+    let whole = rows - rows % TOGETHER;
+    blocks.clear();
+    for r in (0..whole).step_by(TOGETHER) {
+        reachable_rows::<V, TOGETHER>(chain, series, r, blocks);
+    }
+    for r in whole..rows {
+        reachable_rows::<V, 1>(chain, series, r, blocks);
     }
 }
 
 #[inline(always)]
-fn reachable(chain: &Chain, series: &Series, blocks: &mut Vec<(usize, usize)>) {
-    blocks.clear();
-    for r in 0..series.rows {
-        let (x, excursion) = (series.term(0, r), &series.excursion[r]);
-        let (upper, lower) = (&chain.upper[r], &chain.lower[r]);
-        let mut any = false;
-        for l in 0..LANES {
-            any |= x[l] + excursion[l] >= upper[l];
-            any |= x[l] - excursion[l] <= lower[l];
+fn reachable_rows<V: Vector, const G: usize>(
+    chain: &Chain,
+    series: &mut Series,
+    first: usize,
+    blocks: &mut Vec<(usize, usize)>,
+) {
+    let (rows, order) = (series.rows, series.order);
+    let mut excursion = [V::splat(0.0); G];
+    let mut at = first;
+    for inverse in &INVERSE_FACTORIAL[1..=order] {
+        at += rows;
+        let weight = V::splat(*inverse);
+        for (excursion, term) in excursion.iter_mut().zip(&series.terms[at..at + G]) {
+            *excursion = V::load(term).magnitude().fused(weight, *excursion);
         }
-        if any {
-            for l in 0..LANES {
-                if x[l] + excursion[l] >= upper[l] || x[l] - excursion[l] <= lower[l] {
-                    blocks.push((r, l));
-                }
-            }
+    }
+    for (g, excursion) in excursion.iter().enumerate() {
+        let r = first + g;
+        excursion.store(&mut series.excursion[r]);
+        let x = V::load(&series.terms[r]);
+        let above = x.plus(*excursion).reaches(V::load(&chain.upper[r]));
+        let below = V::load(&chain.lower[r]).reaches(x.minus(*excursion));
+        let reached = above | below;
+        if reached != 0 {
+            blocks.extend((0..LANES).filter(|lane| reached >> lane & 1 == 1).map(|lane| (r, lane)));
         }
     }
 }

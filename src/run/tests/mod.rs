@@ -1,5 +1,9 @@
 //! Whole runs with a fake kernel: quick, and a function of the parameters alone, as the real one.
 
+mod fault;
+mod faults;
+mod faulty_disk;
+
 use super::*;
 use crate::model::Parameters;
 use crate::observe::{Precursor, Slip};
@@ -7,15 +11,13 @@ use crate::solver::{SimulationError, Summary};
 use crate::store::columns::Table;
 use crate::store::dataset::Reader;
 use crate::store::layout::Layout;
-use crate::store::storage::{Disk, StoredFile};
+use crate::store::storage::Disk;
 use crate::store::tables::{self, JobRecord, JobResult};
 use crate::sweep::{Job, PART_COST};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsString;
 use std::fs;
-use std::io;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
 
 const SEEDS: u64 = 60;
 
@@ -70,7 +72,7 @@ fn fine(job: &Job, _: &AtomicBool) -> Result<JobResult, SimulationError> {
 }
 
 fn options(stop: &AtomicBool, threads: usize) -> Options<'_> {
-    Options { threads: NonZeroUsize::new(threads), stop, retry_failed: false, shard: Shard::default() }
+    Options { threads: NonZeroUsize::new(threads), stop, retry_failed: false, shard: Shard::default(), walltime: None }
 }
 
 fn run_all(root: &Path, sweep: &Sweep, kernel: &Kernel<'_>) -> RunReport {
@@ -293,105 +295,6 @@ fn the_same_shard_twice_is_refused_while_it_runs() {
     assert_eq!(run_all(root.path(), &sweep(1, ""), &fine).jobs_left, 0);
 }
 
-/// A disk of which the n-th change fails, and all after it: what a kill at that instant leaves.
-struct FailingDisk {
-    changes_left: Arc<AtomicU64>,
-}
-
-fn change(left: &AtomicU64) -> io::Result<()> {
-    let left = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
-    left.map(|_| ()).map_err(|_| io::Error::from(io::ErrorKind::StorageFull))
-}
-
-impl FailingDisk {
-    fn change(&self) -> io::Result<()> {
-        change(&self.changes_left)
-    }
-}
-
-struct FailingFile {
-    file: Box<dyn StoredFile>,
-    changes_left: Arc<AtomicU64>,
-}
-
-impl io::Write for FailingFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        change(&self.changes_left).and_then(|()| self.file.write(bytes))
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
-impl StoredFile for FailingFile {
-    fn sync(&mut self) -> io::Result<()> {
-        change(&self.changes_left).and_then(|()| self.file.sync())
-    }
-}
-
-impl Storage for FailingDisk {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.create_folder(folder))
-    }
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        self.change()?;
-        Ok(Box::new(FailingFile { file: Disk.create(file)?, changes_left: Arc::clone(&self.changes_left) }))
-    }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.rename(from, to))
-    }
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.remove_folder(folder))
-    }
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.exchange(one, other))
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.sync_folder(folder))
-    }
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
-        Disk.list(folder)
-    }
-    fn open(&self, file: &Path) -> io::Result<File> {
-        Disk.open(file)
-    }
-    fn exists(&self, file: &Path) -> io::Result<bool> {
-        Disk.exists(file)
-    }
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.remove(file))
-    }
-    fn lock(&self, file: &Path) -> io::Result<Option<File>> {
-        self.change().and_then(|()| Disk.lock(file))
-    }
-}
-
-#[test]
-fn a_disk_that_fails_at_any_change_ends_the_run_with_an_error_and_the_next_run_completes_it() {
-    let expected = expected_tables();
-    let stop = AtomicBool::new(false);
-    // In steps that meet every kind of change at some part.
-    for changes in (0..).step_by(3) {
-        let root = tempfile::tempdir().unwrap();
-        let disk = FailingDisk { changes_left: Arc::new(AtomicU64::new(changes)) };
-        let ended = run(&disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &fine, &mut |_| ());
-        if root.path().join("tables/jobs").exists() {
-            // Every file that is there is whole, and a part has all its files.
-            let done = texts(root.path(), "jobs", "job_id");
-            for (path, bytes) in tables_of(root.path()) {
-                assert!(expected[&path] == bytes, "{} after {changes} changes", path.display());
-            }
-            assert!(done.len() as u64 <= 2 * SEEDS);
-        }
-        if ended.is_ok() {
-            assert!(changes > 40, "the disk was hardly used");
-            break;
-        }
-        run_all(root.path(), &sweep(SEEDS, ""), &fine);
-        assert!(tables_of(root.path()) == expected, "after {changes} changes");
-    }
-}
-
 #[test]
 fn the_status_tells_what_is_there_and_what_is_missing() {
     let root = tempfile::tempdir().unwrap();
@@ -424,7 +327,7 @@ fn events_account_for_every_job() {
             failed += 1;
         }
         RunEvent::PartCommitted { jobs, .. } => committed += jobs as u64,
-        RunEvent::Stopping => panic!("nobody asked"),
+        RunEvent::Stopping | RunEvent::OutOfTime => panic!("nobody asked"),
         RunEvent::Finished(report) => finished += report.jobs_run,
     })
     .unwrap();
@@ -446,4 +349,39 @@ fn all_tables_have_the_described_columns() {
         let names: Vec<_> = batch.rows.schema().fields().iter().map(|field| field.name().clone()).collect();
         assert_eq!(names, expected);
     }
+}
+
+#[test]
+fn a_walltime_ends_a_run_in_time_with_all_that_it_started_committed_and_the_pace_is_learnt() {
+    /// Of the predicted cost: at a pace of 1 no part of 5 s on two threads would end in time.
+    const PACE: f64 = 0.2;
+    const WALLTIME: Duration = Duration::from_millis(1500);
+    let slow = |job: &Job, interrupt: &AtomicBool| {
+        std::thread::sleep(Duration::from_secs_f64(PACE * job.cost));
+        fine(job, interrupt)
+    };
+    let root = tempfile::tempdir().unwrap();
+    let stop = AtomicBool::new(false);
+    for round in 0.. {
+        let options = Options { walltime: Some(WALLTIME), ..options(&stop, 2) };
+        let (mut jobs_ended, mut out_of_time, mut interrupted) = (0, 0, false);
+        let report = run(&Disk, &sweep(SEEDS, ""), root.path(), options, &slow, &mut |event| match event {
+            RunEvent::JobDone { .. } => jobs_ended += 1,
+            RunEvent::OutOfTime => out_of_time += 1,
+            RunEvent::Stopping => interrupted = true,
+            _ => {}
+        })
+        .unwrap();
+        assert!(report.wall < WALLTIME.as_secs_f64(), "{report:?}");
+        // A machine that stalls may interrupt a part.
+        assert!(interrupted || (report.jobs_run > 0 && report.jobs_run == jobs_ended), "{report:?}");
+        assert_eq!((report.time_wanted.is_some(), out_of_time), (out_of_time > 0, u32::from(out_of_time > 0)));
+        assert_eq!(report.stopped, report.jobs_left > 0, "{report:?}");
+        assert!(report.stopped || round > 0, "four parts take 2 s");
+        if !report.stopped {
+            break;
+        }
+        assert!(round < 10, "{report:?}");
+    }
+    assert!(tables_of(root.path()) == expected_tables());
 }

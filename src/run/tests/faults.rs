@@ -1,0 +1,233 @@
+//! Every operation of small runs fails in every way, and the next run completes them to the same bytes.
+
+use super::fault::{Fault, Operation};
+use super::faulty_disk::{FaultyDisk, MOUNT};
+use super::*;
+use crate::reduce::reduce;
+use crate::store::dataset::Footer;
+
+/// Few jobs a part, by the predicted cost: 8 jobs in two parts with the first two seeds.
+fn small_sweep(seeds: u64) -> Sweep {
+    let text = format!(
+        "name = \"small\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
+         [record]\nslips = 90\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-6\n"
+    );
+    Sweep::parse(&text, Path::new("small.toml")).unwrap()
+}
+
+/// What was done on a disk before.
+#[derive(Clone, Copy)]
+enum Before {
+    Nothing,
+    FirstRun,
+    /// Some of its jobs failed.
+    FailingRun,
+    /// It was killed when it had the first table of a part in place.
+    KilledRun,
+}
+
+/// Renames of a first run before that of the second table of a part: two of the manifest, one of the first table.
+const RENAMES_BEFORE_THE_KILL: usize = 3;
+
+/// What is done on a disk, after what was done on it before.
+#[derive(Clone, Copy)]
+struct Scenario {
+    name: &'static str,
+    before: Before,
+    seeds: u64,
+    retry_failed: bool,
+    /// Whether the tables are reduced.
+    reduces: bool,
+}
+
+const FIRST_RUN: Scenario =
+    Scenario { name: "first run", before: Before::Nothing, seeds: 3, retry_failed: false, reduces: false };
+const SCENARIOS: [Scenario; 4] = [
+    FIRST_RUN,
+    Scenario { name: "extension of a killed run", before: Before::KilledRun, seeds: 5, ..FIRST_RUN },
+    Scenario { name: "retry of failed jobs", before: Before::FailingRun, retry_failed: true, ..FIRST_RUN },
+    Scenario { name: "reduction", before: Before::FirstRun, reduces: true, ..FIRST_RUN },
+];
+
+/// Runs with one thread, and reduces.
+fn attempt(storage: &dyn Storage, root: &Path, scenario: &Scenario, faults: bool) -> Result<RunReport, String> {
+    let stop = AtomicBool::new(false);
+    let options = Options { retry_failed: scenario.retry_failed, ..options(&stop, 1) };
+    let kernel = |job: &Job, _: &AtomicBool| match job.parameters.seed {
+        1 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
+        _ => Ok(measure(&job.parameters)),
+    };
+    let sweep = small_sweep(scenario.seeds);
+    let report = run(storage, &sweep, root, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
+    if scenario.reduces {
+        let footer = Footer::default().with_sweep(&sweep);
+        reduce(storage, &Layout::new(root), &footer).map_err(|error| error.to_string())?;
+    }
+    Ok(report)
+}
+
+/// Tables, reduced data, manifest and sweeps, without logs, locks and leftovers.
+fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
+    let is_result = |path: &Path| !["run/log", "run/lock", "run/staging"].iter().any(|folder| path.starts_with(folder));
+    files.iter().filter(|(path, _)| is_result(path)).map(|(path, bytes)| (path.as_path(), bytes.as_slice())).collect()
+}
+
+fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let (mut files, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
+    while let Some(below) = folders.pop() {
+        for entry in fs::read_dir(below).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+/// Jobs in the jobs table that are done and did not fail.
+fn committed_jobs(root: &Path) -> u64 {
+    if !root.join("tables/jobs").exists() {
+        return 0;
+    }
+    texts(root, "jobs", "outcome").iter().filter(|outcome| *outcome != tables::FAILED).count() as u64
+}
+
+/// A scenario, ready to begin, and how it ends.
+struct Trial {
+    scenario: Scenario,
+    root: PathBuf,
+    prepared: FaultyDisk,
+    before: BTreeMap<PathBuf, Vec<u8>>,
+    after: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl Trial {
+    fn new(scenario: Scenario) -> Self {
+        let root = Path::new(MOUNT).join("results/small");
+        let prepared = FaultyDisk::new();
+        if let Before::KilledRun = scenario.before {
+            prepared.arm(Operation::Rename, RENAMES_BEFORE_THE_KILL, Fault::Killed);
+        }
+        let ended_before = match scenario.before {
+            Before::Nothing => None,
+            before => Some(attempt(&prepared, &root, &FIRST_RUN, matches!(before, Before::FailingRun))),
+        };
+        assert_eq!(prepared.reboot(), ended_before.is_some_and(|ended| ended.is_err()));
+        let good = prepared.copy();
+        attempt(&good, &root, &scenario, false).unwrap();
+        let (before, after) = (prepared.files(&root), good.files(&root));
+        assert!(after.keys().filter(|path| path.starts_with("tables/jobs")).count() >= 2, "{:?}", after.keys());
+        Self { scenario, root, prepared, before, after }
+    }
+
+    /// Goes through with a fault at the n-th operation of a kind; `false` if there are fewer.
+    fn befalls(&self, operation: Operation, n: usize, fault: Fault) -> bool {
+        let disk = self.prepared.copy();
+        disk.arm(operation, n, fault);
+        let ended = attempt(&disk, &self.root, &self.scenario, false);
+        if !disk.reboot() {
+            assert!(ended.is_ok(), "{ended:?}");
+            return false;
+        }
+        let case = format!("{}: {fault:?} at {operation:?} {n}, {ended:?}", self.scenario.name);
+        let left = disk.files(&self.root);
+        match fault {
+            Fault::ShortWrite => assert!(ended.is_ok(), "{case}"),
+            Fault::Killed | Fault::PowerCut | Fault::PowerCutTorn => {}
+            _ => assert!(ended.is_err() || results(&left) == results(&self.after), "{case}"),
+        }
+        // Nothing was damaged, so nobody is to be told to move files away.
+        assert!(!ended.is_err_and(|error| error.contains("damaged")), "{case}");
+        self.is_whole(&left, &case);
+        self.resumes(&disk, &left, &case);
+
+        // What a run reported as done survives a power cut, whatever happened before it.
+        attempt(&disk, &self.root, &self.scenario, false).expect(&case);
+        disk.cut_power();
+        assert!(results(&disk.files(&self.root)) == results(&self.after), "{case}: resumed, then a power cut");
+        true
+    }
+
+    /// What is there is whole, and no table that was there is lost.
+    fn is_whole(&self, left: &BTreeMap<PathBuf, Vec<u8>>, case: &str) {
+        let is_data = |path: &Path| path.starts_with("tables") || path.starts_with("reduced");
+        for (path, bytes) in left.iter().filter(|(path, _)| is_data(path)) {
+            let known = [self.before.get(path), self.after.get(path)];
+            assert!(known.contains(&Some(bytes)), "{case}: {}", path.display());
+        }
+        let mut tables = self.before.keys().filter(|path| path.starts_with("tables"));
+        assert!(tables.all(|path| left.contains_key(path)), "{case}");
+    }
+
+    /// The same command with the real store goes on, runs nothing twice, and ends with the same bytes.
+    fn resumes(&self, disk: &FaultyDisk, left: &BTreeMap<PathBuf, Vec<u8>>, case: &str) {
+        // Where syncs cost nothing, if there is such a place.
+        let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();
+        let real = folder.path().join("small");
+        for path in disk.folders(&self.root) {
+            fs::create_dir_all(real.join(path)).unwrap();
+        }
+        for (path, bytes) in left {
+            fs::write(real.join(path), bytes).unwrap();
+        }
+        let done = committed_jobs(&real);
+        let report = attempt(&Disk, &real, &self.scenario, false).expect(case);
+        let jobs_run = committed_jobs(&real) - done;
+        assert_eq!((report.jobs_run, report.jobs_failed, report.jobs_left), (jobs_run, 0, 0), "{case}");
+        assert!(results(&files_below(&real)) == results(&self.after), "{case}: resumed with the real store");
+        assert!(Disk.list(&real.join("run/staging/shard-1-of-1")).unwrap().is_empty(), "{case}");
+    }
+}
+
+/// How often each fault befell each operation.
+type Tried = BTreeMap<Operation, [usize; Fault::ALL.len()]>;
+
+fn try_all(scenario: Scenario) -> Tried {
+    let trial = Trial::new(scenario);
+    let mut tried = Tried::new();
+    for operation in Operation::ALL {
+        for (column, fault) in Fault::ALL.into_iter().enumerate().filter(|(_, fault)| fault.befalls(operation)) {
+            let mut n = 0;
+            while trial.befalls(operation, n, fault) {
+                n += 1;
+            }
+            tried.entry(operation).or_default()[column] += n;
+        }
+    }
+    tried
+}
+
+fn markdown(tried: &Tried) -> String {
+    let row = |first: &str, cells: &[String]| format!("| {first} | {} |\n", cells.join(" | "));
+    let head = row("", &Fault::ALL.map(|fault| fault.name().to_owned()));
+    let line = format!("|---|{}\n", "---|".repeat(Fault::ALL.len()));
+    let cells = |counts: &[usize; Fault::ALL.len()]| {
+        counts.map(|count| if count == 0 { String::new() } else { count.to_string() })
+    };
+    let rows = tried.iter().map(|(operation, counts)| row(operation.name(), &cells(counts)));
+    [head, line].into_iter().chain(rows).collect()
+}
+
+#[test]
+fn every_fault_at_every_operation_leaves_whole_files_and_the_next_run_ends_with_the_same_bytes() {
+    let mut tried = Tried::new();
+    let each = std::thread::scope(|scope| {
+        let threads = SCENARIOS.map(|scenario| scope.spawn(move || try_all(scenario)));
+        threads.map(|thread| thread.join().unwrap())
+    });
+    for (operation, counts) in each.into_iter().flatten() {
+        let sums = tried.entry(operation).or_default();
+        sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+    }
+    let table = markdown(&tried);
+    let total: usize = tried.values().flatten().sum();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/development.md");
+    let text = fs::read_to_string(file).unwrap();
+    assert!(
+        text.contains(&table) && text.contains(&format!("{total} faults")),
+        "docs/development.md tells another table; it was tried: {total} faults\n{table}"
+    );
+}

@@ -1,0 +1,108 @@
+//! The hot loops, compiled for each set of processor features and chosen at run time.
+
+use super::glide::{Glide, advance};
+use super::taylor::{Chain, Series, State, StepInput, evaluate, expand, reachable};
+use super::vector::Plain;
+#[cfg(target_arch = "x86_64")]
+use super::vector::{Avx2, Avx512};
+
+/// The hot loops, compiled for the features of one kind of processor.
+#[derive(Clone, Copy)]
+pub(super) struct Kernels {
+    expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
+    evaluate: unsafe fn(&Series, f64, f64, &mut State),
+    reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
+    glide: unsafe fn(&Chain, f64, f64, &mut Glide),
+    /// Name of the processor features, for tests and reports.
+    #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
+    pub name: &'static str,
+}
+
+/// Compiles the loops for one set of processor features.
+macro_rules! kernels {
+    ($module:ident, $vector:ident $(, $features:literal)?) => {
+        mod $module {
+            use super::{Chain, Glide, Kernels, Series, State, StepInput, advance, evaluate, expand, reachable};
+            use super::$vector;
+
+            $(#[target_feature(enable = $features)])?
+            fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+                expand::<$vector>(chain, state, input, series)
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn evaluate_here(series: &Series, s: f64, length: f64, state: &mut State) {
+                evaluate::<$vector>(series, s, length, state);
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn reachable_here(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
+                reachable::<$vector>(chain, series, blocks);
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn glide_here(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+                advance::<$vector>(chain, seconds, error, glide);
+            }
+
+            pub(super) const KERNELS: Kernels = Kernels {
+                expand: expand_here,
+                evaluate: evaluate_here,
+                reachable: reachable_here,
+                glide: glide_here,
+                name: stringify!($module),
+            };
+        }
+    };
+}
+
+kernels!(baseline, Plain);
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2, Avx2, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512, Avx512, "avx512f");
+
+impl Kernels {
+    /// Every path that this processor can run, the fastest last.
+    pub fn available() -> Vec<Self> {
+        let mut paths = vec![baseline::KERNELS];
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                paths.push(avx2::KERNELS);
+            }
+            if is_x86_feature_detected!("avx512f") {
+                paths.push(avx512::KERNELS);
+            }
+        }
+        paths
+    }
+
+    /// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
+    #[inline]
+    pub fn expand(self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+        // SAFETY: `available` yields only paths whose features this processor has.
+        unsafe { (self.expand)(chain, state, input, series) }
+    }
+
+    /// State at s in [0, 1] of a step of so many seconds.
+    #[inline]
+    pub fn evaluate(self, series: &Series, s: f64, length: f64, state: &mut State) {
+        // SAFETY: as above.
+        unsafe { (self.evaluate)(series, s, length, state) }
+    }
+
+    /// Row and lane of every block that may reach a break position within the step.
+    #[inline]
+    pub fn reachable(self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
+        // SAFETY: as above.
+        unsafe { (self.reachable)(chain, series, blocks) }
+    }
+
+    /// Carries the free motion over so many seconds; see [`advance`].
+    #[inline]
+    pub fn glide(self, chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+        // SAFETY: as above.
+        unsafe { (self.glide)(chain, seconds, error, glide) }
+    }
+}
