@@ -4,7 +4,7 @@
 
 mod program;
 
-use program::{Cell, FAILING, Folder, MANY, MANY_PARTS, TABLES, json, wait};
+use program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
 use std::fs;
 use std::path::PathBuf;
 
@@ -228,12 +228,11 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         for command in commands {
             let ended = folder.ends(4, command);
             assert!(ended.stderr.contains(&format!("{name}: damaged")), "{command}: {}", ended.stderr);
-            assert!(ended.stderr.contains("move this file and those of the same name"), "{}", ended.stderr);
+            assert!(ended.stderr.contains("stickslip verify"), "{}", ended.stderr);
         }
         // The way out that the message tells.
-        for table in TABLES {
-            let _ = fs::remove_file(folder.path("r/tables").join(table).join(part.file_name().unwrap()));
-        }
+        folder.ends(4, "verify r");
+        folder.ends(0, "verify r --repair");
         let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);
         assert_eq!(report["jobs_run"].as_u64(), Some(4096));
         assert!(folder.tables("r") == whole, "{table}");
@@ -256,9 +255,14 @@ fn a_pipe_gets_the_report_and_nothing_else() {
     folder.write("tiny.toml", TINY);
     let report = folder.ends(0, "run tiny.toml --json --out r").stdout;
     assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
-    for command in
-        ["plan tiny.toml --json", "status r --json", "reduce r --json", "simulate --set N=3 --slips 1 --json"]
-    {
+    for command in [
+        "plan tiny.toml --json",
+        "status r --json",
+        "reduce r --json",
+        "verify r --json",
+        "compact r --json",
+        "simulate --set N=3 --slips 1 --json",
+    ] {
         assert_eq!(json(&folder.ends(0, command).stdout)["format"].as_u64(), Some(1), "{command}");
     }
 }
@@ -292,7 +296,7 @@ fn completions_are_there_for_the_usual_shells() {
 fn the_help_of_every_command_holds_an_example() {
     let folder = Folder::new();
     assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
-    for command in ["", "plan", "run", "status", "reduce", "plot", "simulate", "completions"] {
+    for command in ["", "plan", "run", "status", "reduce", "plot", "verify", "compact", "simulate", "completions"] {
         let help = folder.ends(0, &format!("{command} --help")).stdout;
         let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
         assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");

@@ -1,10 +1,12 @@
 //! Exit codes, and which error ends with which.
 
 use stickslip::reduce::ReduceError;
-use stickslip::run::RunError;
+use stickslip::run::{RunError, UpkeepError};
 use stickslip::solver::SimulationError;
+use stickslip::store::compact::CompactError;
 use stickslip::store::dataset::DatasetError;
 use stickslip::store::manifest::DirectoryError;
+use stickslip::store::verify::RepairError;
 use stickslip::sweep::SweepError;
 
 /// How the program ends.
@@ -48,8 +50,27 @@ impl Exit {
             return match error {
                 RunError::Directory(error) => Self::of_cause(error),
                 RunError::Dataset(error) => Self::of_cause(error),
+                RunError::Upkeep(error) => Self::of_cause(error),
                 RunError::Locked { .. } | RunError::Threads { .. } => Some(Self::Usage),
                 RunError::Storage(_) => None,
+            };
+        }
+        if let Some(error) = cause.downcast_ref::<UpkeepError>() {
+            return match error {
+                UpkeepError::Directory(error) | UpkeepError::Repair(RepairError::Directory(error)) => {
+                    Self::of_cause(error)
+                }
+                UpkeepError::Compact(error) | UpkeepError::Repair(RepairError::Compact(error)) => Self::of_cause(error),
+                UpkeepError::Repair(RepairError::Storage(_)) | UpkeepError::Storage(_) => None,
+                UpkeepError::Running { .. } | UpkeepError::Busy(_) => Some(Self::Usage),
+                UpkeepError::Damaged { .. } => Some(Self::Damaged),
+            };
+        }
+        if let Some(error) = cause.downcast_ref::<CompactError>() {
+            return match error {
+                CompactError::Dataset(error) => Self::of_cause(error),
+                CompactError::NoExchange(_) => Some(Self::Usage),
+                CompactError::Storage(_) => None,
             };
         }
         if let Some(error) = cause.downcast_ref::<ReduceError>() {
@@ -62,12 +83,13 @@ impl Exit {
         if let Some(error) = cause.downcast_ref::<DirectoryError>() {
             return match error {
                 DirectoryError::Damaged { .. } | DirectoryError::Sweep(_) => Some(Self::Damaged),
+                DirectoryError::Dataset(error) => Self::of_cause(error),
                 DirectoryError::Storage(_) | DirectoryError::Busy(_) => None,
                 _ => Some(Self::Usage),
             };
         }
         match cause.downcast_ref::<DatasetError>() {
-            Some(DatasetError::Damaged { .. }) => Some(Self::Damaged),
+            Some(DatasetError::Damaged { .. } | DatasetError::Stray { .. }) => Some(Self::Damaged),
             _ => None,
         }
     }

@@ -1,6 +1,7 @@
 //! Flags, text and JSON output, progress, exit codes: the only code that prints.
 
 mod accuracy;
+mod compact;
 mod completions;
 mod exit;
 mod output;
@@ -10,6 +11,7 @@ mod reduce;
 mod run;
 mod simulate;
 mod status;
+mod verify;
 
 use self::exit::Exit;
 use clap::{Parser, Subcommand};
@@ -39,6 +41,8 @@ enum Command {
     Status(status::Arguments),
     Reduce(reduce::ReduceArguments),
     Plot(reduce::PlotArguments),
+    Verify(verify::Arguments),
+    Compact(compact::Arguments),
     Simulate(simulate::Arguments),
     Accuracy(accuracy::Arguments),
     Completions(completions::Arguments),
@@ -52,6 +56,8 @@ pub fn main() -> ExitCode {
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => reduce::plot(&arguments),
+        Command::Verify(arguments) => verify::verify(&arguments),
+        Command::Compact(arguments) => compact::compact(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Completions(arguments) => completions::completions(&arguments),

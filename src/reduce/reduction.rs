@@ -14,11 +14,12 @@ use crate::model::{Symbol, Value};
 use crate::store::commit::{Commit, alone, create_folder};
 use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
 use crate::store::layout::Layout;
+use crate::store::part::committed_files;
 use crate::store::storage::{Storage, StorageError};
 use crate::store::tables::{jobs, slips};
 use serde::Serialize;
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 /// Slips whose intervals are held at once: 256 MB of doubles.
@@ -84,7 +85,7 @@ fn reduce_by(
     let _alone = alone(storage, layout, WRITER)?;
     // Listed once: what other runs commit meanwhile is left out as a whole.
     let job_files = files(storage, &layout.table(jobs().name))?;
-    let slip_files = committed_slips(storage, layout, &job_files)?;
+    let slip_files = committed_files(storage, layout, slips().name, &job_files)?;
     let all_jobs = read_jobs(storage, layout, job_files)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
@@ -172,13 +173,6 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
         })
         .find(|order| order.is_ne())
         .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
-}
-
-/// Files of slips that belong to committed jobs: a run killed in between leaves the slips of a part without its jobs.
-fn committed_slips(storage: &dyn Storage, layout: &Layout, jobs: &[PathBuf]) -> Result<Vec<PathBuf>, ReduceError> {
-    let names: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
-    let slips = files(storage, &layout.table(slips().name))?;
-    Ok(slips.into_iter().filter(|path| path.file_name().is_some_and(|name| names.contains(name))).collect())
 }
 
 /// Cuts the sets where their slips would exceed the most.

@@ -196,6 +196,12 @@ mod tests {
         fn remove(&self, file: &Path) -> io::Result<()> {
             Disk.remove(file)
         }
+        fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+            Disk.remove_folder(folder)
+        }
+        fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
+            Disk.exchange(one, other)
+        }
         fn lock(&self, file: &Path) -> io::Result<Lock> {
             fs::File::options().create(true).append(true).open(file)?;
             Ok(Lock::Unknown)

@@ -54,6 +54,11 @@ pub enum Entry {
         /// Sum of the wall times of its jobs, in s.
         measured: f64,
     },
+    /// A committed part was taken away, so that it is run again.
+    Withdrawn {
+        /// Name of the part.
+        part: String,
+    },
     /// The run ends by itself.
     Finished {
         /// Whether it was stopped before all was done.

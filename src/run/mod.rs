@@ -9,7 +9,7 @@
 //!
 //! What is done is what is committed, so a run that was killed goes on by looking which part files are missing. Contract:
 //! the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a job in flight.
-//! claim.rs keeps two processes from running the same shard.
+//! claim.rs keeps two processes from running the same shard; upkeep.rs verifies, repairs and compacts while no shard runs.
 
 mod claim;
 mod collect;
@@ -20,12 +20,14 @@ mod status;
 mod survey;
 #[cfg(test)]
 mod tests;
+mod upkeep;
 mod walltime;
 
 pub use kernel::{Kernel, kernel, limits};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Failure, MOST_FAILURES, Status, status};
+pub use upkeep::{UpkeepError, compact, repair, verify};
 
 use crate::run::claim::{Claim, PATIENCE, clear_leftovers};
 use crate::run::collect::Collector;
@@ -154,6 +156,9 @@ pub enum RunError {
         /// The shard.
         shard: Shard,
     },
+    /// Compacted or damaged files cannot be taken care of.
+    #[error(transparent)]
+    Upkeep(#[from] UpkeepError),
     /// The threads cannot be started.
     #[error("cannot start {threads} threads: {source}; take fewer with --threads")]
     Threads {
@@ -180,8 +185,14 @@ pub fn run(
 ) -> Result<RunReport, RunError> {
     let begin = Instant::now();
     let directory = Directory::open(storage, root, sweep)?;
+    if options.retry_failed {
+        upkeep::withdraw_failed(storage, &directory)?;
+    }
     let claim = Claim::take(storage, directory.layout(), &options.shard.writer(), PATIENCE)?
         .ok_or_else(|| RunError::Locked { directory: root.to_owned(), shard: options.shard })?;
+    upkeep::absent(storage, directory.layout())?;
+    // It may have been compacted before the shard was ours.
+    let directory = directory.with_compaction(storage)?;
     claim.while_held(|| run_claimed(storage, &directory, begin, options, kernel, progress))
 }
 

@@ -71,7 +71,7 @@ pub fn status(storage: &dyn Storage, directory: &Directory) -> Result<Status, Da
     let survey = scope.survey_with(|part, failed| {
         if !failed.is_empty() && failures.len() < MOST_FAILURES {
             let sweep = &directory.sweeps()[part.epoch];
-            let told = part::failures(storage, directory.layout(), part)?.into_iter().map(|(position, reason)| {
+            let told = part::failures(storage, directory, part)?.into_iter().flatten().map(|(position, reason)| {
                 let job = &part.jobs[position];
                 Failure { job_id: sweep.job_id(&job.parameters).to_string(), reason, command: sweep.command(job) }
             });

@@ -65,7 +65,7 @@ impl<'a> Scope<'a> {
     ) -> Result<Survey, DatasetError> {
         let mut survey = Survey::default();
         for part in self.parts() {
-            if let Some(failed) = failed_jobs(self.storage, self.directory.layout(), &part)? {
+            if let Some(failed) = failed_jobs(self.storage, self.directory, &part)? {
                 survey.parts_done += 1;
                 survey.jobs_done += part.jobs.len() as u64;
                 survey.jobs_failed += failed.len() as u64;
@@ -103,12 +103,11 @@ impl<'a> Scope<'a> {
 
     /// Positions of the jobs of a part that are to be run, and whether they have failed before.
     fn remaining(self, part: &Part) -> Result<(Vec<usize>, bool), DatasetError> {
-        let layout = self.directory.layout();
         if self.retry_failed {
-            if let Some(failed) = failed_jobs(self.storage, layout, part)? {
+            if let Some(failed) = failed_jobs(self.storage, self.directory, part)? {
                 return Ok((failed, true));
             }
-        } else if is_done(self.storage, layout, part)? {
+        } else if is_done(self.storage, self.directory, part)? {
             return Ok((Vec::new(), false));
         }
         let wanted = if self.directory.wants(part) { part.jobs.len() } else { 0 };

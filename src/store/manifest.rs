@@ -6,22 +6,22 @@
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::store::commit::{Commit, clear, create_folder};
-use crate::store::dataset::PROGRAM;
-use crate::store::layout::{Layout, MANIFEST, RUN, RUN_FOLDERS};
+use crate::store::compaction::Compaction;
+use crate::store::dataset::{DatasetError, PROGRAM};
+use crate::store::layout::{Layout, RUN, RUN_FOLDERS};
+use crate::store::seal;
 use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
 use crate::store::tables;
 use crate::sweep::{Job, PLAN_VERSION, Part, Sweep, SweepError};
 use arrow_schema::Schema;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Version of the manifest and of the layout around it.
-const FORMAT: u32 = 1;
+/// Version of the manifest and of the layout around it. 2: files have seals, the manifest holds the texts of the sweeps.
+const FORMAT: u32 = 2;
 /// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
 const WRITER: &str = "manifest";
 /// How long to wait for others that write the manifest: shards that begin together do so one after the other.
@@ -30,7 +30,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(30);
 /// The file `run/manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Manifest {
+pub(super) struct Manifest {
     format: u32,
     /// The program that began the directory; any with the same versions below may go on.
     program: String,
@@ -40,10 +40,10 @@ struct Manifest {
     plan_version: u32,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,
-    /// Hashes of the sweep files, one for each epoch.
-    sweeps: Vec<String>,
+    /// Texts of the sweep files, one for each epoch.
+    pub(super) sweeps: Vec<String>,
     /// The epoch whose sweep was asked for last.
-    current: usize,
+    pub(super) current: usize,
 }
 
 /// The format alone, read first: a newer manifest may have keys that are not known here.
@@ -53,7 +53,7 @@ struct Format {
 }
 
 impl Manifest {
-    fn new(sweep: &Sweep) -> Self {
+    pub(super) fn new(sweep: &Sweep) -> Self {
         let columns = |schema: &Schema| schema.fields().iter().map(|field| field.name().clone()).collect();
         let mut recorded = vec![
             (tables::slips().name, columns(&tables::slips().schema())),
@@ -70,13 +70,13 @@ impl Manifest {
             rng_scheme: RNG_SCHEME.to_owned(),
             plan_version: PLAN_VERSION,
             tables: recorded.into_iter().map(|(name, columns)| (name.to_owned(), columns)).collect(),
-            sweeps: vec![hash(sweep.text())],
+            sweeps: vec![sweep.text().to_owned()],
             current: 0,
         }
     }
 
     /// In what a manifest of this program would differ, sweeps aside.
-    fn difference(&self, ours: &Self) -> Vec<String> {
+    pub(super) fn difference(&self, ours: &Self) -> Vec<String> {
         let versions = |manifest: &Self| {
             [
                 ("model version", manifest.model_version.to_string()),
@@ -104,20 +104,15 @@ impl Manifest {
     }
 }
 
-fn hash(text: &str) -> String {
-    Sha256::digest(text).iter().fold(String::new(), |mut hexadecimal, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(hexadecimal, "{byte:02x}");
-        hexadecimal
-    })
-}
-
 /// Why a directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DirectoryError {
     /// A file operation failed.
     #[error(transparent)]
     Storage(#[from] StorageError),
+    /// The record of a compaction is damaged, or does not fit the tables.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
     /// A sweep file of the directory is no longer understood.
     #[error(transparent)]
     Sweep(#[from] SweepError),
@@ -139,16 +134,16 @@ pub enum DirectoryError {
         differences: Vec<String>,
     },
     /// The manifest or a sweep file beside it does not read.
-    #[error("{}: damaged: {problem}; restore it from a copy, or begin in another directory with --out", .path.display())]
+    #[error("{}: damaged: {problem}; `stickslip verify` on the results directory tells how to repair it", .path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// What is wrong.
         problem: String,
     },
-    /// Written by a program that is newer than this one.
+    /// Written by a program with another format.
     #[error("{}: has format {format}, this program knows {FORMAT}; use the program that wrote it", .path.display())]
-    Newer {
+    Format {
         /// The manifest.
         path: PathBuf,
         /// Its format.
@@ -165,6 +160,7 @@ pub struct Directory {
     layout: Layout,
     sweeps: Vec<Sweep>,
     current: usize,
+    compaction: Compaction,
 }
 
 impl Directory {
@@ -175,7 +171,7 @@ impl Directory {
     pub fn open(storage: &dyn Storage, root: &Path, sweep: &Sweep) -> Result<Self, DirectoryError> {
         let layout = Layout::new(root);
         if let Opened::Ready(directory) = Self::compare(storage, &layout, sweep)? {
-            return Ok(directory);
+            return directory.with_compaction(storage);
         }
         create_folder(storage, &layout.locks())?;
         let lock = layout.locks().join(WRITER);
@@ -185,9 +181,9 @@ impl Directory {
         }
         // Another run may have written the manifest before the lock was ours.
         match Self::compare(storage, &layout, sweep)? {
-            Opened::Ready(directory) => Ok(directory),
+            Opened::Ready(directory) => directory.with_compaction(storage),
             Opened::ToWrite(manifest, sweeps) => {
-                let directory = Self { layout, sweeps, current: manifest.current };
+                let directory = Self::new(layout, sweeps, manifest.current).with_compaction(storage)?;
                 directory.write(storage, &manifest)?;
                 Ok(directory)
             }
@@ -199,10 +195,56 @@ impl Directory {
     /// # Errors
     /// When it is no results directory, belongs to other versions, or is damaged.
     pub fn read(storage: &dyn Storage, root: &Path) -> Result<Self, DirectoryError> {
+        Self::read_sweeps(storage, root)?.with_compaction(storage)
+    }
+
+    /// Reads which sweeps a directory belongs to, without a look at its tables.
+    ///
+    /// # Errors
+    /// As [`Directory::read`].
+    pub fn read_sweeps(storage: &dyn Storage, root: &Path) -> Result<Self, DirectoryError> {
         let layout = Layout::new(root);
         let (manifest, sweeps) =
             read_manifest(storage, &layout)?.ok_or_else(|| DirectoryError::NoResults(root.to_owned()))?;
-        Ok(Self { layout, sweeps, current: manifest.current })
+        Ok(Self::new(layout, sweeps, manifest.current))
+    }
+
+    pub(super) fn new(layout: Layout, sweeps: Vec<Sweep>, current: usize) -> Self {
+        Self { layout, sweeps, current, compaction: Compaction::default() }
+    }
+
+    /// The same, with what is compacted now.
+    ///
+    /// # Errors
+    /// When the record of the compaction is damaged or does not fit the tables.
+    pub fn with_compaction(mut self, storage: &dyn Storage) -> Result<Self, DirectoryError> {
+        self.compaction = Compaction::read(storage, &self.layout)?;
+        Ok(self)
+    }
+
+    /// Whether precursors have a table.
+    #[must_use]
+    pub fn records_precursors(&self) -> bool {
+        self.sweeps[self.current].recording().precursors
+    }
+
+    /// Names of the tables, that of the jobs last.
+    pub fn tables(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let precursors = self.records_precursors().then(|| tables::precursors().name);
+        [Some(tables::slips().name), precursors, Some(tables::jobs().name)].into_iter().flatten()
+    }
+
+    /// The same, with another notion of what is compacted.
+    #[must_use]
+    pub(super) fn compacted_as(mut self, compaction: Compaction) -> Self {
+        self.compaction = compaction;
+        self
+    }
+
+    /// What is compacted.
+    #[must_use]
+    pub const fn compaction(&self) -> &Compaction {
+        &self.compaction
     }
 
     /// Where everything lies.
@@ -255,17 +297,17 @@ impl Directory {
         }
         let epoch = sweeps.iter().position(|known| known.text() == sweep.text());
         if epoch == Some(manifest.current) {
-            return Ok(Opened::Ready(Self { layout: layout.clone(), sweeps, current: manifest.current }));
+            return Ok(Opened::Ready(Self::new(layout.clone(), sweeps, manifest.current)));
         }
         manifest.current = epoch.unwrap_or_else(|| {
             sweeps.push(sweep.clone());
-            manifest.sweeps.push(hash(sweep.text()));
+            manifest.sweeps.push(sweep.text().to_owned());
             sweeps.len() - 1
         });
         Ok(Opened::ToWrite(manifest, sweeps))
     }
 
-    fn write(&self, storage: &dyn Storage, manifest: &Manifest) -> Result<(), DirectoryError> {
+    pub(super) fn write(&self, storage: &dyn Storage, manifest: &Manifest) -> Result<(), DirectoryError> {
         let staging = self.layout.staging(WRITER);
         clear(storage, &staging)?;
         let mut commit = Commit::begin(storage, &staging)?;
@@ -273,9 +315,8 @@ impl Directory {
             commit.stage_bytes(&self.layout.sweep(epoch), sweep.text().as_bytes())?;
         }
         let path = self.layout.manifest();
-        let mut text = serde_json::to_string_pretty(manifest)
+        let text = seal::to_json(manifest)
             .map_err(|error| DirectoryError::Damaged { path: path.clone(), problem: error.to_string() })?;
-        text.push('\n');
         // Last, so that a manifest never names a sweep that is not there.
         commit.stage_bytes(&path, text.as_bytes())?;
         Ok(commit.publish()?)
@@ -304,35 +345,47 @@ fn is_fresh(storage: &dyn Storage, layout: &Layout) -> Result<bool, StorageError
     }
 }
 
-fn read_text(storage: &dyn Storage, path: &Path) -> Result<String, DirectoryError> {
+pub(super) fn read_text(storage: &dyn Storage, path: &Path) -> Result<String, DirectoryError> {
     let mut bytes = Vec::new();
     let read = storage.open(path).and_then(|mut file| file.read_to_end(&mut bytes));
-    read.map_err(StorageError::at("read", path))?;
+    match read {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Err(damaged(path, "it is missing".to_owned())),
+        read => read.map_err(StorageError::at("read", path))?,
+    };
     String::from_utf8(bytes)
         .map_err(|error| DirectoryError::Damaged { path: path.to_owned(), problem: error.to_string() })
 }
 
-/// The manifest and its sweeps, verified; `None` if there is no manifest.
-fn read_manifest(storage: &dyn Storage, layout: &Layout) -> Result<Option<(Manifest, Vec<Sweep>)>, DirectoryError> {
-    let path = layout.run().join(MANIFEST);
+pub(super) fn damaged(path: &Path, problem: String) -> DirectoryError {
+    DirectoryError::Damaged { path: path.to_owned(), problem }
+}
+
+/// The manifest alone; `None` if there is none.
+pub(super) fn read_alone(storage: &dyn Storage, layout: &Layout) -> Result<Option<Manifest>, DirectoryError> {
+    let path = layout.manifest();
     if !storage.exists(&path).map_err(StorageError::at("look up", &path))? {
         return Ok(None);
     }
-    let damaged = |path: &Path, problem: String| DirectoryError::Damaged { path: path.to_owned(), problem };
     let text = read_text(storage, &path)?;
     let Format { format } = serde_json::from_str(&text).map_err(|error| damaged(&path, error.to_string()))?;
-    if format > FORMAT {
-        return Err(DirectoryError::Newer { path, format });
+    if format != FORMAT {
+        return Err(DirectoryError::Format { path, format });
     }
-    let manifest: Manifest = serde_json::from_str(&text).map_err(|error| damaged(&path, error.to_string()))?;
+    let manifest: Manifest = seal::from_json(&text).map_err(|problem| damaged(&path, problem))?;
     if manifest.current >= manifest.sweeps.len() {
         return Err(damaged(&path, format!("there is no sweep {}", manifest.current)));
     }
+    Ok(Some(manifest))
+}
+
+/// The manifest and its sweeps, verified; `None` if there is no manifest.
+fn read_manifest(storage: &dyn Storage, layout: &Layout) -> Result<Option<(Manifest, Vec<Sweep>)>, DirectoryError> {
+    let Some(manifest) = read_alone(storage, layout)? else { return Ok(None) };
     let mut sweeps = Vec::with_capacity(manifest.sweeps.len());
     for (epoch, expected) in manifest.sweeps.iter().enumerate() {
         let path = layout.sweep(epoch);
         let text = read_text(storage, &path)?;
-        if hash(&text) != *expected {
+        if text != *expected {
             return Err(damaged(&path, "it was changed; edit the original sweep file instead".to_owned()));
         }
         sweeps.push(Sweep::parse(&text, &path)?);
@@ -396,13 +449,16 @@ mod tests {
         refused("[model]\nK = 2e8\n[record]\nslips = 4", &["model.K", "record.slips: 3 -> 4"]);
         let path = root.path().join("run/manifest.json");
         let text = fs::read_to_string(&path).unwrap();
-        let other = text.replace(RNG_SCHEME, "dice").replace("\"onset\"", "\"start\"");
-        assert_ne!(text, other);
-        fs::write(&path, other).unwrap();
+        let mut other: Manifest = seal::from_json(&text).unwrap();
+        other.rng_scheme = "dice".to_owned();
+        other.tables.get_mut("slips").unwrap().iter_mut().filter(|column| *column == "onset").for_each(|column| {
+            *column = "start".to_owned();
+        });
+        fs::write(&path, seal::to_json(&other).unwrap()).unwrap();
         refused("[model]\nK = 1e8\n[record]\nslips = 3", &["random numbers: dice -> ", "without [\"start\"]"]);
-        fs::write(&path, text.replace("\"format\": 1", "\"format\": 2, \"new\": 0")).unwrap();
+        fs::write(&path, text.replace("\"format\": 2", "\"format\": 3, \"new\": 0")).unwrap();
         let error = Directory::read(&Disk, root.path()).unwrap_err().to_string();
-        assert!(error.contains("has format 2"), "{error}");
+        assert!(error.contains("has format 3"), "{error}");
     }
 
     #[test]

@@ -1,17 +1,18 @@
 //! Parts: consecutive jobs of the plan whose rows are committed together, in the plan's order.
 //!
-//! A part has one file in each table. The one in `jobs` comes last, so a part is done exactly if that is there.
+//! A part has one file in each table. The one in `jobs` comes last, so a part is done exactly if that is there, or if its
+//! rows were compacted.
 
 use crate::store::columns::Table;
 use crate::store::commit::{Commit, create_folder};
-use crate::store::dataset::{Batch, DatasetError, Footer, Reader, TableWriter};
-use crate::store::layout::{Layout, part_file};
+use crate::store::dataset::{Batch, DatasetError, Footer, Reader, TableWriter, files};
+use crate::store::layout::{Layout, is_compacted, part_file};
 use crate::store::manifest::Directory;
 use crate::store::storage::{Storage, StorageError};
 use crate::store::tables::{self, FAILED, JobLabel, JobResult, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::{Part, Sweep};
 use arrow_array::Array;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -33,16 +34,40 @@ pub fn label(sweep: &Sweep, part: &Part, position: usize) -> JobLabel {
 ///
 /// # Errors
 /// When its file in `jobs` cannot be read, or has other jobs than the part.
-pub fn failed_jobs(storage: &dyn Storage, layout: &Layout, part: &Part) -> Result<Option<Vec<usize>>, DatasetError> {
-    let path = jobs_file(layout, part);
-    if !storage.exists(&path).map_err(StorageError::at("look up", &path))? {
+pub fn failed_jobs(
+    storage: &dyn Storage,
+    directory: &Directory,
+    part: &Part,
+) -> Result<Option<Vec<usize>>, DatasetError> {
+    Ok(failures(storage, directory, part)?.map(|failed| failed.into_keys().collect()))
+}
+
+/// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done.
+///
+/// # Errors
+/// When its file in `jobs` cannot be read, or has other jobs than the part.
+pub fn failures(
+    storage: &dyn Storage,
+    directory: &Directory,
+    part: &Part,
+) -> Result<Option<BTreeMap<usize, String>>, DatasetError> {
+    let compaction = directory.compaction();
+    if compaction.holds(part.epoch, part.index) {
+        return Ok(Some(compaction.failures(part.epoch, part.index).cloned().unwrap_or_default()));
+    }
+    if !is_done(storage, directory, part)? {
         return Ok(None);
     }
-    let (mut failed, mut rows) = (Vec::new(), 0);
-    for batch in Reader::new(storage, vec![path.clone()], Some(&["outcome"])) {
+    let path = jobs_file(directory.layout(), part);
+    let (mut failed, mut rows) = (BTreeMap::new(), 0);
+    for batch in Reader::new(storage, vec![path.clone()], Some(&["outcome", "reason"])) {
         let batch = batch?;
-        let outcomes = batch.texts("outcome")?.iter().enumerate();
-        failed.extend(outcomes.filter(|(_, outcome)| *outcome == Some(FAILED)).map(|(row, _)| rows + row));
+        let cells = batch.texts("outcome")?.iter().zip(batch.texts("reason")?).enumerate();
+        failed.extend(
+            cells
+                .filter(|(_, (outcome, _))| *outcome == Some(FAILED))
+                .map(|(row, (_, reason))| (rows + row, reason.unwrap_or_default().to_owned())),
+        );
         rows += batch.rows.num_rows();
     }
     if rows == part.jobs.len() {
@@ -52,26 +77,34 @@ pub fn failed_jobs(storage: &dyn Storage, layout: &Layout, part: &Part) -> Resul
     }
 }
 
-/// Positions of the jobs of a part that failed, with their reasons; none if the part is not done.
-///
-/// # Errors
-/// As [`failed_jobs`].
-pub fn failures(storage: &dyn Storage, layout: &Layout, part: &Part) -> Result<Vec<(usize, String)>, DatasetError> {
-    let Some(failed) = failed_jobs(storage, layout, part)? else { return Ok(Vec::new()) };
-    let mut reasons = Vec::with_capacity(part.jobs.len());
-    for batch in Reader::new(storage, vec![jobs_file(layout, part)], Some(&["reason"])) {
-        reasons.extend(batch?.texts("reason")?.iter().map(|reason| reason.unwrap_or_default().to_owned()));
-    }
-    Ok(failed.into_iter().filter_map(|position| Some((position, reasons.get(position)?.clone()))).collect())
-}
-
 /// Whether a part is done.
 ///
 /// # Errors
 /// When that cannot be looked up.
-pub fn is_done(storage: &dyn Storage, layout: &Layout, part: &Part) -> Result<bool, StorageError> {
-    let path = jobs_file(layout, part);
+pub fn is_done(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<bool, StorageError> {
+    if directory.compaction().holds(part.epoch, part.index) {
+        return Ok(true);
+    }
+    let path = jobs_file(directory.layout(), part);
     storage.exists(&path).map_err(StorageError::at("look up", &path))
+}
+
+/// Files of a table that count beside these of `jobs`: compacted ones, and those of parts that are done. A run killed in
+/// between leaves the slips of a part without its jobs.
+///
+/// # Errors
+/// As [`files`].
+pub fn committed_files(
+    storage: &dyn Storage,
+    layout: &Layout,
+    table: &str,
+    jobs: &[PathBuf],
+) -> Result<Vec<PathBuf>, DatasetError> {
+    let done: HashSet<_> = jobs.iter().filter_map(|path| path.file_name()).collect();
+    let counts = |path: &PathBuf| {
+        path.file_name().is_some_and(|name| done.contains(name) || name.to_str().is_some_and(is_compacted))
+    };
+    Ok(files(storage, &layout.table(table))?.into_iter().filter(counts).collect())
 }
 
 fn jobs_file(layout: &Layout, part: &Part) -> PathBuf {

@@ -37,6 +37,10 @@ pub trait Storage: Sync {
     fn exists(&self, file: &Path) -> io::Result<bool>;
     /// Removes a file.
     fn remove(&self, file: &Path) -> io::Result<()>;
+    /// Removes a folder with all that is in it; nothing happens if there is none.
+    fn remove_folder(&self, folder: &Path) -> io::Result<()>;
+    /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
+    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()>;
     /// Tries to lock a file, created if needed.
     fn lock(&self, file: &Path) -> io::Result<Lock>;
 }
@@ -138,6 +142,17 @@ impl Storage for Disk {
         fs::remove_file(file)
     }
 
+    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+        match fs::remove_dir_all(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            removed => removed,
+        }
+    }
+
+    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
+        exchange(one, other)
+    }
+
     fn lock(&self, file: &Path) -> io::Result<Lock> {
         let handle = File::options().create(true).truncate(false).write(true).open(file)?;
         match handle.try_lock() {
@@ -154,9 +169,27 @@ impl Storage for Disk {
     }
 }
 
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+fn exchange(one: &Path, other: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).map_err(|error| match error {
+        // A file system that does not know the flag, or a kernel that does not know the call.
+        Errno::INVAL | Errno::NOSYS | Errno::NOTSUP => io::ErrorKind::Unsupported.into(),
+        error => error.into(),
+    })
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn a_lock_is_refused_while_held_and_free_afterwards() {
@@ -167,5 +200,32 @@ mod tests {
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Taken));
         drop(held);
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Ours(_)));
+    }
+
+    #[test]
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    fn exchanged_folders_are_there_at_every_instant() {
+        let root = tempfile::tempdir().unwrap();
+        let [one, other] = ["one", "other"].map(|name| root.path().join(name));
+        for folder in [&one, &other] {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join(folder.file_name().unwrap()), "").unwrap();
+        }
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    Disk.exchange(&one, &other).unwrap();
+                }
+            });
+            let there = (0..20_000).all(|_| one.exists() && other.exists());
+            done.store(true, Ordering::Relaxed);
+            assert!(there);
+        });
+        let names = |folder| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
+        assert_eq!(
+            BTreeSet::from([names(&one), names(&other)]),
+            BTreeSet::from([["one".into()], ["other".into()]].map(Vec::from))
+        );
     }
 }

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -60,13 +61,16 @@ def test_every_column_of_a_simulation_is_documented(stickslip, tmp_path):
             assert f"`{field.name}`" in row, f"{flag}.{field.name}"
 
 
-def test_every_field_of_json_output_is_documented(stickslip, results):
+def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):
     sweep = results.parent / "tiny.toml"
+    copy = shutil.copytree(results, tmp_path / "copy")
     outputs = {
         "plan": ("plan", sweep),
         "run": ("run", sweep, "--out", results, "--no-reduce"),
         "status": ("status", results),
         "reduce": ("reduce", results),
+        "verify": ("verify", results),
+        "compact": ("compact", copy),
         "simulate": ("simulate", "--set", "N=9", "--time", 0.01),
     }
     text = (ROOT / "docs" / "results.md").read_text()

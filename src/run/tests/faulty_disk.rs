@@ -355,6 +355,18 @@ impl Storage for FaultyDisk {
         })
     }
 
+    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+        self.act(Operation::Remove, |state| {
+            state.seen.retain(|path, _| !path.starts_with(folder));
+            Ok(())
+        })
+    }
+
+    /// Compaction meets its faults in the tests of `upkeep`.
+    fn exchange(&self, _: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
     fn lock(&self, file: &Path) -> io::Result<Lock> {
         self.act(Operation::Lock, |state| {
             state.touch(file)?;

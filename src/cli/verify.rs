@@ -1,0 +1,128 @@
+//! `stickslip verify`: whether a results directory is whole, and what to do if not.
+
+use super::exit::Exit;
+use super::output;
+use anyhow::Result;
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use stickslip::store::layout::Layout;
+use stickslip::store::storage::Disk;
+use stickslip::store::verify::{Problem, Verification};
+
+/// Check that every file of a results directory is whole and every job is there once, and say what to do if not
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  stickslip verify results/fig3
+  stickslip verify results/fig3 --repair     then `run` makes anew what was taken away
+
+Nothing is changed without --repair. Exit code 4: something is damaged.")]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// Move what is damaged to run/quarantine, and restore what can be restored
+    #[arg(long)]
+    repair: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Ids of jobs that are shown for each problem; `--json` has all.
+const SHOWN_JOBS: usize = 3;
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    verification: &'a Verification,
+    /// Whether what is damaged was taken away.
+    repaired: bool,
+    /// Commands that are to be run, in this order.
+    commands: Vec<String>,
+}
+
+pub fn verify(arguments: &Arguments) -> Result<Exit> {
+    let root = &arguments.directory;
+    let verification = if arguments.repair {
+        stickslip::run::repair(&Disk, root)?.verification
+    } else {
+        stickslip::run::verify(&Disk, root)?
+    };
+    let repaired = arguments.repair && verification.wants_repair();
+    let commands = commands(root, &verification, !arguments.repair);
+    if arguments.json {
+        output::json(&Report { verification: &verification, repaired, commands })?;
+    } else {
+        describe(&verification, &commands, repaired)?;
+    }
+    Ok(if verification.whole || arguments.repair { Exit::Done } else { Exit::Damaged })
+}
+
+/// What repairs a directory.
+fn commands(root: &Path, verification: &Verification, with_repair: bool) -> Vec<String> {
+    let mut commands = Vec::new();
+    if with_repair && verification.wants_repair() {
+        commands.push(format!("stickslip verify {} --repair", quoted(root)));
+    }
+    let layout = Layout::new(root);
+    for &epoch in &verification.epochs {
+        commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(epoch)), quoted(root)));
+    }
+    if verification.wants_compaction() {
+        commands.push(format!("stickslip compact {}", quoted(root)));
+    }
+    if verification.wants_reduction() {
+        commands.push(format!("stickslip reduce {}", quoted(root)));
+    }
+    commands
+}
+
+/// A path as a shell reads it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    if text.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
+}
+
+fn describe(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
+    for problem in &verification.problems {
+        output::print(&format!("{}: {}{}\n", problem.path.display(), problem.problem, jobs_of(problem)))?;
+    }
+    let megabytes = verification.bytes as f64 / 1e6;
+    let missing = match (verification.parts_missing, verification.jobs_missing) {
+        (0, _) => "nothing".to_owned(),
+        (parts, jobs) => format!("{}, {}", output::count(parts, "part"), output::count(jobs, "job")),
+    };
+    let damaged = match verification.problems.len() as u64 {
+        0 => "nothing".to_owned(),
+        problems => output::count(problems, "problem") + if repaired { ", taken care of" } else { "" },
+    };
+    output::pairs(&[
+        (
+            "whole",
+            format!("{} with {}", output::count(verification.parts, "part"), output::count(verification.jobs, "job")),
+        ),
+        ("files", format!("{}, {megabytes:.1} MB", verification.files)),
+        ("not yet done", missing),
+        ("damaged", damaged),
+    ])?;
+    if !commands.is_empty() {
+        output::print("to repair:\n")?;
+        commands.iter().try_for_each(|command| output::print(&format!("  {command}\n")))?;
+    }
+    Ok(())
+}
+
+fn jobs_of(problem: &Problem) -> String {
+    if problem.jobs.is_empty() {
+        return String::new();
+    }
+    let more = if problem.jobs.len() > SHOWN_JOBS { ", ..." } else { "" };
+    let shown = &problem.jobs[..problem.jobs.len().min(SHOWN_JOBS)];
+    format!("; concerns {}: {}{more}", output::count(problem.jobs.len() as u64, "job"), shown.join(", "))
+}
