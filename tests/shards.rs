@@ -88,7 +88,7 @@ fn a_walltime_is_kept_and_the_same_command_goes_on_until_all_is_done() {
     let begin = Instant::now();
     folder.ends(0, "run many.toml --no-reduce --out whole --threads 1");
     // Half a second is set aside for the end.
-    let walltime = begin.elapsed().mul_f64(0.6) + Duration::from_millis(500);
+    let walltime = begin.elapsed().mul_f64(0.4) + Duration::from_millis(500);
     let (mut stops, mut jobs_run) = (0, 0);
     loop {
         let begin = Instant::now();
@@ -106,7 +106,7 @@ fn a_walltime_is_kept_and_the_same_command_goes_on_until_all_is_done() {
         assert!(report["jobs_run"].as_u64() > Some(0), "{report}");
         stops += 1;
     }
-    assert!(stops >= 1, "more than half of the jobs were run in half of the time");
+    assert!(stops >= 1, "all jobs were run in less than half of the time");
     assert_eq!(jobs_run, 60_000, "nothing was run twice");
     assert!(folder.tables("r") == folder.tables("whole"));
 }

@@ -99,7 +99,7 @@ impl Storage for Dying {
 fn sweep(seeds: u64) -> Sweep {
     let text = format!(
         "name = \"test\"\n[axes]\nseed = {{ count = {seeds} }}\nV0 = [1e-4, 2e-4]\n[record]\nslips = 3\n\
-         [solver]\nmethod = \"fixed-step\"\ndt = 1e-6\n"
+         [solver]\nmethod = \"fixed-step\"\ndt = 4.68e-7\n"
     );
     Sweep::parse(&text, Path::new("test.toml")).unwrap()
 }

@@ -125,7 +125,7 @@ fn differences_are_told_but_for_axes_and_conditions() {
             "model.K: 1e8 -> 2e8",
             "model.Delta: 0 -> 1",
             "model.T: none -> 2",
-            "solver.tolerance: 1e-6 -> 1e-7",
+            "solver.tolerance: 1e-4 -> 1e-7",
             "record.max_time: none -> 1",
         ]
     );
@@ -135,7 +135,7 @@ fn differences_are_told_but_for_axes_and_conditions() {
 fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
     // 0.6 s each: nine reach 5 s.
     let dear = [sweep(
-        "[record]\nmax_time = 2.5e-6\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = { count = 20 }",
+        "[record]\nmax_time = 5.34e-6\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = { count = 20 }",
     )];
     let sizes: Vec<usize> = Plan::new(&dear).parts().map(|part| part.jobs.len()).collect();
     assert_eq!(sizes, [9, 9, 2]);
@@ -168,7 +168,7 @@ fn the_sweeps_of_the_figures_are_read_and_take_minutes() {
         let sweep = [sweep(text)];
         let totals = Plan::new(&sweep).totals();
         assert_eq!(sweep[0].name(), name);
-        assert!((120.0..300.0).contains(&totals.cost), "{name}: {totals:?}");
+        assert!((60.0..300.0).contains(&totals.cost), "{name}: {totals:?}");
         let jobs: HashSet<JobId> = sweep[0].jobs().map(|job| sweep[0].job_id(&job.parameters)).collect();
         assert_eq!(jobs.len() as u64, totals.jobs);
     }
