@@ -10,7 +10,7 @@ const PANEL: (f64, f64) = (300.0, 280.0);
 const GUIDES: [(i32, Stroke); 2] =
     [(1, Stroke::dashed(GREY, 1.4, (2.0, 3.0))), (2, Stroke::dashed(GREY, 1.4, (8.0, 4.0)))];
 /// Guides start under the lowest curve by this factor.
-const GUIDES_UNDER: f64 = 0.6;
+const GUIDES_UNDER: f64 = 0.35;
 
 /// A name and points, each a size and a value.
 pub type Line = (String, Vec<(f64, f64)>);
@@ -26,6 +26,8 @@ pub struct Growth {
     pub counts: Vec<Line>,
 }
 
+type LinesOf = fn(&Growth) -> &[Line];
+
 /// Draws a column of two panels for each size: costs above, counts below. Names are those of the last.
 ///
 /// # Errors
@@ -34,7 +36,7 @@ pub fn scaling(columns: &[Growth]) -> Result<Picture, FigureError> {
     const NAME: &str = "scaling";
     let (width, height) = (LEFT + PANEL.0, ABOVE + PANEL.1);
     let mut sheet = Sheet::new(NAME, (columns.len() as f64 * width + LEGEND, 2.0 * height + UNDER));
-    let rows: [(&str, fn(&Growth) -> &[Line]); 2] =
+    let rows: [(&str, LinesOf); 2] =
         [("CPU time per slip (s)", |growth| &growth.costs), ("Steps and breaks per slip", |growth| &growth.counts)];
     for (row, (y_label, lines_of)) in rows.into_iter().enumerate() {
         let values = columns.iter().flat_map(|growth| points(lines_of(growth))).map(|point| point.1);
