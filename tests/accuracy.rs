@@ -6,16 +6,14 @@ mod program;
 use program::{Folder, json};
 
 #[test]
-fn scaling_writes_what_it_prints_and_runs_anew_over_it() {
+fn scaling_writes_what_it_prints() {
     let folder = Folder::new();
     let printed = json(&folder.ends(0, "accuracy --scaling --quick --out cost --json").stdout);
     let written = json(&std::fs::read_to_string(folder.path("cost/scaling.json")).unwrap());
     assert_eq!(printed, written);
-    let mut names: Vec<_> = folder.contents("cost").into_keys().collect();
-    names.sort();
-    let expected =
-        ["scaling-exponents.parquet", "scaling.json", "scaling.parquet", "scaling.png", "scaling.svg"].map(Into::into);
-    assert_eq!(names, expected);
+    let contents = folder.contents("cost");
+    let names: Vec<_> = contents.keys().map(|name| name.to_str().unwrap()).collect();
+    assert_eq!(names, ["scaling-exponents.parquet", "scaling.json", "scaling.parquet", "scaling.png", "scaling.svg"]);
 
     let (table, sizes) = (folder.file("cost/scaling.parquet"), printed["sizes"].as_array().unwrap());
     assert_eq!(table.counts("N"), [70, 70, 140, 140, 280, 280, 70, 70]);
@@ -23,8 +21,11 @@ fn scaling_writes_what_it_prints_and_runs_anew_over_it() {
     assert_eq!(table.reals("tolerance"), [1e-6, 1e-10].repeat(4));
     for column in ["cpu_per_slip", "cpu_per_simulated_second", "cpu_per_step", "steps_per_slip", "breaks_per_slip"] {
         let told: Vec<f64> = sizes.iter().map(|row| row[column].as_f64().unwrap()).collect();
-        assert_eq!(table.reals(column), told, "{column}");
-        assert!(told.iter().all(|&value| value > 0.0), "{column}: {told:?}");
+        assert_eq!(told.len(), 8);
+        for (told, stored) in told.into_iter().zip(table.reals(column)) {
+            // The parser of the JSON may be off by the last bit.
+            assert!(told > 0.0 && (told - stored).abs() <= 1e-15 * stored, "{column}: {told} {stored}");
+        }
     }
     let exponents = folder.file("cost/scaling-exponents.parquet");
     assert_eq!(exponents.texts("size"), ["N", "N", "Ns", "Ns"]);

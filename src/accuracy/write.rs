@@ -169,9 +169,8 @@ fn scaling_figure(findings: &ScalingFindings) -> Result<Picture, AccuracyError> 
     let columns = [(Symbol::N, "Blocks N"), (Symbol::Ns, "Contacts per block Nₛ")].map(|(size, label)| {
         let mut counts: Vec<Line> = lines(size, "steps,", |row| row.cost.steps_per_slip);
         // Breaks hardly depend on the tolerance.
-        counts.extend(
-            lines(size, "", |row| row.breaks_per_slip).drain(..1).map(|(_, points)| ("breaks".to_owned(), points)),
-        );
+        let breaks: Vec<Line> = lines(size, "breaks,", |row| row.breaks_per_slip);
+        counts.extend(breaks.into_iter().take(1).map(|(_, points)| ("breaks".to_owned(), points)));
         Growth { label: label.to_owned(), costs: lines(size, "tolerance", |row| row.cost.per_slip), counts }
     });
     Ok(scaling(&columns)?)

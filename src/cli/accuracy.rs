@@ -23,6 +23,7 @@ Examples:
   stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
   stickslip accuracy --scaling               what a slip costs with N and Ns, in two minutes; --quick: in seconds
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
