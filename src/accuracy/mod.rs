@@ -22,7 +22,7 @@ mod write;
 pub use cpu::Cost;
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
-pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study, drive_in_words};
+pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 pub use tables::{distances, exponents, markdown, methods, sizes, stability};
 pub use write::{as_json, scaling_json, stability_json, write, write_scaling, write_stability};
 
@@ -65,6 +65,16 @@ pub fn described(solver: Solver) -> String {
         Solver::EventDriven { tolerance } => format!("event-driven, tolerance {tolerance:e}"),
         Solver::FixedStep { time_step } => format!("fixed step, dt {time_step:e} s"),
     }
+}
+
+/// Velocity and modulation of a drive in words.
+#[must_use]
+pub fn drive_in_words(parameters: &Parameters) -> String {
+    let modulation = parameters.modulation_period.map_or_else(
+        || "Delta = 0".to_owned(),
+        |period| format!("Delta = {:e} m, 1/T = {} Hz", parameters.modulation_amplitude, (1.0 / period).round()),
+    );
+    format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
 }
 
 /// Observers end these simulations; none needs as many events as the default budget of a job.

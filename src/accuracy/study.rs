@@ -7,7 +7,7 @@
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cpu::{self, Cost};
 use super::distance::{Distances, distances};
-use super::{AccuracyError, NO_LIMITS, failed};
+use super::{AccuracyError, NO_LIMITS, drive_in_words, failed};
 use crate::model::Parameters;
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Solver, Summary, TOLERANCES, simulate, simulate_audited};
@@ -336,16 +336,6 @@ impl Study {
         }
         Ok(ensembles)
     }
-}
-
-/// Velocity and modulation of a drive in words.
-#[must_use]
-pub fn drive_in_words(parameters: &Parameters) -> String {
-    let modulation = parameters.modulation_period.map_or_else(
-        || "Delta = 0".to_owned(),
-        |period| format!("Delta = {:e} m, 1/T = {} Hz", parameters.modulation_amplitude, (1.0 / period).round()),
-    );
-    format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
 }
 
 fn sample(slips: &[Slip], quantity: Quantity) -> Vec<f64> {

@@ -116,7 +116,7 @@ fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>,
     let breaks = lines(&findings.methods, velocity, |row| {
         let errors = row.break_times?;
         let uncertainty = Some((errors.median, errors.largest));
-        Some((row, WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip }))
+        Some(WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip })
     });
     let intervals: Vec<&DistanceRow> =
         findings.distances.iter().filter(|row| row.quantity == Quantity::Interval).collect();
@@ -124,7 +124,7 @@ fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>,
         let same = |other: &&&DistanceRow| other.parameters == row.parameters && other.solver == row.solver;
         let distance = intervals.iter().find(same)?.distances.wasserstein;
         let uncertainty = Some((distance.low, distance.high));
-        Some((row, WorkPrecision { error: distance.value, uncertainty, work: row.cost.per_slip }))
+        Some(WorkPrecision { error: distance.value, uncertainty, work: row.cost.per_slip })
     });
     let mut figures = Vec::new();
     for (name, label, lines) in [
@@ -139,13 +139,14 @@ fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>,
 }
 
 /// A line per method and drive at this velocity.
-fn lines<'a>(
-    rows: &'a [MethodRow],
+fn lines(
+    rows: &[MethodRow],
     velocity: f64,
-    point: impl Fn(&'a MethodRow) -> Option<(&'a MethodRow, WorkPrecision)>,
+    point: impl Fn(&MethodRow) -> Option<WorkPrecision>,
 ) -> Vec<(String, Vec<WorkPrecision>)> {
     let mut lines: Vec<(String, Vec<WorkPrecision>)> = Vec::new();
-    for (row, point) in rows.iter().filter(|row| row.parameters.drive_velocity == velocity).filter_map(point) {
+    for row in rows.iter().filter(|row| row.parameters.drive_velocity == velocity) {
+        let Some(point) = point(row) else { continue };
         let drive = if row.parameters.modulation_amplitude > 0.0 { "Δ > 0" } else { "Δ = 0" };
         let cost = if row.cost.timed_slips == 0 { "*" } else { "" };
         let name = format!("{}{cost}, {drive}", method(row.solver));
