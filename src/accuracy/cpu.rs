@@ -1,4 +1,6 @@
-//! CPU time of the calling thread, and the processor that it runs on.
+//! CPU time of the calling thread, what it buys, and the processor that it runs on.
+
+use crate::solver::Summary;
 
 /// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
 #[must_use]
@@ -25,6 +27,41 @@ pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
     let begin = thread_seconds();
     let result = compute();
     (thread_seconds() - begin, result)
+}
+
+/// What a solver costs, on one thread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// CPU seconds per simulated second.
+    pub per_simulated_second: f64,
+    /// CPU seconds per slip.
+    pub per_slip: f64,
+    /// Steps per slip.
+    pub steps_per_slip: f64,
+    /// CPU time per step, in s.
+    pub per_step: f64,
+    /// Slips that were timed; 0 if the cost per slip is extrapolated from that of a step.
+    pub timed_slips: u64,
+}
+
+impl Cost {
+    /// The cost of a run with these slips. Without any, that per slip is infinite.
+    #[must_use]
+    pub fn of(cpu_seconds: f64, run: &Summary, slips: u64) -> Self {
+        Self {
+            per_simulated_second: cpu_seconds / run.end_time,
+            per_slip: cpu_seconds / slips as f64,
+            steps_per_slip: run.steps as f64 / slips as f64,
+            per_step: cpu_seconds / run.steps as f64,
+            timed_slips: slips,
+        }
+    }
+
+    /// The same, were a slip to take so many steps.
+    #[must_use]
+    pub fn extrapolated(self, steps_per_slip: f64) -> Self {
+        Self { per_slip: self.per_step * steps_per_slip, steps_per_slip, ..self }
+    }
 }
 
 /// Name of the processor as the operating system tells it, and the architecture.

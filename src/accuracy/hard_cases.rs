@@ -8,7 +8,6 @@ use crate::model::slider::{StiffnessMatrix, stability_limit};
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
 use crate::solver::{Limits, SimulationError, Solver, Summary, simulate_audited};
-use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -50,7 +49,7 @@ pub struct HardCase {
 }
 
 /// How a case went.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Stability {
     /// What breaks a naive code.
     pub threat: String,

@@ -5,11 +5,12 @@
 //! would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
+use super::cpu::{self, Cost};
 use super::distance::{Distances, distances};
-use super::{AccuracyError, cpu};
+use super::{AccuracyError, NO_LIMITS, drive_in_words, failed};
 use crate::model::Parameters;
 use crate::observe::{Recording, Slip, SlipObserver};
-use crate::solver::{Limits, Solver, Summary, TOLERANCES, simulate, simulate_audited};
+use crate::solver::{Solver, Summary, TOLERANCES, simulate, simulate_audited};
 use rayon::prelude::*;
 
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
@@ -95,21 +96,6 @@ impl Study {
 fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
     let fixed = time_steps.iter().map(|&time_step| Solver::FixedStep { time_step });
     fixed.chain(tolerances.iter().map(|&tolerance| Solver::EventDriven { tolerance })).collect()
-}
-
-/// What a solver costs under one drive, on one thread.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cost {
-    /// CPU seconds per simulated second.
-    pub per_simulated_second: f64,
-    /// CPU seconds per slip.
-    pub per_slip: f64,
-    /// Steps per slip.
-    pub steps_per_slip: f64,
-    /// CPU time per step, in s.
-    pub per_step: f64,
-    /// Slips that were timed, start-up included; 0 if the cost per slip is extrapolated from that of a step.
-    pub timed_slips: u64,
 }
 
 /// One solver under one drive.
@@ -209,18 +195,11 @@ impl Ensemble {
 
     /// Costs; where there are no slips, those per slip follow from the mean interval in s.
     fn cost(&self, mean_interval: f64) -> Cost {
-        let per_step = self.cpu_seconds / self.summary.steps as f64;
-        let steps_per_slip = if self.slips_seen > 0 {
-            self.summary.steps as f64 / self.slips_seen as f64
+        let cost = Cost::of(self.cpu_seconds, &self.summary, self.slips_seen);
+        if self.slips_seen > 0 {
+            cost
         } else {
-            mean_interval * self.summary.steps as f64 / self.summary.end_time
-        };
-        Cost {
-            per_simulated_second: self.cpu_seconds / self.summary.end_time,
-            per_slip: per_step * steps_per_slip,
-            steps_per_slip,
-            per_step,
-            timed_slips: self.slips_seen,
+            cost.extrapolated(mean_interval * self.summary.steps as f64 / self.summary.end_time)
         }
     }
 }
@@ -238,7 +217,11 @@ impl Study {
             tell("first breaks and energy ledgers");
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = Solver::EventDriven { tolerance: *TOLERANCES.start() };
-            simulate(parameters, tightest, NO_LIMITS, &mut first_breaks).map_err(failed(parameters, tightest))?;
+            simulate(parameters, tightest, NO_LIMITS, &mut first_breaks).map_err(failed(
+                drive_in_words,
+                parameters,
+                tightest,
+            ))?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
                 let break_times = self.break_times(parameters, solver, &first_breaks)?;
@@ -288,7 +271,11 @@ impl Study {
         let realisation = |seed: u64| {
             let parameters = Parameters { seed: REFERENCE_SEEDS + seed, ..parameters.clone() };
             let mut observer = SlipObserver::new(&parameters, &self.recording());
-            simulate(&parameters, solver, NO_LIMITS, &mut observer).map_err(failed(&parameters, solver))?;
+            simulate(&parameters, solver, NO_LIMITS, &mut observer).map_err(failed(
+                drive_in_words,
+                &parameters,
+                solver,
+            ))?;
             Ok(observer.into_rows().0)
         };
         let slips: Vec<Vec<Slip>> = seeds.map(realisation).collect::<Result<_, AccuracyError>>()?;
@@ -306,7 +293,7 @@ impl Study {
             return Ok(None);
         }
         let mut comparison = Comparison::new(reference, self.breaks);
-        simulate(parameters, solver, NO_LIMITS, &mut comparison).map_err(failed(parameters, solver))?;
+        simulate(parameters, solver, NO_LIMITS, &mut comparison).map_err(failed(drive_in_words, parameters, solver))?;
         Ok(Some(comparison.errors()))
     }
 
@@ -316,8 +303,11 @@ impl Study {
         }
         let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
         let mut observer = SlipObserver::new(parameters, &recording);
-        let (_, ledger) =
-            simulate_audited(parameters, solver, NO_LIMITS, &mut observer).map_err(failed(parameters, solver))?;
+        let (_, ledger) = simulate_audited(parameters, solver, NO_LIMITS, &mut observer).map_err(failed(
+            drive_in_words,
+            parameters,
+            solver,
+        ))?;
         Ok(Some(ledger.residual()))
     }
 
@@ -340,33 +330,12 @@ impl Study {
                 }
                 let mut observer = SlipObserver::new(&parameters, &self.recording());
                 let (cpu_seconds, summary) = cpu::timed(|| simulate(&parameters, solver, limits, &mut observer));
-                let summary = summary.map_err(failed(&parameters, solver))?;
+                let summary = summary.map_err(failed(drive_in_words, &parameters, solver))?;
                 ensemble.add(cpu_seconds, &summary, observer.into_rows().0);
             }
         }
         Ok(ensembles)
     }
-}
-
-/// Observers end these simulations; none needs as many events as the default budget of a job.
-const NO_LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
-
-fn failed(
-    parameters: &Parameters,
-    solver: Solver,
-) -> impl FnOnce(crate::solver::SimulationError) -> AccuracyError + use<> {
-    let (drive, seed) = (drive_in_words(parameters), parameters.seed);
-    move |source| AccuracyError::Simulation { drive, seed, solver: super::described(solver), source }
-}
-
-/// Velocity and modulation of a drive in words.
-#[must_use]
-pub fn drive_in_words(parameters: &Parameters) -> String {
-    let modulation = parameters.modulation_period.map_or_else(
-        || "Delta = 0".to_owned(),
-        |period| format!("Delta = {:e} m, 1/T = {} Hz", parameters.modulation_amplitude, (1.0 / period).round()),
-    );
-    format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
 }
 
 fn sample(slips: &[Slip], quantity: Quantity) -> Vec<f64> {

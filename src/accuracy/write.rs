@@ -1,10 +1,11 @@
 //! What a study leaves behind: tables as Parquet, everything as JSON, and the work-precision figures, put in place together.
 
+use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{DistanceRow, Findings, MethodRow, Quantity, Study};
-use super::tables::{distances, method, methods, setting, stability};
+use super::tables::{distances, exponents, method, methods, sizes, stability};
 use super::{AccuracyError, Stability, cpu};
-use crate::figure::{Picture, WorkPrecision, work_precision};
-use crate::model::Parameters;
+use crate::figure::{Growth, Line, Picture, WorkPrecision, scaling, work_precision};
+use crate::model::Symbol;
 use crate::store::columns::Table;
 use crate::store::commit::{Commit, create_folder};
 use crate::store::dataset::{Footer, PROGRAM, TableWriter};
@@ -13,77 +14,46 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Version of the JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
-/// Findings as JSON.
+/// The findings of a study as JSON.
 #[must_use]
 pub fn as_json(study: &Study, findings: &Findings) -> Value {
-    json!({
-        "format": FORMAT,
-        "program": PROGRAM,
-        "processor": cpu::processor(),
+    document(json!({
         "seeds": study.seeds,
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
-        "methods": findings.methods.iter().map(method_json).collect::<Vec<_>>(),
-        "distances": findings.distances.iter().map(distance_json).collect::<Vec<_>>(),
-    })
+        "methods": rows(&methods(), &findings.methods),
+        "distances": rows(&distances(), &findings.distances),
+    }))
+}
+
+/// Scaling as JSON.
+#[must_use]
+pub fn scaling_json(findings: &ScalingFindings) -> Value {
+    document(json!({
+        "sizes": rows(&sizes(), &findings.sizes),
+        "exponents": rows(&exponents(), &findings.exponents),
+    }))
 }
 
 /// The stability table as JSON.
 #[must_use]
-pub fn stability_json(rows: &[Stability]) -> Value {
-    json!({ "format": FORMAT, "program": PROGRAM, "processor": cpu::processor(), "cases": rows })
+pub fn stability_json(cases: &[Stability]) -> Value {
+    document(json!({ "cases": rows(&stability(), cases) }))
 }
 
-fn method_json(row: &MethodRow) -> Value {
-    let breaks = row.break_times.map(|errors| {
-        json!({
-            "compared": errors.breaks,
-            "missing": errors.missing,
-            "median_error": errors.median,
-            "largest_error": errors.largest,
-            "together": errors.together,
-            "together_seconds": errors.together_seconds,
-            "together_throughout": errors.together_throughout,
-        })
-    });
-    json!({
-        "V0": row.parameters.drive_velocity,
-        "Delta": row.parameters.modulation_amplitude,
-        "T": row.parameters.modulation_period,
-        "method": method(row.solver),
-        "setting": setting(row.solver),
-        "cpu_per_simulated_second": row.cost.per_simulated_second,
-        "cpu_per_slip": row.cost.per_slip,
-        "cpu_per_step": row.cost.per_step,
-        "steps_per_slip": row.cost.steps_per_slip,
-        "timed_slips": row.cost.timed_slips,
-        "is_extrapolated": row.cost.timed_slips == 0,
-        "break_times": breaks,
-        "ledger_residual": row.ledger_residual,
-    })
+/// Adds what every document begins with.
+fn document(mut fields: Value) -> Value {
+    fields["format"] = FORMAT.into();
+    fields["program"] = PROGRAM.into();
+    fields["processor"] = cpu::processor().into();
+    fields
 }
 
-fn distance_json(row: &DistanceRow) -> Value {
-    let distance = |distance: super::distance::Distance| json!({ "value": distance.value, "low": distance.low, "high": distance.high, "floor": distance.floor });
-    json!({
-        "V0": row.parameters.drive_velocity,
-        "Delta": row.parameters.modulation_amplitude,
-        "T": row.parameters.modulation_period,
-        "method": method(row.solver),
-        "setting": setting(row.solver),
-        "quantity": row.quantity.name(),
-        "slips": row.sizes.0,
-        "reference_slips": row.sizes.1,
-        "mean": row.means.0,
-        "reference_mean": row.means.1,
-        "deviation": row.deviations.0,
-        "reference_deviation": row.deviations.1,
-        "wasserstein": distance(row.distances.wasserstein),
-        "kolmogorov_smirnov": distance(row.distances.kolmogorov),
-    })
+fn rows<Row>(table: &Table<Row>, rows: &[Row]) -> Value {
+    rows.iter().map(|row| table.json(row)).collect()
 }
 
 /// Writes tables, JSON and figures into a folder, over those of an earlier study; returns the files.
@@ -96,17 +66,32 @@ pub fn write(
     study: &Study,
     findings: &Findings,
 ) -> Result<Vec<PathBuf>, AccuracyError> {
-    let footer = Footer::default().with("processor", &cpu::processor());
     let mut output = Output::begin(storage, folder)?;
-    output.table(methods(), &footer, &findings.methods)?;
-    output.table(distances(), &footer, &findings.distances)?;
-    output.bytes("accuracy.json", as_json(study, findings).to_string().as_bytes())?;
+    output.table(methods(), &findings.methods)?;
+    output.table(distances(), &findings.distances)?;
+    output.json("accuracy.json", &as_json(study, findings))?;
     for &velocity in &study.velocities {
         for (name, picture) in figures(velocity, findings)? {
-            output.bytes(&format!("{name}.svg"), picture.svg().as_bytes())?;
-            output.bytes(&format!("{name}.png"), &picture.png()?)?;
+            output.picture(&name, &picture)?;
         }
     }
+    output.publish()
+}
+
+/// Writes tables, JSON and figure of a scaling into a folder; returns the files.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_scaling(
+    storage: &dyn Storage,
+    folder: &Path,
+    findings: &ScalingFindings,
+) -> Result<Vec<PathBuf>, AccuracyError> {
+    let mut output = Output::begin(storage, folder)?;
+    output.table(sizes(), &findings.sizes)?;
+    output.table(exponents(), &findings.exponents)?;
+    output.json("scaling.json", &scaling_json(findings))?;
+    output.picture("scaling", &scaling_figure(findings)?)?;
     output.publish()
 }
 
@@ -120,37 +105,27 @@ pub fn write_stability(
     rows: &[Stability],
 ) -> Result<Vec<PathBuf>, AccuracyError> {
     let mut output = Output::begin(storage, folder)?;
-    output.table(stability(), &Footer::default().with("processor", &cpu::processor()), rows)?;
-    output.bytes("hard-cases.json", stability_json(rows).to_string().as_bytes())?;
+    output.table(stability(), rows)?;
+    output.json("hard-cases.json", &stability_json(rows))?;
     output.publish()
 }
 
 /// The figures at one velocity, each with its name: cost against the error of break times, and against the distance of τ.
 fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>, AccuracyError> {
     const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
-    let breaks = lines(
-        &findings.methods,
-        velocity,
-        |row| &row.parameters,
-        |row| {
-            let errors = row.break_times?;
-            let uncertainty = Some((errors.median, errors.largest));
-            Some((row, WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip }))
-        },
-    );
+    let breaks = lines(&findings.methods, velocity, |row| {
+        let errors = row.break_times?;
+        let uncertainty = Some((errors.median, errors.largest));
+        Some(WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip })
+    });
     let intervals: Vec<&DistanceRow> =
         findings.distances.iter().filter(|row| row.quantity == Quantity::Interval).collect();
-    let slips = lines(
-        &findings.methods,
-        velocity,
-        |row| &row.parameters,
-        |row| {
-            let same = |other: &&&DistanceRow| other.parameters == row.parameters && other.solver == row.solver;
-            let distance = intervals.iter().find(same)?.distances.wasserstein;
-            let uncertainty = Some((distance.low, distance.high));
-            Some((row, WorkPrecision { error: distance.value, uncertainty, work: row.cost.per_slip }))
-        },
-    );
+    let slips = lines(&findings.methods, velocity, |row| {
+        let same = |other: &&&DistanceRow| other.parameters == row.parameters && other.solver == row.solver;
+        let distance = intervals.iter().find(same)?.distances.wasserstein;
+        let uncertainty = Some((distance.low, distance.high));
+        Some(WorkPrecision { error: distance.value, uncertainty, work: row.cost.per_slip })
+    });
     let mut figures = Vec::new();
     for (name, label, lines) in [
         ("break-times", "median error of the first break times, up to the largest (s)", breaks),
@@ -164,14 +139,14 @@ fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>,
 }
 
 /// A line per method and drive at this velocity.
-fn lines<'a>(
-    rows: &'a [MethodRow],
+fn lines(
+    rows: &[MethodRow],
     velocity: f64,
-    parameters: fn(&MethodRow) -> &Parameters,
-    point: impl Fn(&'a MethodRow) -> Option<(&'a MethodRow, WorkPrecision)>,
+    point: impl Fn(&MethodRow) -> Option<WorkPrecision>,
 ) -> Vec<(String, Vec<WorkPrecision>)> {
     let mut lines: Vec<(String, Vec<WorkPrecision>)> = Vec::new();
-    for (row, point) in rows.iter().filter(|row| parameters(row).drive_velocity == velocity).filter_map(point) {
+    for row in rows.iter().filter(|row| row.parameters.drive_velocity == velocity) {
+        let Some(point) = point(row) else { continue };
         let drive = if row.parameters.modulation_amplitude > 0.0 { "Δ > 0" } else { "Δ = 0" };
         let cost = if row.cost.timed_slips == 0 { "*" } else { "" };
         let name = format!("{}{cost}, {drive}", method(row.solver));
@@ -181,6 +156,25 @@ fn lines<'a>(
         }
     }
     lines
+}
+
+/// Costs, steps and breaks over either size, a line per tolerance.
+fn scaling_figure(findings: &ScalingFindings) -> Result<Picture, AccuracyError> {
+    let mut tolerances: Vec<f64> = findings.sizes.iter().map(|row| row.tolerance).collect();
+    tolerances.sort_by(|a, b| b.total_cmp(a));
+    tolerances.dedup();
+    let lines = |size, name: &str, value: fn(&SizeRow) -> f64| {
+        let points = |tolerance| growing(size, tolerance, &findings.sizes).map(|(count, row)| (count, value(row)));
+        tolerances.iter().map(|&tolerance| (format!("{name} {tolerance:e}"), points(tolerance).collect())).collect()
+    };
+    let columns = [(Symbol::N, "Blocks N"), (Symbol::Ns, "Contacts per block Nₛ")].map(|(size, label)| {
+        let mut counts: Vec<Line> = lines(size, "steps,", |row| row.cost.steps_per_slip);
+        // Breaks hardly depend on the tolerance.
+        let breaks: Vec<Line> = lines(size, "breaks,", |row| row.breaks_per_slip);
+        counts.extend(breaks.into_iter().take(1).map(|(_, points)| ("breaks".to_owned(), points)));
+        Growth { label: label.to_owned(), costs: lines(size, "tolerance", |row| row.cost.per_slip), counts }
+    });
+    Ok(scaling(&columns)?)
 }
 
 fn staging(folder: &Path) -> PathBuf {
@@ -208,9 +202,10 @@ impl<'a> Output<'a> {
         file
     }
 
-    fn table<Row>(&mut self, table: Table<Row>, footer: &Footer, rows: &[Row]) -> Result<(), AccuracyError> {
+    fn table<Row>(&mut self, table: Table<Row>, rows: &[Row]) -> Result<(), AccuracyError> {
+        let footer = Footer::default().with("processor", &cpu::processor());
         let file = self.place(&format!("{}.parquet", table.name));
-        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&file), table, footer)?;
+        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&file), table, &footer)?;
         for row in rows {
             writer.push(row)?;
         }
@@ -220,6 +215,15 @@ impl<'a> Output<'a> {
     fn bytes(&mut self, name: &str, bytes: &[u8]) -> Result<(), AccuracyError> {
         let file = self.place(name);
         Ok(self.commit.stage_bytes(&file, bytes)?)
+    }
+
+    fn json(&mut self, name: &str, value: &Value) -> Result<(), AccuracyError> {
+        self.bytes(name, value.to_string().as_bytes())
+    }
+
+    fn picture(&mut self, name: &str, picture: &Picture) -> Result<(), AccuracyError> {
+        self.bytes(&format!("{name}.svg"), picture.svg().as_bytes())?;
+        self.bytes(&format!("{name}.png"), &picture.png()?)
     }
 
     fn publish(self) -> Result<Vec<PathBuf>, AccuracyError> {
@@ -234,8 +238,8 @@ impl<'a> Output<'a> {
 mod tests {
     use super::super::breaks::BreakErrors;
     use super::super::distance::distances as measured;
-    use super::super::study::Cost;
     use super::*;
+    use crate::model::Parameters;
     use crate::solver::Solver;
     use crate::store::dataset::Reader;
     use crate::store::storage::Disk;
@@ -251,8 +255,13 @@ mod tests {
             together_seconds: 0.06,
             together_throughout: false,
         });
-        let cost =
-            Cost { per_simulated_second: 0.2, per_slip: 0.02, steps_per_slip: 1e5, per_step: 2e-7, timed_slips: 0 };
+        let cost = cpu::Cost {
+            per_simulated_second: 0.2,
+            per_slip: 0.02,
+            steps_per_slip: 1e5,
+            per_step: 2e-7,
+            timed_slips: 0,
+        };
         let method =
             MethodRow { parameters: parameters.clone(), solver, cost, break_times, ledger_residual: Some(-1e-3) };
         let untested = MethodRow { break_times: None, ledger_residual: None, ..method.clone() };
@@ -291,9 +300,44 @@ mod tests {
             Reader::new(&Disk, files[..1].to_vec(), None).map(|batch| batch.unwrap().rows.num_rows()).sum();
         assert_eq!(rows, 2);
         let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
-        assert_eq!(json["methods"][0]["is_extrapolated"], true);
-        assert_eq!(json["methods"][1]["break_times"], Value::Null);
+        assert_eq!(json["methods"][0]["timed_slips"], 0);
+        assert_eq!((&json["methods"][0]["median_break_error"], &json["methods"][0]["T"]), (&json!(1e-7), &Value::Null));
+        assert_eq!(json["methods"][1]["median_break_error"], Value::Null);
         assert_eq!(json["distances"][0]["quantity"], "interval");
         assert!(!folder.path().join("staging").exists(), "the staging folder must not stay");
+    }
+
+    #[test]
+    fn every_field_of_the_json_is_documented() {
+        let page = include_str!("../../docs/results.md");
+        let documents = [
+            ("accuracy", as_json(&Study::quick(), &findings())),
+            ("accuracy --scaling", scaling_json(&ScalingFindings::default())),
+            ("accuracy --hard-cases", stability_json(&[])),
+        ];
+        for (command, document) in documents {
+            let row = page.lines().find(|line| line.starts_with(&format!("| `{command}` |"))).unwrap();
+            for field in document.as_object().unwrap().keys() {
+                assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scaling_is_drawn_whatever_the_order_of_its_rows_and_not_without_any() {
+        let row = |blocks, tolerance| SizeRow {
+            parameters: Parameters { blocks, ..Parameters::default() },
+            tolerance,
+            cost: cpu::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cpu::Cost::default() },
+            leaps_per_slip: 100.0,
+            breaks_per_slip: 3e3,
+            reattachments_per_slip: 3e3,
+        };
+        let sizes = vec![row(70, 1e-10), row(70, 1e-6), row(140, 1e-10), row(140, 1e-6)];
+        let svg = scaling_figure(&ScalingFindings { sizes, exponents: Vec::new() }).unwrap().svg();
+        for name in ["tolerance 1e-6", "tolerance 1e-10", "steps, 1e-6", "steps, 1e-10", "breaks"] {
+            assert_eq!(svg.matches(&format!(">{name}<")).count(), 1, "{name}");
+        }
+        assert!(matches!(scaling_figure(&ScalingFindings::default()), Err(AccuracyError::Figure(_))));
     }
 }

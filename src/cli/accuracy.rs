@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use stickslip::accuracy::{
-    self, Findings, MethodRow, Quantity, Stability, Study, described, drive_in_words, hard_cases, stability_json,
+    self, Findings, MethodRow, Quantity, Scaling, ScalingFindings, Stability, Study, described, drive_in_words,
+    hard_cases, scaling_json, stability_json,
 };
 use stickslip::store::storage::Disk;
 
@@ -20,12 +21,14 @@ And the residual of the energy ledger. Cost is CPU time of one thread; keep the 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
   stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
+  stickslip accuracy --scaling               what a slip costs with N and Ns, in two minutes; --quick: in seconds
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
-    /// Fewer settings and slips: about a minute
+    /// Fewer settings and slips
     #[arg(long)]
     quick: bool,
     /// Realisations of each ensemble [default: 8, with --quick 2]
@@ -34,6 +37,9 @@ pub struct Arguments {
     /// Slips of each realisation [default: 100, with --quick 12]
     #[arg(long, value_name = "N")]
     slips: Option<u64>,
+    /// Measure what a slip costs with the size of the slider instead
+    #[arg(long, conflicts_with_all = ["hard_cases", "seeds", "slips"])]
+    scaling: bool,
     /// Run the hard cases instead
     #[arg(long, conflicts_with_all = ["quick", "seeds", "slips"])]
     hard_cases: bool,
@@ -45,6 +51,9 @@ pub struct Arguments {
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     if arguments.hard_cases {
         return run_hard_cases(arguments);
+    }
+    if arguments.scaling {
+        return run_scaling(arguments);
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
@@ -60,6 +69,19 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         output::json(&accuracy::as_json(&study, &findings))?;
     } else {
         output::print(&study_text(&study, &findings))?;
+        print_files(&files)?;
+    }
+    Ok(Exit::Done)
+}
+
+fn run_scaling(arguments: &Arguments) -> Result<Exit> {
+    let scaling = if arguments.quick { Scaling::quick() } else { Scaling::full() };
+    let findings = scaling.run(&mut |next| output::tell(next))?;
+    let files = accuracy::write_scaling(&Disk, &arguments.out, &findings)?;
+    if arguments.json {
+        output::json(&scaling_json(&findings))?;
+    } else {
+        output::print(&scaling_text(&findings))?;
         print_files(&files)?;
     }
     Ok(Exit::Done)
@@ -151,6 +173,48 @@ fn study_line(row: &MethodRow, findings: &Findings) -> String {
         wasserstein,
         kolmogorov
     )
+}
+
+fn scaling_text(findings: &ScalingFindings) -> String {
+    let mut lines = vec![format!("{}; one thread; per slip past start-up", accuracy::cpu::processor())];
+    lines.push(format!(
+        "\n{:>6} {:>6} {:>9} {:>6} {:>10} {:>10} {:>9} {:>9} {:>9} {:>7} {:>8}",
+        "N", "Ns", "tolerance", "slips", "CPU s", "CPU/sim. s", "steps", "breaks", "reattach.", "leaps", "ns/step"
+    ));
+    for row in &findings.sizes {
+        lines.push(format!(
+            "{:>6} {:>6} {:>9e} {:>6} {:>10.2e} {:>10.2e} {:>9.0} {:>9.0} {:>9.0} {:>7.0} {:>8.0}",
+            row.parameters.blocks,
+            row.parameters.contacts_per_block,
+            row.tolerance,
+            row.cost.timed_slips,
+            row.cost.per_slip,
+            row.cost.per_simulated_second,
+            row.cost.steps_per_slip,
+            row.breaks_per_slip,
+            row.reattachments_per_slip,
+            row.leaps_per_slip,
+            1e9 * row.cost.per_step
+        ));
+    }
+    lines.push(format!(
+        "\n{:13} {:>9} {:>17} {:>10} {:>9} {:>9} {:>8}",
+        "exponents of", "tolerance", "CPU s", "CPU/sim. s", "steps", "breaks", "ns/step"
+    ));
+    for row in &findings.exponents {
+        lines.push(format!(
+            "{:>13} {:>9e} {:>17.2} {:>10.2} {:>9.2} {:>9.2} {:>8.2}",
+            row.size.key(),
+            row.tolerance,
+            row.cpu_per_slip,
+            row.cpu_per_simulated_second,
+            row.steps_per_slip,
+            row.breaks_per_slip,
+            row.cpu_per_step
+        ));
+    }
+    lines.push(String::new());
+    lines.join("\n")
 }
 
 fn stability_text(rows: &[Stability]) -> String {

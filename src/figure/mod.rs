@@ -7,6 +7,7 @@ mod frame;
 mod histograms;
 mod intervals;
 mod picture;
+mod scaling;
 mod simulation;
 mod work_precision;
 
@@ -15,6 +16,7 @@ pub use draw::draw_all;
 pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
 pub use intervals::intervals;
 pub use picture::Picture;
+pub use scaling::{Growth, Line, scaling};
 pub use simulation::{AttachedMap, simulation};
 pub use work_precision::{WorkPrecision, work_precision};
 

@@ -3,10 +3,9 @@
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Frame, LEGEND, LegendPlace, Mark};
-use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
+use super::picture::{Dot, INKS, Picture, Sheet, Stroke};
 
 const SIZE: (f64, f64) = (840.0, 500.0);
-const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// Error and cost of a method at one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]

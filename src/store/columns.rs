@@ -7,7 +7,7 @@
 use crate::model::{Parameters, Symbol, Value};
 use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use serde_json::{Map, json};
+use serde_json::{Map, Value as Json, json};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -39,6 +39,26 @@ pub enum Getter<Row> {
     Flag(fn(&Row) -> bool),
     /// A parameter of the model; null for a period when the modulation is off.
     Parameter(Symbol, fn(&Row) -> &Parameters),
+}
+
+impl<Row> Getter<Row> {
+    fn json(&self, row: &Row) -> Json {
+        match self {
+            Self::Real(get) => get(row).into(),
+            Self::OptionalReal(get) => get(row).into(),
+            Self::Count(get) => get(row).into(),
+            Self::OptionalCount(get) => get(row).into(),
+            Self::Text(get) => get(row).into(),
+            Self::OptionalText(get) => get(row).into(),
+            Self::Flag(get) => get(row).into(),
+            Self::Parameter(symbol, of) => match of(row).get(*symbol) {
+                Value::Real(real) => real.into(),
+                Value::Count(count) => count.into(),
+                Value::BreakOn(rule) => rule.word().into(),
+                Value::Absent => Json::Null,
+            },
+        }
+    }
 }
 
 /// A column of a table whose rows are of type `Row`.
@@ -132,6 +152,12 @@ impl<Row> Table<Row> {
             let _ = writeln!(text, "| `{}` | {kind}{nullable} | {} | {} |", column.name, column.unit, column.meaning);
         }
         text
+    }
+
+    /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
+    #[must_use]
+    pub fn json(&self, row: &Row) -> Json {
+        self.columns.iter().map(|column| (column.name.to_owned(), column.value.json(row))).collect()
     }
 
     /// An empty buffer for rows of this table.
@@ -291,8 +317,20 @@ impl Cells {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// Holds a page of the documentation that is made from columns; writes it anew if `UPDATE_DOCS` is set.
+    pub(crate) fn assert_documented(page: &str, text: &str) {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page);
+        if std::env::var_os("UPDATE_DOCS").is_some() {
+            std::fs::write(&file, text).unwrap();
+        }
+        assert!(
+            std::fs::read_to_string(&file).unwrap_or_default() == text,
+            "docs/{page} is out of date: run the tests with UPDATE_DOCS=1"
+        );
+    }
 
     struct Reading {
         force: f64,
@@ -364,6 +402,17 @@ mod tests {
         let batch = RecordBatch::try_from_iter([("force", Arc::new(Int64Array::from(vec![1])) as ArrayRef)]).unwrap();
         let error = table().buffer().copy(&batch, 0..1).unwrap_err();
         assert!(error.to_string().contains("column force is Int64, not Float64"), "{error}");
+    }
+
+    #[test]
+    fn rows_become_json_by_the_names_of_the_columns() {
+        let [first, second] = rows();
+        let expected = json!({
+            "force": 1.5, "phase": null, "number": 1, "name": "reading 1", "high": true, "T": null, "break_on": "magnitude"
+        });
+        assert_eq!(table().json(&first), expected);
+        let second = table().json(&Reading { force: f64::NAN, ..second });
+        assert_eq!((&second["force"], &second["phase"], &second["T"]), (&Json::Null, &json!(0.25), &json!(0.01)));
     }
 
     #[test]

@@ -294,6 +294,7 @@ pub fn markdown() -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::store::columns::tests::assert_documented;
     use arrow_array::cast::AsArray;
     use arrow_array::types::Int64Type;
 
@@ -352,19 +353,11 @@ pub(crate) mod tests {
 
     #[test]
     fn documented_tables_are_those_written() {
-        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/tables.md");
         let text = format!(
             "# Tables\n\nUnits are SI. Every file of a table has these columns in this order; units and meanings are \
              also in its metadata.\n\n{}",
             markdown()
         );
-        if std::env::var_os("UPDATE_DOCS").is_some() {
-            std::fs::create_dir_all(concat!(env!("CARGO_MANIFEST_DIR"), "/docs")).unwrap();
-            std::fs::write(file, &text).unwrap();
-        }
-        assert!(
-            std::fs::read_to_string(file).unwrap_or_default() == text,
-            "docs/tables.md is out of date: run the tests with UPDATE_DOCS=1"
-        );
+        assert_documented("tables.md", &text);
     }
 }

@@ -1,0 +1,280 @@
+//! Scaling: what a slip costs as the slider grows, in blocks N and in contacts per block N_s.
+//!
+//! Every case breaks about as many contacts: the larger the slider, the fewer its slips. The start-up is run once more alone
+//! and its cost taken off, so what is left is that of slips past start-up. Exponents are slopes of straight lines through
+//! the logarithms.
+
+use super::cpu::{self, Cost};
+use super::{AccuracyError, NO_LIMITS, failed};
+use crate::model::{Parameters, Symbol};
+use crate::observe::{Recording, SlipObserver};
+use crate::solver::{Solver, Summary, simulate};
+
+/// Slips of start-up, whose cost is taken off.
+const START_UP: u64 = 2;
+/// Fewest slips that are timed.
+const FEWEST_SLIPS: u64 = 2;
+
+/// What to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scaling {
+    /// Numbers of blocks N, with the default contacts per block.
+    pub blocks: Vec<usize>,
+    /// Contacts per block N_s, with the default number of blocks.
+    pub contacts_per_block: Vec<usize>,
+    /// Tolerances of the event-driven solver.
+    pub tolerances: Vec<f64>,
+    /// Contacts N N_s of all slips of a case together.
+    pub contacts: u64,
+}
+
+/// What grows: the number of blocks, and of contacts per block.
+pub const SIZES: [Symbol; 2] = [Symbol::N, Symbol::Ns];
+
+/// Cost at one size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SizeRow {
+    /// The size, and all other parameters.
+    pub parameters: Parameters,
+    /// Tolerance of the event-driven solver.
+    pub tolerance: f64,
+    /// What it costs past start-up.
+    pub cost: Cost,
+    /// Of its steps, leaps over quiet time; per slip.
+    pub leaps_per_slip: f64,
+    /// Contacts broken per slip, those between slips included.
+    pub breaks_per_slip: f64,
+    /// Contacts reattached per slip.
+    pub reattachments_per_slip: f64,
+}
+
+/// Exponents of the powers of one size that fit best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exponents {
+    /// What grows: one of [`SIZES`].
+    pub size: Symbol,
+    /// Tolerance of the event-driven solver.
+    pub tolerance: f64,
+    /// That of CPU time per slip.
+    pub cpu_per_slip: f64,
+    /// That of CPU time per simulated time.
+    pub cpu_per_simulated_second: f64,
+    /// That of CPU time per step.
+    pub cpu_per_step: f64,
+    /// That of steps per slip.
+    pub steps_per_slip: f64,
+    /// That of breaks per slip.
+    pub breaks_per_slip: f64,
+}
+
+/// All that is found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScalingFindings {
+    /// Size by size, tolerance by tolerance.
+    pub sizes: Vec<SizeRow>,
+    /// Likewise; none of a size that does not grow.
+    pub exponents: Vec<Exponents>,
+}
+
+impl Scaling {
+    /// Over factors of sixteen: minutes.
+    #[must_use]
+    pub fn full() -> Self {
+        Self {
+            blocks: vec![70, 140, 280, 560, 1120],
+            contacts_per_block: vec![20, 80, 320],
+            tolerances: vec![1e-6, 1e-10],
+            contacts: 400_000,
+        }
+    }
+
+    /// Over factors of four: seconds.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self { blocks: vec![70, 140, 280], contacts_per_block: vec![20, 80], contacts: 30_000, ..Self::full() }
+    }
+
+    /// The sizes, each once.
+    fn cases(&self) -> Vec<Parameters> {
+        let wide = self.blocks.iter().map(|&count| (Symbol::N, count));
+        let dense = self.contacts_per_block.iter().map(|&count| (Symbol::Ns, count));
+        let mut cases = Vec::new();
+        for (size, count) in wide.chain(dense) {
+            let mut case = Parameters::default();
+            match size {
+                Symbol::N => case.blocks = count,
+                _ => case.contacts_per_block = count,
+            }
+            if !cases.contains(&case) {
+                cases.push(case);
+            }
+        }
+        cases
+    }
+
+    /// Slips that are timed at a size.
+    fn slips(&self, parameters: &Parameters) -> u64 {
+        (self.contacts / (parameters.blocks * parameters.contacts_per_block) as u64).max(FEWEST_SLIPS)
+    }
+
+    /// Runs it. `tell` hears in words what comes next.
+    ///
+    /// # Errors
+    /// When a simulation cannot go on.
+    pub fn run(&self, tell: &mut dyn FnMut(&str)) -> Result<ScalingFindings, AccuracyError> {
+        let mut sizes = Vec::new();
+        for parameters in &self.cases() {
+            let slips = self.slips(parameters);
+            tell(&format!("{}: {slips} slips", size_in_words(parameters)));
+            for &tolerance in &self.tolerances {
+                sizes.push(timed(parameters, tolerance, slips)?);
+            }
+        }
+        let pairs = SIZES.into_iter().flat_map(|size| self.tolerances.iter().map(move |&tolerance| (size, tolerance)));
+        let exponents = pairs.filter_map(|(size, tolerance)| Exponents::of(size, tolerance, &sizes)).collect();
+        Ok(ScalingFindings { sizes, exponents })
+    }
+}
+
+/// Times slips past start-up.
+fn timed(parameters: &Parameters, tolerance: f64, slips: u64) -> Result<SizeRow, AccuracyError> {
+    let solver = Solver::EventDriven { tolerance };
+    let run = |slips: u64| {
+        let recording = Recording { slips, discard: 0, ..Recording::default() };
+        let mut observer = SlipObserver::new(parameters, &recording);
+        let (cpu_seconds, run) = cpu::timed(|| simulate(parameters, solver, NO_LIMITS, &mut observer));
+        run.map(|summary| (cpu_seconds, summary)).map_err(failed(size_in_words, parameters, solver))
+    };
+    let (start_up_seconds, start_up) = run(START_UP)?;
+    let (all_seconds, all) = run(START_UP + slips)?;
+    let past = Summary {
+        end_time: all.end_time - start_up.end_time,
+        steps: all.steps - start_up.steps,
+        leaps: all.leaps - start_up.leaps,
+        breaks: all.breaks - start_up.breaks,
+        reattachments: all.reattachments - start_up.reattachments,
+        ..all
+    };
+    let per_slip = |count: u64| count as f64 / slips as f64;
+    Ok(SizeRow {
+        parameters: parameters.clone(),
+        tolerance,
+        cost: Cost::of(all_seconds - start_up_seconds, &past, slips),
+        leaps_per_slip: per_slip(past.leaps),
+        breaks_per_slip: per_slip(past.breaks),
+        reattachments_per_slip: per_slip(past.reattachments),
+    })
+}
+
+/// The rows in which this size grows and the other is at its default.
+pub(super) fn growing(size: Symbol, tolerance: f64, rows: &[SizeRow]) -> impl Iterator<Item = (f64, &SizeRow)> {
+    let default = Parameters::default();
+    let is_case = move |row: &&SizeRow| {
+        let stays = |other| row.parameters.get(other) == default.get(other);
+        row.tolerance == tolerance && SIZES.into_iter().all(|other| other == size || stays(other))
+    };
+    rows.iter().filter(is_case).map(move |row| {
+        let count = if size == Symbol::N { row.parameters.blocks } else { row.parameters.contacts_per_block };
+        (count as f64, row)
+    })
+}
+
+impl Exponents {
+    /// Those over the sizes; `None` for fewer than two.
+    fn of(size: Symbol, tolerance: f64, rows: &[SizeRow]) -> Option<Self> {
+        let fit = |value: fn(&SizeRow) -> f64| {
+            exponent(&growing(size, tolerance, rows).map(|(count, row)| (count, value(row))).collect::<Vec<_>>())
+        };
+        Some(Self {
+            size,
+            tolerance,
+            cpu_per_slip: fit(|row| row.cost.per_slip)?,
+            cpu_per_simulated_second: fit(|row| row.cost.per_simulated_second)?,
+            cpu_per_step: fit(|row| row.cost.per_step)?,
+            steps_per_slip: fit(|row| row.cost.steps_per_slip)?,
+            breaks_per_slip: fit(|row| row.breaks_per_slip)?,
+        })
+    }
+}
+
+/// Slope of the straight line through the logarithms, by least squares; `None` for fewer than two sizes.
+fn exponent(points: &[(f64, f64)]) -> Option<f64> {
+    let logarithms = || points.iter().map(|&(x, y)| (x.ln(), y.ln()));
+    let count = points.len() as f64;
+    let (x_mean, y_mean) = logarithms().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / count, sum.1 + y / count));
+    let spread: f64 = logarithms().map(|(x, _)| (x - x_mean).powi(2)).sum();
+    let common: f64 = logarithms().map(|(x, y)| (x - x_mean) * (y - y_mean)).sum();
+    (spread > 0.0).then(|| common / spread)
+}
+
+/// The size in words.
+fn size_in_words(parameters: &Parameters) -> String {
+    format!("N = {}, Ns = {}", parameters.blocks, parameters.contacts_per_block)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponent_of_a_power_is_found_and_one_size_has_none() {
+        let points: Vec<(f64, f64)> = [70.0, 140.0, 560.0].iter().map(|&n: &f64| (n, 0.3 * n.powf(1.7))).collect();
+        assert!((exponent(&points).unwrap() - 1.7).abs() < 1e-12);
+        assert_eq!(exponent(&points[..1]), None);
+        assert_eq!(exponent(&[]), None);
+    }
+
+    #[test]
+    fn every_size_is_run_once_with_about_as_many_contacts() {
+        let scaling = Scaling::full();
+        let cases = scaling.cases();
+        assert_eq!(cases.len(), 7);
+        for case in &cases {
+            let contacts = scaling.slips(case) * (case.blocks * case.contacts_per_block) as u64;
+            assert!((380_000..=400_000).contains(&contacts), "{}: {contacts}", size_in_words(case));
+        }
+        assert_eq!(Scaling { contacts: 1, ..scaling }.slips(&cases[0]), FEWEST_SLIPS);
+    }
+
+    #[test]
+    fn breaks_grow_as_the_contacts_and_steps_as_the_breaks() {
+        let scaling = Scaling {
+            blocks: vec![35, 70],
+            contacts_per_block: vec![10, 20],
+            tolerances: vec![1e-6],
+            contacts: 20_000,
+        };
+        let findings = scaling.run(&mut |_| {}).unwrap();
+        assert_eq!(findings.sizes.len(), 3);
+        for row in &findings.sizes {
+            let contacts = (row.parameters.blocks * row.parameters.contacts_per_block) as f64;
+            // Every contact breaks, some again and again.
+            assert!(row.breaks_per_slip > contacts && row.breaks_per_slip < 20.0 * contacts, "{row:?}");
+            // What breaks attaches again, some of it after the last slip.
+            assert!((row.reattachments_per_slip / row.breaks_per_slip - 1.0).abs() < 0.2, "{row:?}");
+            assert!(row.leaps_per_slip < row.cost.steps_per_slip && row.cost.per_slip > 0.0, "{row:?}");
+        }
+        let [wide, dense] = findings.exponents[..] else { panic!("{:?}", findings.exponents) };
+        assert_eq!((wide.size, dense.size), (Symbol::N, Symbol::Ns));
+        for exponents in [wide, dense] {
+            assert!((0.5..2.0).contains(&exponents.breaks_per_slip), "{exponents:?}");
+        }
+    }
+
+    #[test]
+    fn a_size_grows_over_its_own_rows_only() {
+        let row = |blocks, contacts_per_block| SizeRow {
+            parameters: Parameters { blocks, contacts_per_block, ..Parameters::default() },
+            tolerance: 1e-6,
+            cost: Cost::default(),
+            leaps_per_slip: 0.0,
+            breaks_per_slip: 0.0,
+            reattachments_per_slip: 0.0,
+        };
+        let rows = [row(70, 20), row(140, 20), row(70, 80)];
+        let sizes = |size| growing(size, 1e-6, &rows).map(|(count, _)| count).collect::<Vec<_>>();
+        assert_eq!(sizes(Symbol::N), [70.0, 140.0]);
+        assert_eq!(sizes(Symbol::Ns), [20.0, 80.0]);
+        assert_eq!(growing(Symbol::N, 1e-10, &rows).count(), 0);
+    }
+}

@@ -1,0 +1,119 @@
+//! Scaling: what a slip costs, and the steps and breaks in it, over each size of the slider; all logarithmic.
+
+use super::FigureError;
+use super::axis::{Axis, logarithmic_bounds};
+use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
+use super::picture::{Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
+
+const PANEL: (f64, f64) = (300.0, 280.0);
+/// Powers of the size that are drawn as guides, and their dashes.
+const GUIDES: [(i32, Stroke); 2] =
+    [(1, Stroke::dashed(GREY, 1.4, (2.0, 3.0))), (2, Stroke::dashed(GREY, 1.4, (8.0, 4.0)))];
+/// Guides start under the lowest curve by this factor.
+const GUIDES_UNDER: f64 = 0.35;
+
+/// A name and points, each a size and a value.
+pub type Line = (String, Vec<(f64, f64)>);
+
+/// What grows with a size of the slider.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Growth {
+    /// What the size is.
+    pub label: String,
+    /// CPU times per slip, in s.
+    pub costs: Vec<Line>,
+    /// Counts per slip.
+    pub counts: Vec<Line>,
+}
+
+type LinesOf = fn(&Growth) -> &[Line];
+
+/// Draws a column of two panels for each size: costs above, counts below. Names are those of the last.
+///
+/// # Errors
+/// When there is nothing to draw.
+pub fn scaling(columns: &[Growth]) -> Result<Picture, FigureError> {
+    const NAME: &str = "scaling";
+    let (width, height) = (LEFT + PANEL.0, ABOVE + PANEL.1);
+    let mut sheet = Sheet::new(NAME, (columns.len() as f64 * width + LEGEND, 2.0 * height + UNDER));
+    let rows: [(&str, LinesOf); 2] =
+        [("CPU time per slip (s)", |growth| &growth.costs), ("Steps and breaks per slip", |growth| &growth.counts)];
+    for (row, (y_label, lines_of)) in rows.into_iter().enumerate() {
+        let values = columns.iter().flat_map(|growth| points(lines_of(growth))).map(|point| point.1);
+        let (low, high) = logarithmic_bounds(values).ok_or(FigureError::Empty { figure: NAME, what: "costs" })?;
+        for (column, growth) in columns.iter().enumerate() {
+            let lines = lines_of(growth);
+            let Some((first, last)) = logarithmic_bounds(points(lines).map(|point| point.0)) else { continue };
+            let frame = Frame {
+                left: LEFT + column as f64 * width,
+                top: ABOVE + row as f64 * height,
+                width: PANEL.0,
+                height: PANEL.1,
+                x: Axis::logarithmic(&growth.label, first, last),
+                y: Axis::logarithmic(y_label, GUIDES_UNDER * low, high),
+            };
+            let is_last = row + 1 == rows.len();
+            draw(&mut sheet, &frame, lines);
+            frame.axes(&mut sheet, is_last);
+            if is_last {
+                frame.x_label(&mut sheet);
+            }
+            if column == 0 {
+                frame.y_label(&mut sheet);
+            }
+            if column + 1 == columns.len() {
+                frame.legend(&mut sheet, LegendPlace::Beside, &legend(lines, row == 0));
+            }
+        }
+    }
+    Ok(sheet.finish())
+}
+
+fn points(lines: &[Line]) -> impl Iterator<Item = (f64, f64)> {
+    lines.iter().flat_map(|(_, points)| points).copied()
+}
+
+fn legend(lines: &[Line], with_guides: bool) -> Vec<(Mark, String)> {
+    let lines = lines.iter().zip(INKS).map(|((name, _), ink)| (Mark::Line(curve(ink)), name.clone()));
+    let guides = GUIDES.iter().filter(|_| with_guides);
+    lines.chain(guides.map(|&(power, stroke)| (Mark::Line(stroke), format!("slope {power}")))).collect()
+}
+
+const fn curve(ink: Ink) -> Stroke {
+    Stroke::solid(ink, 1.8)
+}
+
+/// The guides from under the first point of the lowest line, and the lines over them.
+fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Line]) {
+    let start = points(lines).fold((f64::INFINITY, f64::INFINITY), |least, (x, y)| (least.0.min(x), least.1.min(y)));
+    frame.clipped(sheet, |sheet| {
+        for (power, stroke) in GUIDES {
+            let guide = |x: f64| (x, GUIDES_UNDER * start.1 * (x / start.0).powi(power));
+            frame.curve(sheet, [guide(start.0), guide(frame.x.high)], stroke);
+        }
+        for ((_, points), ink) in lines.iter().zip(INKS) {
+            frame.curve(sheet, points.iter().copied(), curve(ink));
+            frame.points(sheet, points.iter().copied(), Dot { ink, radius: 4.0, opacity: 1.0 });
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_panels_a_size_and_each_label_once() {
+        let line = |name: &str| (name.to_owned(), vec![(70.0, 0.01), (140.0, 0.03)]);
+        let growth = |label: &str| Growth { label: label.to_owned(), costs: vec![line("a")], counts: vec![line("b")] };
+        let picture = scaling(&[growth("Blocks N"), growth("Contacts")]).unwrap();
+        let svg = picture.svg();
+        assert_eq!(svg.matches("<clipPath").count(), 4);
+        for text in ["Blocks N", "Contacts", "CPU time per slip (s)", "Steps and breaks per slip", "slope 1", "slope 2"]
+        {
+            assert_eq!(svg.matches(&format!(">{text}<")).count(), 1, "{text}");
+        }
+        assert!(picture.png().unwrap().starts_with(b"\x89PNG"));
+        assert!(scaling(&[]).is_err());
+    }
+}
