@@ -376,6 +376,31 @@ mod tests {
     }
 
     #[test]
+    fn events_that_share_a_step_come_in_the_order_and_at_the_times_of_those_that_do_not() {
+        let plain = Parameters::default();
+        let modulated =
+            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+        for parameters in [plain, modulated] {
+            let log = |tolerance: f64| {
+                let limits = Limits { end_time: 0.1, events: u64::MAX, interrupt: None };
+                let mut log = ContactLog::default();
+                let summary = run(&parameters, tolerance, limits, &mut log, None).unwrap();
+                (summary.steps, log.events)
+            };
+            let ((steps, merged), (steps_alone, alone)) = (log(1e-4), log(1e-10));
+            assert!(10 * steps < 8 * steps_alone, "nothing is merged: {steps} steps, {steps_alone} at 1e-10");
+            let later = |events: &[ContactEvent]| events.iter().filter(|event| event.generation > 0).count();
+            assert!(later(&alone) > 150, "too few events to compare");
+            assert_eq!(merged.len(), alone.len());
+            for (event, exact) in merged.iter().zip(&alone) {
+                let which = |event: &ContactEvent| (event.block, event.contact, event.generation, event.change);
+                assert_eq!(which(event), which(exact), "at t = {} s", exact.time);
+                assert!((event.time - exact.time).abs() < 1e-6, "{} s, not {} s", event.time, exact.time);
+            }
+        }
+    }
+
+    #[test]
     fn truncations_of_many_steps_do_not_add_up_with_heavy_damping() {
         let parameters = Parameters { blocks: 1, damping_rate: 1e7, ..Parameters::default() };
         let log = |tolerance: f64| {

@@ -9,8 +9,8 @@
 //! at j-1, j+1:  h² K_int/m δ2/12 ξ⁴
 //! ```
 //!
-//! and by terms of higher order that spread along the chain. As long as these are under the error of a step, the event is
-//! merged into it: the change is added to the series, which stays right from the event on. The step ends where it no longer
+//! and by terms of higher order that spread along the chain. As long as these are under a small part of the error of a step, the
+//! event is merged into it: the change is added to the series, which stays right from the event on. The step ends where it no longer
 //! would. Contract: events in the right order, also of blocks whose series has changed.
 
 use super::crossing::first_exit;
