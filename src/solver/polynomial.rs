@@ -78,7 +78,7 @@ pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
     (strays, slope_varies + strays)
 }
 
-/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s. Takes one coefficient less than [`MOST_COEFFICIENTS`].
+/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s.
 pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
     let square = s * s;
     let mut sums = [0.0, 0.0];
