@@ -264,3 +264,30 @@ fn about_zero([second, third, fourth]: [f64; 3], at: f64) -> [f64; MERGED_ORDER 
         fourth,
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_root_from_the_bits_lies_below_the_root_and_not_far(exponent in -60.0_f64..0.0) {
+            let value = libm::pow(10.0, exponent);
+            for (root, exact) in
+                [(root_below::<5>(value), libm::pow(value, 0.2)), (root_below::<6>(value), libm::pow(value, 1.0 / 6.0))]
+            {
+                prop_assert!(root <= exact && root > 0.8 * exact, "{} for {}", root, exact);
+            }
+        }
+
+        #[test]
+        fn terms_about_an_event_are_the_same_about_the_start(
+            second in -1.0_f64..1.0, third in -1.0_f64..1.0, fourth in -1.0_f64..1.0, at in 0.0_f64..1.0, s in 0.0_f64..1.0
+        ) {
+            let beyond = s - at;
+            let expected = beyond * beyond * (second + beyond * (third + beyond * fourth));
+            prop_assert!((polynomial::value(&about_zero([second, third, fourth], at), s) - expected).abs() < 1e-13);
+        }
+    }
+}
