@@ -1,0 +1,228 @@
+"""Questions that the paper leaves open: each a sweep, a figure and a finding, with its statistical error."""
+
+import math
+
+import numpy
+
+from .document import Section
+from .estimate import Estimate, bootstrap, jackknife, locking_index, near_whole, paired
+from .paper import SIZES, count_by_slip, envelope, minimum_phase
+from .results import Results, of
+
+#: Locking index from which a set is called strongly locked here.
+STRONG = 0.8
+FREQUENCIES = (29, 58, 116)
+
+
+def questions(results: Results) -> list[Section]:
+    return [
+        drag(results),
+        locking_map(results),
+        staircase(results),
+        against(results, "size", "N", "the number of blocks N", lambda value: f"{value:.0f}"),
+        against(results, "contacts", "Ns", "the number of contacts per block N_s", lambda value: f"{value:.0f}"),
+        against(results, "disorder", "dfs", "the disorder of the thresholds Δf_s/f_s", lambda value: f"{value / 1.37:.3f}"),
+        stiff_drive(results),
+        choices(results),
+    ]
+
+
+def resultant(rows) -> float:
+    """|<exp(iφ)>| of the phases."""
+    return float(abs(numpy.exp(1j * rows["phase"]).mean()))
+
+
+def index(rows) -> float:
+    """Locking index of the intervals."""
+    return locking_index(rows["periods"])
+
+
+def mean_of_sets(statistic):
+    """The mean over parameter sets of a statistic of each."""
+    return lambda rows: float(rows.groupby("set_id")[["periods", "phase"]].apply(statistic).mean())
+
+
+def drag(results: Results) -> Section:
+    section = Section("Drag: the period changed slowly within one run", "`sweeps/drag.toml`", "drag")
+    slips = results.slips("drag")
+    slips = slips[slips["interval"].notna()]
+    ratio = slips["interval"] / slips["T_onset"]
+    slips = slips.assign(periods=ratio, there=slips["onset"] < slips["ramp_time"])
+    slips = slips[slips["onset"] < 2 * slips["ramp_time"]]
+    share = jackknife(slips, lambda rows: near_whole(rows["periods"]))
+    section.check(
+        "T changed during a run drags τ with it (page 3)",
+        "more than 0.5 of the intervals within 0.1 T of nT, while T changes",
+        share.text(),
+        share.low > 0.5,
+    )
+    edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 9)
+    rows, differences = [], []
+    for low, high in zip(edges, edges[1:]):
+        bin = slips[(slips["T_onset"] >= low) & (slips["T_onset"] <= high)]
+        there, back = bin[bin["there"]], bin[~bin["there"]]
+        difference = paired(there, back, lambda rows: rows["n"].mean())
+        differences.append(difference)
+        rows.append(
+            [
+                f"{1e3 * low:.1f} to {1e3 * high:.1f}",
+                *(f"{1e3 * part['interval'].median():.1f}" for part in (there, back)),
+                *(f"{part['n'].mean():.2f}" for part in (there, back)),
+                difference.text(2),
+            ]
+        )
+    section.table = (
+        ["T (ms)", "median τ (ms), there", "back", "mean n, there", "back", "difference, paired by seed"],
+        rows,
+    )
+    distinct = sum(difference.low > 0 or difference.high < 0 for difference in differences)
+    section.remarks.append(
+        f"Hysteresis: n differs between the way there and the way back, beyond its 95 % interval, in {distinct} of {len(differences)} bins of T."
+    )
+    return section
+
+
+def locking_map(results: Results) -> Section:
+    section = Section("Arnold tongues: locking over period and amplitude", "`sweeps/locking-map.toml`", "locking-map")
+    slips = results.slips("locking-map")
+    slips = slips[slips["interval"].notna()]
+    single = slips.groupby("set_id").agg(eta=("eta", "first"), Delta=("Delta", "first"), T=("T", "first"))
+    single["index"] = slips.groupby("set_id")["periods"].apply(locking_index)
+    edges = [0, 0.5, 1, 1.5, 2, 3, 5, 10, 20]
+    rows = []
+    for low, high in zip(edges, edges[1:]):
+        bin = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
+        if bin.empty:
+            continue
+        sets = single[(single["eta"] >= low) & (single["eta"] < high)]
+        mean = bootstrap(bin.assign(index=bin["set_id"].map(single["index"])), lambda rows: rows.groupby("set_id")["index"].first().mean(), "set_id")
+        rows.append([f"{low:g} to {high:g}", len(sets), mean.text(), f"{(sets['index'] > STRONG).mean():.2f}"])
+    section.table = (["η", "sets", "mean locking index", f"share of sets above {STRONG}"], rows)
+    free = numpy.sqrt(math.pi / 4 / (slips.groupby("set_id").size().mean()))
+    section.remarks.append(
+        f"{len(single)} parameter sets, {len(slips)} intervals. A set without any locking has an index of {free:.2f} on average, as it has {slips.groupby('set_id').size().mean():.0f} intervals."
+    )
+    # How well a tongue locks depends on where τ without modulation lies between two multiples of T.
+    strong = single[(single["eta"] > 1) & (single["eta"] < 3)]
+    natural = of(results.slips("fig2"), Delta=0.0, dfs=6.9e-3)["interval"].mean()
+    beyond = (natural / strong["T"]) % 1
+    ends = [0, 0.25, 0.5, 0.75, 1]
+    means = [strong["index"][(beyond >= low) & (beyond < high)].agg(["mean", "sem"]) for low, high in zip(ends, ends[1:])]
+    section.remarks.append(
+        f"For η from 1 to 3 the index depends on where the interval without modulation, τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn it is "
+        + ", ".join(f"{mean['mean']:.2f} ± {1.96 * mean['sem']:.2f}" for mean in means)
+        + "."
+    )
+    return section
+
+
+def staircase(results: Results) -> Section:
+    section = Section("Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase")
+    slips = results.slips("staircase")
+    slips = slips[slips["interval"].notna()]
+    rows = []
+    for amplitude in sorted(set(slips["Delta"])):
+        mine = of(slips, Delta=amplitude)
+        steps = mine.groupby("T")["periods"].median()
+        on_step = (steps - steps.round()).abs() < 0.05
+        whole = {n: steps.index[on_step & (steps.round() == n)] for n in range(1, 7)}
+        widths = [f"{1e3 * found.min():.0f} to {1e3 * found.max():.0f}" if len(found) else "none" for found in whole.values()]
+        share = bootstrap(mine, near_step, "seed")
+        rows.append([f"{1e6 * amplitude:.1f}", share.text(2), *widths])
+    section.table = (
+        ["Δ (µm)", "share of the periods T whose median τ is within 0.05 T of nT", *(f"n = {n}: T (ms)" for n in range(1, 7))],
+        rows,
+    )
+    return section
+
+
+def near_step(rows) -> float:
+    """Share of the periods T at which the median of τ lies within 0.05 T of a whole number of periods."""
+    steps = rows.groupby("T")["periods"].median()
+    return float(((steps - steps.round()).abs() < 0.05).mean())
+
+
+def against(results: Results, sweep: str, key: str, what: str, shown) -> Section:
+    section = Section(f"Locking against {what}", f"`sweeps/{sweep}.toml`, Δ = 1 µm", sweep)
+    slips = results.slips(sweep)
+    rows, weakest = [], {}
+    for value in sorted(set(slips[key])):
+        mine = slips[slips[key] == value]
+        still = mine[mine["Delta"] == 0]
+        tau = jackknife(still, lambda rows: 1e3 * rows["interval"].mean())
+        spread = jackknife(still, lambda rows: rows["interval"].std() / rows["interval"].mean())
+        lengths = [jackknife(of(mine, Delta=1e-6, frequency=frequency), resultant) for frequency in FREQUENCIES]
+        weakest[value] = min(lengths, key=lambda length: length.value)
+        rows.append([shown(value), tau.text(1), spread.text(2), *(length.text(2) for length in lengths)])
+    section.table = (
+        [what, "τ without modulation (ms)", "its s.d. over mean", *(f"resultant length of φ at {f} Hz" for f in FREQUENCIES)],
+        rows,
+    )
+    locked = [value for value, length in weakest.items() if length.low > 0.5]
+    section.remarks.append(
+        "The phases are locked at all three frequencies (resultant length above 0.5 beyond its 95 % interval) at "
+        + (", ".join(shown(value) for value in locked) if locked else "none of these values")
+        + "; elsewhere "
+        + (", ".join(f"{shown(value)} has {length.text(2)} at its weakest" for value, length in weakest.items() if value not in locked) or "nowhere not")
+        + "."
+    )
+    return section
+
+
+def stiff_drive(results: Results) -> Section:
+    section = Section("The experiment's drive: K_d = 1e9 N/m", "`sweeps/stiff-drive.toml`, K_d Δ = 20 to 100 N", "stiff-drive-phase")
+    slips = results.slips("stiff-drive")
+    slips = slips[slips["phase"].notna()]
+    above = slips[slips["eta"] > 2]
+    limits = above["eta"].map({eta: minimum_phase(eta) for eta in above["eta"].unique()})
+    under = bootstrap(above.assign(under=above["phase"] < limits - 0.15), lambda rows: rows["under"].mean(), "set_id")
+    section.check(
+        "(d) the experiment: almost no slip under the back-bone",
+        "share of slips more than 0.15 rad under φ_min below 0.02, η > 2",
+        under.text(4),
+        under.high < 0.02,
+    )
+    section.check(*envelope(above))
+    rows = []
+    for low, high in ((0, 0.7), (1, 2), (2, 5), (5, 20), (20, 100), (100, 1001)):
+        bin = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
+        length = bootstrap(bin, mean_of_sets(resultant), "set_id") if len(bin) else None
+        if length:
+            rows.append([f"{low} to {min(high, 1000)}", bin["set_id"].nunique(), length.text(2)])
+    section.table = (["η", "sets", "resultant length of φ, mean over sets"], rows)
+    return section
+
+
+def choices(results: Results) -> Section:
+    section = Section("What the model's choices change", "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`")
+    slips, jobs = results.slips("choices"), results.table("choices", "jobs")
+    for name, values in (
+        ("no modulation", {"Delta": 0.0}),
+        ("29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
+        ("58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
+    ):
+        tension, magnitude = (of(slips, break_on=rule, **values) for rule in ("tension", "magnitude"))
+        difference = paired(tension, magnitude, lambda rows: 1e3 * rows["interval"].mean())
+        pairs = tension.merge(magnitude, on=["seed", "slip"], suffixes=("", "_other"))
+        same = (pairs["interval"] == pairs["interval_other"]).mean()
+        section.remarks.append(
+            f"- `break_on = \"tension\"` instead of `\"magnitude\"`, {name}: mean τ differs by {difference.text(3)} ms, paired by seed; {100 * same:.0f} % of {len(pairs)} intervals are the same to the last bit."
+        )
+    precursors = results.table("choices", "precursors")
+    still = of(slips, Delta=0.0, break_on="magnitude")
+    precursors = precursors[precursors["job_id"].isin(still["job_id"])]
+    counts = ", ".join(f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
+    section.remarks.append(f"- `precursor_size`: precursors per slip without modulation, by the least number of breaks: {counts}.")
+    phases = results.slips("fig3")
+    phases = phases[phases["eta"] > 1.014]
+    past = phases["phase"] - numpy.arcsin(1 / phases["eta"])
+    section.remarks.append(
+        f"- Window of the phase: {100 * (past > 0).mean():.2f} % of the slips of `fig3` at η > 1.014 lie past Φ_max, by at most {past.max():.3f} rad; the window reaches 0.5 rad past it."
+    )
+    section.remarks.append(startup(results))
+    return section
+
+
+def startup(results: Results) -> str:
+    table = results.reduced("startup", "startup")
+    return f"- Start-up: {len(table)} rows."

@@ -1,0 +1,68 @@
+"""Estimates with 95 % intervals. Jobs of different seeds are independent, slips within a job are not: so seeds are what is
+left out (jackknife) or drawn again (bootstrap)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy
+import pandas
+from scipy import stats
+
+LEVEL = 0.95
+ROUNDS = 1000
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and the ends of its 95 % interval; a half-width of zero where nothing was sampled."""
+
+    value: float
+    low: float
+    high: float
+
+    def text(self, digits: int = 3, factor: float = 1.0) -> str:
+        """Value and interval with `digits` decimals, in units of 1/`factor`."""
+        value, low, high = (f"{factor * x:.{digits}f}".replace("-", "−") for x in (self.value, self.low, self.high))
+        return value if low == high else f"{value} ({low} to {high})"
+
+
+def jackknife(frame: pandas.DataFrame, of: Callable[[pandas.DataFrame], float], unit: str = "seed") -> Estimate:
+    """A smooth statistic of all rows, with Student's t over estimates that leave out one `unit` each (Efron 1982)."""
+    units = frame[unit].unique()
+    value, count = of(frame), len(units)
+    left_out = numpy.array([of(frame[frame[unit] != one]) for one in units])
+    error = numpy.sqrt((count - 1) / count * ((left_out - left_out.mean()) ** 2).sum())
+    reach = stats.t.ppf(0.5 + LEVEL / 2, count - 1) * error
+    return Estimate(value, value - reach, value + reach)
+
+
+def bootstrap(frame: pandas.DataFrame, of: Callable[[pandas.DataFrame], float], unit: str) -> Estimate:
+    """A statistic that is not smooth, such as a quantile: percentiles over units drawn with replacement."""
+    groups = [group for _, group in frame.groupby(unit)]
+    generator = numpy.random.default_rng(2011)
+    draws = [
+        of(pandas.concat([groups[index] for index in generator.integers(len(groups), size=len(groups))]))
+        for _ in range(ROUNDS)
+    ]
+    low, high = numpy.nanquantile(draws, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
+    return Estimate(of(frame), low, high)
+
+
+def paired(left: pandas.DataFrame, right: pandas.DataFrame, of: Callable[[pandas.DataFrame], float]) -> Estimate:
+    """The difference left - right of a statistic of single seeds, with Student's t over the seeds that both have."""
+    both = sorted(set(left["seed"]) & set(right["seed"]))
+    differences = [of(left[left["seed"] == seed]) - of(right[right["seed"] == seed]) for seed in both]
+    mean, error = numpy.mean(differences), stats.sem(differences)
+    reach = stats.t.ppf(0.5 + LEVEL / 2, len(both) - 1) * error
+    return Estimate(mean, mean - reach, mean + reach)
+
+
+def locking_index(periods: pandas.Series) -> float:
+    """|<exp(2πi τ/T)>| of intervals in periods: 1 if all are whole numbers."""
+    return float(abs(numpy.exp(2j * numpy.pi * periods.dropna()).mean()))
+
+
+def near_whole(periods: pandas.Series) -> float:
+    """Share of intervals within a tenth of a period of a whole number; 0.2 if they come anyhow."""
+    periods = periods.dropna()
+    return float(((periods - periods.round()).abs() < 0.1).mean())
