@@ -5,7 +5,7 @@ import math
 import numpy
 
 from .document import Section
-from .estimate import Estimate, bootstrap, jackknife, locking_index, near_whole, paired
+from .estimate import jackknife, locking_index, mean, near_whole, paired, share
 from .paper import SIZES, count_by_slip, envelope, minimum_phase
 from .results import Results, of
 
@@ -27,19 +27,14 @@ def questions(results: Results) -> list[Section]:
     ]
 
 
-def resultant(rows) -> float:
-    """|<exp(iφ)>| of the phases."""
-    return float(abs(numpy.exp(1j * rows["phase"]).mean()))
+def length_of(phases) -> float:
+    """Resultant length |<exp(iφ)>|."""
+    return float(abs(numpy.exp(1j * phases).mean()))
 
 
-def index(rows) -> float:
-    """Locking index of the intervals."""
-    return locking_index(rows["periods"])
-
-
-def mean_of_sets(statistic):
-    """The mean over parameter sets of a statistic of each."""
-    return lambda rows: float(rows.groupby("set_id")[["periods", "phase"]].apply(statistic).mean())
+def by_set(slips, column, statistic):
+    """A statistic of a column for each parameter set."""
+    return slips.groupby("set_id")[column].apply(statistic)
 
 
 def drag(results: Results) -> Section:
@@ -49,12 +44,12 @@ def drag(results: Results) -> Section:
     ratio = slips["interval"] / slips["T_onset"]
     slips = slips.assign(periods=ratio, there=slips["onset"] < slips["ramp_time"])
     slips = slips[slips["onset"] < 2 * slips["ramp_time"]]
-    share = jackknife(slips, lambda rows: near_whole(rows["periods"]))
+    near = share(near_whole(slips["periods"]), slips["seed"])
     section.check(
         "T changed during a run drags τ with it (page 3)",
         "more than 0.5 of the intervals within 0.1 T of nT, while T changes",
-        share.text(),
-        share.low > 0.5,
+        near.text(),
+        near.low > 0.5,
     )
     edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 9)
     rows, differences = [], []
@@ -87,16 +82,14 @@ def locking_map(results: Results) -> Section:
     slips = results.slips("locking-map")
     slips = slips[slips["interval"].notna()]
     single = slips.groupby("set_id").agg(eta=("eta", "first"), Delta=("Delta", "first"), T=("T", "first"))
-    single["index"] = slips.groupby("set_id")["periods"].apply(locking_index)
+    single["index"] = by_set(slips, "periods", locking_index)
     edges = [0, 0.5, 1, 1.5, 2, 3, 5, 10, 20]
     rows = []
     for low, high in zip(edges, edges[1:]):
-        bin = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
-        if bin.empty:
-            continue
         sets = single[(single["eta"] >= low) & (single["eta"] < high)]
-        mean = bootstrap(bin.assign(index=bin["set_id"].map(single["index"])), lambda rows: rows.groupby("set_id")["index"].first().mean(), "set_id")
-        rows.append([f"{low:g} to {high:g}", len(sets), mean.text(), f"{(sets['index'] > STRONG).mean():.2f}"])
+        if len(sets) < 2:
+            continue
+        rows.append([f"{low:g} to {high:g}", len(sets), mean(sets["index"]).text(), f"{(sets['index'] > STRONG).mean():.2f}"])
     section.table = (["η", "sets", "mean locking index", f"share of sets above {STRONG}"], rows)
     free = numpy.sqrt(math.pi / 4 / (slips.groupby("set_id").size().mean()))
     section.remarks.append(
@@ -107,10 +100,10 @@ def locking_map(results: Results) -> Section:
     natural = of(results.slips("fig2"), Delta=0.0, dfs=6.9e-3)["interval"].mean()
     beyond = (natural / strong["T"]) % 1
     ends = [0, 0.25, 0.5, 0.75, 1]
-    means = [strong["index"][(beyond >= low) & (beyond < high)].agg(["mean", "sem"]) for low, high in zip(ends, ends[1:])]
+    means = [mean(strong["index"][(beyond >= low) & (beyond < high)]) for low, high in zip(ends, ends[1:])]
     section.remarks.append(
         f"For η from 1 to 3 the index depends on where the interval without modulation, τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn it is "
-        + ", ".join(f"{mean['mean']:.2f} ± {1.96 * mean['sem']:.2f}" for mean in means)
+        + ", ".join(one.text(2) for one in means)
         + "."
     )
     return section
@@ -127,8 +120,7 @@ def staircase(results: Results) -> Section:
         on_step = (steps - steps.round()).abs() < 0.05
         whole = {n: steps.index[on_step & (steps.round() == n)] for n in range(1, 7)}
         widths = [f"{1e3 * found.min():.0f} to {1e3 * found.max():.0f}" if len(found) else "none" for found in whole.values()]
-        share = bootstrap(mine, near_step, "seed")
-        rows.append([f"{1e6 * amplitude:.1f}", share.text(2), *widths])
+        rows.append([f"{1e6 * amplitude:.1f}", jackknife(mine, near_step).text(2), *widths])
     section.table = (
         ["Δ (µm)", "share of the periods T whose median τ is within 0.05 T of nT", *(f"n = {n}: T (ms)" for n in range(1, 7))],
         rows,
@@ -151,7 +143,7 @@ def against(results: Results, sweep: str, key: str, what: str, shown) -> Section
         still = mine[mine["Delta"] == 0]
         tau = jackknife(still, lambda rows: 1e3 * rows["interval"].mean())
         spread = jackknife(still, lambda rows: rows["interval"].std() / rows["interval"].mean())
-        lengths = [jackknife(of(mine, Delta=1e-6, frequency=frequency), resultant) for frequency in FREQUENCIES]
+        lengths = [jackknife(of(mine, Delta=1e-6, frequency=frequency), lambda rows: length_of(rows["phase"])) for frequency in FREQUENCIES]
         weakest[value] = min(lengths, key=lambda length: length.value)
         rows.append([shown(value), tau.text(1), spread.text(2), *(length.text(2) for length in lengths)])
     section.table = (
@@ -175,7 +167,7 @@ def stiff_drive(results: Results) -> Section:
     slips = slips[slips["phase"].notna()]
     above = slips[slips["eta"] > 2]
     limits = above["eta"].map({eta: minimum_phase(eta) for eta in above["eta"].unique()})
-    under = bootstrap(above.assign(under=above["phase"] < limits - 0.15), lambda rows: rows["under"].mean(), "set_id")
+    under = share(above["phase"] < limits - 0.15, above["set_id"])
     section.check(
         "(d) the experiment: almost no slip under the back-bone",
         "share of slips more than 0.15 rad under φ_min below 0.02, η > 2",
@@ -186,9 +178,9 @@ def stiff_drive(results: Results) -> Section:
     rows = []
     for low, high in ((0, 0.7), (1, 2), (2, 5), (5, 20), (20, 100), (100, 1001)):
         bin = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
-        length = bootstrap(bin, mean_of_sets(resultant), "set_id") if len(bin) else None
-        if length:
-            rows.append([f"{low} to {min(high, 1000)}", bin["set_id"].nunique(), length.text(2)])
+        if not bin.empty:
+            lengths = by_set(bin, "phase", length_of)
+            rows.append([f"{low} to {min(high, 1000)}", len(lengths), mean(lengths).text(2)])
     section.table = (["η", "sets", "resultant length of φ, mean over sets"], rows)
     return section
 
@@ -200,6 +192,7 @@ def choices(results: Results) -> Section:
         ("no modulation", {"Delta": 0.0}),
         ("29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
         ("58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
+        ("Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
     ):
         tension, magnitude = (of(slips, break_on=rule, **values) for rule in ("tension", "magnitude"))
         difference = paired(tension, magnitude, lambda rows: 1e3 * rows["interval"].mean())

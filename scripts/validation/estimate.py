@@ -9,7 +9,7 @@ import pandas
 from scipy import stats
 
 LEVEL = 0.95
-ROUNDS = 1000
+ROUNDS = 400
 
 
 @dataclass(frozen=True)
@@ -29,19 +29,37 @@ class Estimate:
 def jackknife(frame: pandas.DataFrame, of: Callable[[pandas.DataFrame], float], unit: str = "seed") -> Estimate:
     """A smooth statistic of all rows, with Student's t over estimates that leave out one `unit` each (Efron 1982)."""
     units = frame[unit].unique()
-    value, count = of(frame), len(units)
-    left_out = numpy.array([of(frame[frame[unit] != one]) for one in units])
+    return _spread(of(frame), numpy.array([of(frame[frame[unit] != one]) for one in units]))
+
+
+def _spread(value: float, left_out: numpy.ndarray) -> Estimate:
+    count = len(left_out)
     error = numpy.sqrt((count - 1) / count * ((left_out - left_out.mean()) ** 2).sum())
     reach = stats.t.ppf(0.5 + LEVEL / 2, count - 1) * error
     return Estimate(value, value - reach, value + reach)
 
 
+def share(flags: pandas.Series, units: pandas.Series) -> Estimate:
+    """The share of rows with a flag: the jackknife over units, in closed form."""
+    sums = flags.astype(float).groupby(units.to_numpy()).agg(["sum", "size"])
+    whole = sums.sum()
+    left_out = (whole["sum"] - sums["sum"]) / (whole["size"] - sums["size"])
+    return _spread(whole["sum"] / whole["size"], left_out.to_numpy())
+
+
+def mean(values: pandas.Series) -> Estimate:
+    """The mean of independent values."""
+    values = values.dropna()
+    reach = stats.t.ppf(0.5 + LEVEL / 2, len(values) - 1) * stats.sem(values)
+    return Estimate(values.mean(), values.mean() - reach, values.mean() + reach)
+
+
 def bootstrap(frame: pandas.DataFrame, of: Callable[[pandas.DataFrame], float], unit: str) -> Estimate:
     """A statistic that is not smooth, such as a quantile: percentiles over units drawn with replacement."""
-    groups = [group for _, group in frame.groupby(unit)]
+    places = list(frame.groupby(unit).indices.values())
     generator = numpy.random.default_rng(2011)
     draws = [
-        of(pandas.concat([groups[index] for index in generator.integers(len(groups), size=len(groups))]))
+        of(frame.take(numpy.concatenate([places[one] for one in generator.integers(len(places), size=len(places))])))
         for _ in range(ROUNDS)
     ]
     low, high = numpy.nanquantile(draws, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
@@ -52,9 +70,7 @@ def paired(left: pandas.DataFrame, right: pandas.DataFrame, of: Callable[[pandas
     """The difference left - right of a statistic of single seeds, with Student's t over the seeds that both have."""
     both = sorted(set(left["seed"]) & set(right["seed"]))
     differences = [of(left[left["seed"] == seed]) - of(right[right["seed"] == seed]) for seed in both]
-    mean, error = numpy.mean(differences), stats.sem(differences)
-    reach = stats.t.ppf(0.5 + LEVEL / 2, len(both) - 1) * error
-    return Estimate(mean, mean - reach, mean + reach)
+    return mean(pandas.Series(differences))
 
 
 def locking_index(periods: pandas.Series) -> float:
@@ -62,7 +78,6 @@ def locking_index(periods: pandas.Series) -> float:
     return float(abs(numpy.exp(2j * numpy.pi * periods.dropna()).mean()))
 
 
-def near_whole(periods: pandas.Series) -> float:
-    """Share of intervals within a tenth of a period of a whole number; 0.2 if they come anyhow."""
-    periods = periods.dropna()
-    return float(((periods - periods.round()).abs() < 0.1).mean())
+def near_whole(periods: pandas.Series) -> pandas.Series:
+    """Whether intervals are within a tenth of a period of a whole number; a fifth are if they come anyhow."""
+    return (periods - periods.round()).abs() < 0.1

@@ -6,7 +6,7 @@ import numpy
 from scipy import signal, stats
 
 from .document import Section
-from .estimate import Estimate, bootstrap, jackknife, locking_index, near_whole, paired
+from .estimate import Estimate, bootstrap, jackknife, locking_index, near_whole, paired, share
 from .results import Results, of
 
 #: Least break counts at which precursors are counted; 20 is one block's worth.
@@ -54,11 +54,11 @@ def stick_slip(results: Results) -> Section:
     modes = peaks(slips["interval"])
     main = slips[slips["interval"] < 0.135]
     late = slips[slips["interval"] >= 0.135]
-    share = jackknife(slips, lambda rows: (rows["interval"] >= 0.135).mean())
+    later = share(slips["interval"] >= 0.135, slips["seed"])
     section.check(
         "their distribution has two peaks",
         "two modes",
-        f"modes at {', '.join(f'{mode:.3f}' for mode in modes)} s; share of the later peak {share.text()}",
+        f"modes at {', '.join(f'{mode:.3f}' for mode in modes)} s; share of the later peak {later.text()}",
         len(modes) == 2,
     )
     more = paired(late, main, lambda rows: rows["precursors"].mean())
@@ -116,11 +116,12 @@ def integer_multiples(results: Results) -> Section:
         rows = of(slips, frequency=frequency, Delta=1e-6)
         index = jackknife(rows, lambda rows: locking_index(rows["periods"]))
         chance = locking_index(still["interval"] * frequency)
-        share = jackknife(rows, lambda rows: near_whole(rows["periods"]))
+        rows = rows[rows["periods"].notna()]
+        near = share(near_whole(rows["periods"]), rows["seed"])
         section.check(
             f"τ locks at {frequency} Hz",
             "locking index > 0.7",
-            f"{index.text()}, without modulation {chance:.3f}; within 0.1 T of nT: {share.text()} (by chance 0.2)",
+            f"{index.text()}, without modulation {chance:.3f}; within 0.1 T of nT: {near.text()} (by chance 0.2)",
             index.low > 0.7,
         )
     leads = lead_times(slips, precursors)
@@ -167,8 +168,9 @@ def many_periods(results: Results) -> Section:
     section = Section("4. τ = nT over a broad range of loading", "`sweeps/fig3.toml` (Fig. 3c)", "fig3-tau-T")
     slips = results.slips("fig3").merge(results.reduced("fig3", "sets")[["set_id", "locked"]], on="set_id")
     slips = slips[(slips["eta"] >= 1) & slips["interval"].notna()]
-    whole = bootstrap(slips, lambda rows: near_whole(rows["periods"]), "set_id")
-    locked = bootstrap(slips[slips["locked"]], lambda rows: near_whole(rows["periods"]), "set_id")
+    slips = slips.assign(near=near_whole(slips["periods"]))
+    whole = share(slips["near"], slips["set_id"])
+    locked = share(slips["near"][slips["locked"]], slips["set_id"][slips["locked"]])
     section.check(
         "data fall on lines τ = nT",
         "over all sets with η > 1, more than 0.2 of the intervals within 0.1 T of nT (0.2 is chance)",
@@ -182,8 +184,8 @@ def many_periods(results: Results) -> Section:
     rows = []
     for low, high in zip(edges, edges[1:]):
         bin = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
-        share = bootstrap(bin, lambda rows: near_whole(rows["periods"]), "set_id")
-        rows.append([f"{low} to {min(high, 1000)}", bin["set_id"].nunique(), f"{bin['locked'].mean():.2f}", share.text()])
+        near = share(bin["near"], bin["set_id"])
+        rows.append([f"{low} to {min(high, 1000)}", bin["set_id"].nunique(), f"{bin['locked'].mean():.2f}", near.text()])
     section.table = (["η", "sets", "share of slips in locked sets", "within 0.1 T of nT"], rows)
     return section
 
@@ -231,7 +233,7 @@ def phase(results: Results) -> Section:
     section.table = (["η", "slips", "resultant length of φ", "η/2"], resultants)
     high = slips[slips["eta"] > 2]
     margin = high["eta"].map({eta: minimum_phase(eta) for eta in high["eta"].unique()})
-    under = bootstrap(high.assign(under=high["phase"] < margin - 0.15), lambda rows: rows["under"].mean(), "set_id")
+    under = share(high["phase"] < margin - 0.15, high["set_id"])
     touching = (high["phase"] < margin).mean()
     section.check(
         "almost no slip under the back-bone",
@@ -252,9 +254,10 @@ def envelope(slips):
     slips = slips[(slips["eta"] > 5) & (slips["eta"] < 200)]
 
     def exponent(rows):
-        quantiles = rows.groupby(rows["eta"].round(6))["phase"].quantile(0.02)
+        quantiles = rows.groupby("eta")["phase"].quantile(0.02)
         return stats.linregress(numpy.log(quantiles.index), numpy.log(-quantiles)).slope
 
+    slips = slips[["eta", "phase", "set_id"]].assign(eta=slips["eta"].round(6))
     fitted = bootstrap(slips, exponent, "set_id")
     etas = numpy.unique(slips["eta"])
     exact = stats.linregress(numpy.log(etas), numpy.log([-minimum_phase(eta) for eta in etas])).slope

@@ -1,0 +1,90 @@
+"""The validation against the paper: its statistics on data whose answer is known, and the document that it wrote."""
+
+import math
+import re
+import subprocess
+import sys
+
+import numpy
+import pandas
+import pytest
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT))
+
+from scripts.validation import estimate, paper  # noqa: E402
+
+
+@pytest.mark.parametrize(
+    ("eta", "phase"), [(1.1, -3.8447), (1.82, -2.6110), (3.64, -1.7732), (10, -1.0664), (100, -0.34617), (1000, -0.11116)]
+)
+def test_minimum_phase_solves_eq_2(eta, phase):
+    assert paper.minimum_phase(eta) == pytest.approx(phase, abs=1e-4)
+
+
+def test_jackknife_intervals_cover_the_truth_as_often_as_they_say():
+    """Slips that share an offset of their seed: an interval that took slips as independent would cover half as often."""
+    generator = numpy.random.default_rng(1)
+    seeds, slips, covered, rounds = 8, 30, 0, 400
+    for _ in range(rounds):
+        offsets = generator.normal(size=seeds).repeat(slips)
+        frame = pandas.DataFrame(
+            {"seed": numpy.arange(seeds).repeat(slips), "x": 5 + offsets + generator.normal(size=seeds * slips)}
+        )
+        found = estimate.jackknife(frame, lambda rows: rows["x"].mean())
+        covered += found.low < 5 < found.high
+    # 95 % within three standard errors of the share.
+    assert abs(covered / rounds - 0.95) < 3 * math.sqrt(0.95 * 0.05 / rounds)
+
+
+def test_paired_differences_leave_out_what_the_seeds_share():
+    generator = numpy.random.default_rng(2)
+    shared = generator.normal(scale=10, size=12)
+    left = pandas.DataFrame({"seed": range(12), "x": shared + 1 + generator.normal(scale=0.1, size=12)})
+    right = pandas.DataFrame({"seed": range(12), "x": shared + generator.normal(scale=0.1, size=12)})
+    found = estimate.paired(left, right, lambda rows: rows["x"].mean())
+    assert found.low < 1 < found.high
+    assert found.high - found.low < 0.5
+
+
+def test_two_peaks_are_found_where_there_are_two_and_one_where_there_is_one():
+    generator = numpy.random.default_rng(3)
+    one = pandas.Series(generator.normal(0.107, 0.006, 4000))
+    two = pandas.concat([one, pandas.Series(generator.normal(0.166, 0.006, 250))])
+    assert [round(mode, 2) for mode in paper.peaks(one)] == [0.11]
+    assert [round(mode, 2) for mode in paper.peaks(two)] == [0.11, 0.17]
+
+
+def test_the_envelope_of_phases_above_phi_min_has_its_exponent():
+    generator = numpy.random.default_rng(4)
+    etas = numpy.geomspace(2, 1000, 20).repeat(400)
+    lowest = numpy.array([paper.minimum_phase(eta) for eta in etas])
+    frame = pandas.DataFrame(
+        {"eta": etas, "phase": lowest * (1 - generator.random(etas.size)), "set_id": numpy.arange(etas.size) // 40}
+    )
+    *_, agrees = paper.envelope(frame)
+    assert agrees
+    *_, agrees = paper.envelope(frame.assign(phase=-frame["eta"] ** -0.8))
+    assert not agrees
+
+
+def test_curves_are_below_a_level_from_their_last_crossing_on():
+    assert paper.first_below([(0, 5), (1, -20), (2, 0), (3, -20)], -10) == pytest.approx(2.5)
+
+
+def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
+    command = [sys.executable, "-m", "scripts.validation", tmp_path, "--to", tmp_path / "validation.md"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "sweeps/fig2.toml" in done.stderr
+    assert not (tmp_path / "validation.md").exists()
+
+
+def test_the_document_holds_every_section_and_no_number_is_missing():
+    text = (ROOT / "docs" / "validation.md").read_text()
+    for number in range(1, 10):
+        assert f"### {number}. " in text
+    assert "## Beyond the paper" in text
+    assert not re.search(r"\bnan\b|\binf\b", text)
+    for picture in re.findall(r"\((\.\./results/[^)]+\.png)\)", text):
+        assert (ROOT / "docs" / picture).exists(), picture
