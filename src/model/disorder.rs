@@ -76,12 +76,6 @@ impl Disorder {
         }
     }
 
-    /// The delay of [`Self::draw`] alone, in s.
-    pub fn delay(&mut self, contact: usize, generation: u32) -> f64 {
-        let [_, for_delay] = self.words(contact, generation);
-        self.delay_from(for_delay)
-    }
-
     fn words(&mut self, contact: usize, generation: u32) -> [u64; 2] {
         let first = generation - generation % DRAWS_PER_REFILL;
         if self.buffered_from[contact] != first {

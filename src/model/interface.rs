@@ -4,6 +4,7 @@
 //! costs O(N). Single contacts are looked at only when the block reaches its nearest break position or a reattachment
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
+use super::disorder::Contact;
 use super::{BreakOn, Disorder, Parameters};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -73,7 +74,8 @@ pub struct Interface {
     stride: usize,
     break_on: BreakOn,
     disorder: Disorder,
-    threshold: Vec<f64>,
+    /// The life of each contact, or, while it is detached, the next.
+    life: Vec<Contact>,
     anchor: Vec<f64>,
     generation: Vec<u32>,
     /// Stiffness of each contact while attached, else 0.
@@ -104,7 +106,7 @@ impl Interface {
             stride,
             break_on: parameters.break_on,
             disorder: Disorder::new(parameters),
-            threshold: vec![0.0; slots],
+            life: vec![Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; slots],
             anchor: vec![0.0; slots],
             generation: vec![0; slots],
             attached_stiffness: vec![0.0; slots],
@@ -118,7 +120,9 @@ impl Interface {
         };
         for block in 0..blocks {
             for contact in 0..parameters.contacts_per_block {
-                interface.attach(block, contact, 0, 0.0);
+                interface.life[block * stride + contact] =
+                    interface.disorder.draw(block * parameters.contacts_per_block + contact, 0);
+                interface.attach(block * stride + contact, 0.0);
             }
             interface.gather(block);
         }
@@ -151,8 +155,7 @@ impl Interface {
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let due = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.contact / self.contacts_per_block, due.contact % self.contacts_per_block);
-        let generation = self.generation[block * self.stride + contact] + 1;
-        self.attach(block, contact, generation, displacement);
+        self.attach(block * self.stride + contact, displacement);
         self.gather(block);
         self.event(block, contact, due.time, displacement, Change::Attach)
     }
@@ -204,7 +207,7 @@ impl Interface {
 
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
         let slot = block * self.stride + contact;
-        let stiffness = self.attached_stiffness[slot];
+        let Contact { threshold, stiffness, .. } = self.life[slot];
         ContactEvent {
             time,
             block,
@@ -213,33 +216,32 @@ impl Interface {
             change,
             displacement,
             force: stiffness * (displacement - self.anchor[slot]),
-            threshold: self.threshold[slot],
+            threshold,
             stiffness,
         }
     }
 
-    fn attach(&mut self, block: usize, contact: usize, generation: u32, displacement: f64) {
-        let slot = block * self.stride + contact;
-        let drawn = self.disorder.draw(block * self.contacts_per_block + contact, generation);
-        self.threshold[slot] = drawn.threshold;
-        self.generation[slot] = generation;
-        self.attached_stiffness[slot] = drawn.stiffness;
+    fn attach(&mut self, slot: usize, displacement: f64) {
+        let Contact { stiffness, reach, .. } = self.life[slot];
+        self.attached_stiffness[slot] = stiffness;
         self.anchor[slot] = displacement;
-        self.upper[slot] = displacement + drawn.reach;
+        self.upper[slot] = displacement + reach;
         self.lower[slot] = match self.break_on {
-            BreakOn::Magnitude => displacement - drawn.reach,
+            BreakOn::Magnitude => displacement - reach,
             BreakOn::Tension => f64::NEG_INFINITY,
         };
     }
 
+    /// Ends the life of a contact and draws the next.
     fn detach(&mut self, block: usize, contact: usize, time: f64) {
         let slot = block * self.stride + contact;
         let index = block * self.contacts_per_block + contact;
         self.attached_stiffness[slot] = 0.0;
         self.upper[slot] = f64::INFINITY;
         self.lower[slot] = f64::NEG_INFINITY;
-        let delay = self.disorder.delay(index, self.generation[slot] + 1);
-        self.reattachments.push(Due { time: time + delay, contact: index });
+        self.generation[slot] += 1;
+        self.life[slot] = self.disorder.draw(index, self.generation[slot]);
+        self.reattachments.push(Due { time: time + self.life[slot].delay, contact: index });
     }
 
     /// Takes the sums and nearest break positions of a block anew, in fixed lanes.
