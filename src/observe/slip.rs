@@ -129,6 +129,13 @@ struct Active {
     impulse_at_last_break: f64,
 }
 
+impl Active {
+    /// Whether it is a slip or, with so many breaks at least, a precursor.
+    fn is_recorded(&self, precursor_size: u64) -> bool {
+        self.rupture.size >= precursor_size || self.rupture.spans_slider()
+    }
+}
+
 impl SlipObserver {
     /// An observer for one job.
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
@@ -210,9 +217,12 @@ impl SlipObserver {
     fn finish_rupture(&mut self) {
         let Some(active) = self.rupture.take() else { return };
         self.ruptures += 1;
+        if !active.is_recorded(self.precursor_size) {
+            return;
+        }
         if active.rupture.spans_slider() {
             self.record_slip(&active);
-        } else if active.rupture.size >= self.precursor_size {
+        } else {
             self.record_precursor(&active);
         }
     }
@@ -285,8 +295,11 @@ impl SlipObserver {
 
 impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
-        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other.
-        if let Some((time, force)) = segment.maximum_above(self.since_break.force) {
+        // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak since the
+        // last break counts only once its rupture ends, and if that is recorded.
+        let recordable = self.rupture.as_ref().is_some_and(|active| active.is_recorded(self.precursor_size));
+        let floor = if recordable { self.since_break.force } else { self.since_precursor.force };
+        if let Some((time, force)) = segment.maximum_above(floor) {
             let peak = Peak { time, force };
             self.since_break = peak;
             self.since_precursor.raise(peak);

@@ -6,7 +6,8 @@
 //! plain: the baseline of speed, and a witness for the other solver.
 
 use super::ledger::Audit;
-use super::segment::{ForcePath, Segment};
+use super::polynomial;
+use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
 use std::sync::atomic::Ordering;
@@ -113,8 +114,11 @@ pub(super) fn run(
         }
         let next_rate = drive.stiffness * (drive_velocity - motion.velocity[0]);
         let coefficients = hermite(force, next_force, time_step * force_rate, time_step * next_rate);
-        let (ends, scale) = ([force, next_force], time_step);
-        let path = ForcePath::Polynomial { coefficients: &coefficients, first: 0.0, scale, ends };
+        let [constant, linear, square, cube] = coefficients;
+        let integral = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
+        let ends = [ForceAt { force, integral: 0.0 }, ForceAt { force: next_force, integral }];
+        let bend = polynomial::second_derivative_bound(&coefficients);
+        let path = ForcePath::Polynomial { coefficients: &coefficients, bend, first: 0.0, scale: time_step, ends };
         observer.advance(&Segment { start, duration: time_step, path });
         (force, force_rate) = (next_force, next_rate);
         summary.end_time = time;

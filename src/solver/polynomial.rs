@@ -48,23 +48,35 @@ pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
     (even + s * odd, odd + 2.0 * s * (even_slope + s * odd_slope))
 }
 
-/// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1].
+/// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1]. Two sums side by side.
 pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
-    let (mut sum, mut of_sums, mut of_those) = (0.0, 0.0, 0.0);
-    for c in coefficients.iter().skip(2).rev() {
-        sum += c.abs();
-        of_sums += sum;
-        of_those += of_sums;
+    let mut sums = [0.0, 0.0];
+    for (p, c) in coefficients.iter().enumerate().skip(2) {
+        sums[p % 2] += (p * (p - 1)) as f64 * c.abs();
     }
-    2.0 * of_those
+    sums[0] + sums[1]
 }
 
-/// The first three coefficients in the variable s - `centre`.
+/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in [`value`],
+/// with the derivatives of both sums by s².
 pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
-    coefficients
-        .iter()
-        .rev()
-        .fold([0.0; 3], |[value, slope, bend], c| [value * centre + c, slope * centre + value, bend * centre + slope])
+    let square = centre * centre;
+    let (pairs, rest) = coefficients.as_chunks::<2>();
+    let mut sums = [rest.first().copied().unwrap_or(0.0), 0.0];
+    let (mut slopes, mut bends) = ([0.0; 2], [0.0; 2]);
+    for pair in pairs.iter().rev() {
+        for i in 0..2 {
+            bends[i] = bends[i] * square + slopes[i];
+            slopes[i] = slopes[i] * square + sums[i];
+            sums[i] = sums[i] * square + pair[i];
+        }
+    }
+    let along = |of: [f64; 2]| of[0] + centre * of[1];
+    [
+        along(sums),
+        sums[1] + 2.0 * centre * along(slopes),
+        slopes[0] + 3.0 * centre * slopes[1] + 4.0 * square * along(bends),
+    ]
 }
 
 /// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value and to
@@ -78,18 +90,20 @@ pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
     (strays, slope_varies + strays)
 }
 
-/// `Σ c_p s^(p+1)/(p+1)`, the integral from 0 to s.
-pub(crate) fn integral(coefficients: &[f64], s: f64) -> f64 {
+/// `Σ c_p s^p`, and its integral from 0 to s, `Σ c_p s^(p+1)/(p+1)`.
+pub(crate) fn value_and_integral(coefficients: &[f64], s: f64) -> (f64, f64) {
     let square = s * s;
-    let mut sums = [0.0, 0.0];
-    let pairs = coefficients.chunks_exact(2).zip(INVERSE[1..].chunks_exact(2));
-    if let [last] = coefficients.chunks_exact(2).remainder() {
-        sums[0] = last / coefficients.len() as f64;
+    let (pairs, rest) = coefficients.as_chunks::<2>();
+    let last = rest.first().copied().unwrap_or(0.0);
+    let mut sums = [last, 0.0];
+    let mut integrals = [last * INVERSE[coefficients.len()], 0.0];
+    for (pair, inverse) in pairs.iter().zip(INVERSE[1..].as_chunks::<2>().0).rev() {
+        for i in 0..2 {
+            sums[i] = sums[i] * square + pair[i];
+            integrals[i] = integrals[i] * square + pair[i] * inverse[i];
+        }
     }
-    for (pair, inverse) in pairs.rev() {
-        sums = [sums[0] * square + pair[0] * inverse[0], sums[1] * square + pair[1] * inverse[1]];
-    }
-    s * (sums[0] + s * sums[1])
+    (sums[0] + s * sums[1], s * (integrals[0] + s * integrals[1]))
 }
 
 /// Where the polynomial is largest on [`first`, `last`], and its value there.
@@ -161,6 +175,33 @@ fn root_between(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
         let (value, slope) = value_and_slope(coefficients, s);
         (sign * value, sign * slope)
     }))
+}
+
+/// A step of third order below this part of its argument leaves an error of the order of its cube: rounding, unless the slope
+/// vanishes within a thousandth.
+const CUBIC: f64 = 1e-7;
+
+/// Root of a polynomial that rises through zero once between `low` and `high`, sought from `first`: Halley's steps, else as
+/// [`safeguarded_newton`].
+pub(crate) fn safeguarded_halley(coefficients: &[f64], mut low: f64, mut high: f64, first: f64) -> f64 {
+    let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
+    loop {
+        let [height, slope, bend] = expanded(coefficients, s);
+        if height >= 0.0 {
+            high = s;
+        } else {
+            low = s;
+        }
+        let halley = s - height * slope / (slope * slope - height * bend);
+        if (low..=high).contains(&halley) && (halley - s).abs() <= CUBIC * high.abs().max(low.abs()) {
+            return halley;
+        }
+        let next = if halley > low && halley < high { halley } else { 0.5 * (low + high) };
+        if next <= low || next >= high {
+            return next;
+        }
+        s = next;
+    }
 }
 
 /// Root of a function that rises through zero once between `low` and `high`: Newton's steps, bisection where they leave

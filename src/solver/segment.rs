@@ -10,12 +10,14 @@ pub enum ForcePath<'a> {
     Polynomial {
         /// Coefficients c_p, in N.
         coefficients: &'a [f64],
+        /// Bound on the second derivative by s over [0, 1], in N.
+        bend: f64,
         /// Where the segment starts.
         first: f64,
         /// Time that s = 1 stands for, in s.
         scale: f64,
-        /// The shear force at both ends of the segment, in N.
-        ends: [f64; 2],
+        /// The shear force at both ends of the segment.
+        ends: [ForceAt; 2],
     },
     /// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ since the start.
     Harmonic {
@@ -32,6 +34,23 @@ pub enum ForcePath<'a> {
     },
 }
 
+/// A polynomial shear force at some s.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceAt {
+    /// F_S, in N.
+    pub force: f64,
+    /// Its integral by s from 0 to here, in N.
+    pub integral: f64,
+}
+
+impl ForceAt {
+    /// At s of the polynomial with these coefficients, in N.
+    pub(super) fn new(coefficients: &[f64], s: f64) -> Self {
+        let (force, integral) = polynomial::value_and_integral(coefficients, s);
+        Self { force, integral }
+    }
+}
+
 /// A stretch of time without a contact event.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<'a> {
@@ -46,8 +65,9 @@ pub struct Segment<'a> {
 impl<'a> Segment<'a> {
     /// A segment along a polynomial from s = 0, with s = 1 after `duration` s.
     pub fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
-        let ends = [0.0, 1.0].map(|s| polynomial::value(coefficients, s));
-        Self { start, duration, path: ForcePath::Polynomial { coefficients, first: 0.0, scale: duration, ends } }
+        let ends = [0.0, 1.0].map(|s| ForceAt::new(coefficients, s));
+        let bend = polynomial::second_derivative_bound(coefficients);
+        Self { start, duration, path: ForcePath::Polynomial { coefficients, bend, first: 0.0, scale: duration, ends } }
     }
 }
 
@@ -55,7 +75,7 @@ impl Segment<'_> {
     /// F_S at its end, in N.
     pub fn end_force(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial { ends: [_, end], .. } => end,
+            ForcePath::Polynomial { ends: [_, end], .. } => end.force,
             ForcePath::Harmonic { .. } => self.force_after(self.duration),
         }
     }
@@ -97,10 +117,7 @@ impl Segment<'_> {
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
-            ForcePath::Polynomial { coefficients, first, scale, .. } => {
-                let until = |s: f64| if s > 0.0 { polynomial::integral(coefficients, s) } else { 0.0 };
-                scale * (until(first + self.duration / scale) - until(first))
-            }
+            ForcePath::Polynomial { scale, ends: [start, end], .. } => scale * (end.integral - start.integral),
             ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
                 let ramp = self.duration * (start + 0.5 * rate * self.duration);
                 if amplitude == 0.0 {
@@ -116,18 +133,19 @@ impl Segment<'_> {
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial { coefficients, first, scale, ends } => {
-                let [at_first, at_last] = ends.map(|force| sign * force);
-                let last = first + self.duration / scale;
+            ForcePath::Polynomial { coefficients, bend, first, scale, ends } => {
+                let [at_first, at_last] = ends.map(|at| sign * at.force);
+                let width = self.duration / scale;
+                let last = first + width;
                 let (s, extreme) = if at_last > at_first { (last, at_last) } else { (first, at_first) };
                 // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
-                let (bend, width) = (polynomial::second_derivative_bound(coefficients), last - first);
                 if extreme + 0.125 * bend * width * width <= floor {
                     return None;
                 }
-                let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                let slope = coefficients.get(1).map_or(0.0, |c| c.abs());
-                let is_monotone = slope >= slope_varies || (at_last - at_first).abs() >= bend * width * width;
+                let is_monotone = (at_last - at_first).abs() >= bend * width * width || {
+                    let (_, slope_varies) = polynomial::beyond_linear(coefficients);
+                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_varies
+                };
                 let (s, extreme) = if is_monotone {
                     (s, extreme)
                 } else {

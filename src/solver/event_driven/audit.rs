@@ -6,8 +6,7 @@ use super::leap::{DriveNow, Driving};
 use super::taylor::{Chain, Series, State};
 use crate::model::Interface;
 use crate::solver::ledger::{Audit, work};
-use crate::solver::polynomial;
-use crate::solver::segment::{ForcePath, Segment};
+use crate::solver::segment::{ForceAt, ForcePath, Segment};
 
 impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
@@ -107,9 +106,10 @@ impl Run<'_> {
                 audit.follow_series(self.kernels, &self.chain, &self.series, [0.0, s], length);
                 let path = ForcePath::Polynomial {
                     coefficients: &self.force,
+                    bend: self.force_bend,
                     first: 0.0,
                     scale: length,
-                    ends: [0.0, s].map(|s| polynomial::value(&self.force, s)),
+                    ends: [0.0, s].map(|s| ForceAt::new(&self.force, s)),
                 };
                 let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
                 audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);

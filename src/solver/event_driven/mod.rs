@@ -98,6 +98,8 @@ struct Run<'a> {
     /// Coefficients of F_S over the step, in N, and room for those of a block.
     force: Vec<f64>,
     coefficients: Vec<f64>,
+    /// Bound on the second derivative of F_S by s, in N.
+    force_bend: f64,
     /// Order from which on terms are checked, by the number of halvings.
     least_orders: [usize; MOST_HALVINGS + 1],
     /// Largest error left in one step and by one leap, in m.
@@ -145,6 +147,7 @@ impl<'a> Run<'a> {
             attach_window: 0.0,
             force: Vec::new(),
             coefficients: Vec::new(),
+            force_bend: 0.0,
             least_orders: [0; MOST_HALVINGS + 1],
             truncation: truncation_share(parameters, longest_step) * tolerance * parameters.contact_reach(),
             left_out: tolerance * parameters.contact_reach(),

@@ -18,7 +18,7 @@ use super::taylor::{DriveTerms, StepInput};
 use super::{FRAME_SPAN, LONGEST_STEP, MOST_HALVINGS, Run};
 use crate::model::Change;
 use crate::solver::polynomial;
-use crate::solver::segment::{ForcePath, Segment};
+use crate::solver::segment::{ForceAt, ForcePath, Segment};
 use crate::solver::{Observer, SimulationError};
 
 /// Halvings at which a series that does not converge ends the run.
@@ -47,7 +47,7 @@ impl Run<'_> {
         self.summary.steps += 1;
         let start = self.time;
         let (mut done, mut end, mut merged) = (0.0, (horizon / length).min(1.0), 0);
-        let mut force = self.force[0];
+        let mut force = ForceAt { force: self.force[0], integral: 0.0 };
         self.kernels.reachable(&self.chain, &mut self.series, &mut self.candidates);
         self.breaks.clear();
         while let Some((row, lane)) = self.candidates.pop() {
@@ -70,7 +70,7 @@ impl Run<'_> {
             if change == Change::Attach {
                 self.time = self.interface.next_reattachment();
             }
-            let window = self.change(change, block, s, force, length, observer);
+            let window = self.change(change, block, s, force.force, length, observer);
             match change {
                 Change::Break => self.break_window = window * length,
                 Change::Attach => self.attach_window = window * length,
@@ -83,32 +83,36 @@ impl Run<'_> {
             while let Some(block) = self.amended.pop() {
                 self.breaks.retain(|&(_, other)| other != block);
                 self.look_for_break(block, s, end);
+                if block == 0 {
+                    // The same force from here on, as another polynomial.
+                    force.integral = ForceAt::new(&self.force, s).integral;
+                }
             }
         }
         self.kernels.evaluate(&self.series, done, length, &mut self.state);
         self.set_time(self.time);
-        self.passed_force = self.passed_force.max(force);
+        self.passed_force = self.passed_force.max(force.force);
         let covered = if done == 1.0 { 2.0 * length } else { done * length };
         self.typical_advance += 0.25 * (covered - self.typical_advance);
         Ok(())
     }
 
-    /// Tells the observer, and the ledger if there is one, of a part of the step; `force` N is the shear force at its start.
+    /// Tells the observer, and the ledger if there is one, of a part of the step; `force` is the shear force at its start.
     /// Returns that at its end.
     fn tell(
         &mut self,
         start: f64,
         [first, last]: [f64; 2],
-        force: f64,
+        force: ForceAt,
         length: f64,
         observer: &mut dyn Observer,
-    ) -> f64 {
-        let end_force = polynomial::value(&self.force, last);
-        let (coefficients, scale, ends) = (&self.force[..], length, [force, end_force]);
+    ) -> ForceAt {
+        let end_force = ForceAt::new(&self.force, last);
+        let (coefficients, bend, scale, ends) = (&self.force[..], self.force_bend, length, [force, end_force]);
         observer.advance(&Segment {
             start: self.epoch + (start + first * length),
             duration: (last - first) * length,
-            path: ForcePath::Polynomial { coefficients, first, scale, ends },
+            path: ForcePath::Polynomial { coefficients, bend, first, scale, ends },
         });
         if let Some(audit) = &mut self.audit {
             audit.follow_series(self.kernels, &self.chain, &self.series, [first, last], length);
@@ -203,6 +207,7 @@ impl Run<'_> {
             for (force, coefficient) in self.force.iter_mut().zip(coefficients) {
                 *force -= self.drive.stiffness * coefficient;
             }
+            self.force_bend = polynomial::second_derivative_bound(&self.force);
         }
     }
 
@@ -227,6 +232,7 @@ impl Run<'_> {
                     *least_order = if order <= *least_order + 1 { order - 2 } else { order };
                 }
                 self.series.shear_force(drive, self.drive.stiffness, &mut self.force);
+                self.force_bend = polynomial::second_derivative_bound(&self.force);
                 return Ok(length);
             }
             halvings += 1;
