@@ -3,7 +3,7 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
-use crate::solver::polynomial::{beyond_linear, safeguarded_newton, shifted, value, value_and_slope};
+use crate::solver::polynomial::{beyond_linear, expanded, safeguarded_halley, safeguarded_newton, shifted, value};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
@@ -32,13 +32,15 @@ pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], fro
 /// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the slope by
 /// at most `slope_varies`.
 fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> Option<f64> {
-    let here = if from > 0.0 { value(coefficients, from) } else { coefficients[0] };
+    let [here, slope, bend] =
+        if from > 0.0 { expanded(coefficients, from) } else { [coefficients[0], coefficients[1], coefficients[2]] };
     if here >= 0.0 {
         return Some(from);
     }
-    let slope = coefficients[1];
-    if slope.abs() > slope_varies {
-        return if slope > 0.0 { rising_root(coefficients, from, end, from - here / slope) } else { None };
+    if coefficients[1].abs() > slope_varies {
+        // First where the parabola crosses.
+        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * bend).max(0.0).sqrt());
+        return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
     }
     first_in(coefficients, from, end, DEEPEST)
 }
@@ -75,8 +77,7 @@ fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64
 /// The root of a polynomial that rises from below zero throughout [low, high], sought from `first`; `None` if it stays
 /// below.
 fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<f64> {
-    (value(coefficients, high) >= 0.0)
-        .then(|| safeguarded_newton(low, high, first, |s| value_and_slope(coefficients, s)))
+    (value(coefficients, high) >= 0.0).then(|| safeguarded_halley(coefficients, low, high, first))
 }
 
 /// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
