@@ -1,6 +1,7 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::glide::{Glide, advance};
+use super::leap::{DriveNow, Leap, split};
 use super::taylor::{Chain, Series, State, StepInput, evaluate, expand, reachable};
 use super::vector::Plain;
 #[cfg(target_arch = "x86_64")]
@@ -12,6 +13,7 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
+    split: unsafe fn(&Chain, &DriveNow, &mut Leap) -> Option<f64>,
     glide: unsafe fn(&Chain, f64, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
@@ -20,24 +22,30 @@ pub(super) struct Kernels {
 
 /// Compiles the loops for one set of processor features.
 macro_rules! kernels {
-    ($module:ident, $vector:ident $(, $features:literal)?) => {
+    ($module:ident, $vector:ident, $rows:literal $(, $features:literal)?) => {
         mod $module {
-            use super::{Chain, Glide, Kernels, Series, State, StepInput, advance, evaluate, expand, reachable};
+            use super::{Chain, DriveNow, Glide, Kernels, Leap, Series, State, StepInput};
+            use super::{advance, evaluate, expand, reachable, split};
             use super::$vector;
 
             $(#[target_feature(enable = $features)])?
             fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-                expand::<$vector>(chain, state, input, series)
+                expand::<$vector, $rows>(chain, state, input, series)
             }
 
             $(#[target_feature(enable = $features)])?
             fn evaluate_here(series: &Series, s: f64, length: f64, state: &mut State) {
-                evaluate::<$vector>(series, s, length, state);
+                evaluate::<$vector, $rows>(series, s, length, state);
             }
 
             $(#[target_feature(enable = $features)])?
             fn reachable_here(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
-                reachable::<$vector>(chain, series, blocks);
+                reachable::<$vector, $rows>(chain, series, blocks);
+            }
+
+            $(#[target_feature(enable = $features)])?
+            fn split_here(chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
+                split(chain, drive, leap)
             }
 
             $(#[target_feature(enable = $features)])?
@@ -49,6 +57,7 @@ macro_rules! kernels {
                 expand: expand_here,
                 evaluate: evaluate_here,
                 reachable: reachable_here,
+                split: split_here,
                 glide: glide_here,
                 name: stringify!($module),
             };
@@ -56,23 +65,35 @@ macro_rules! kernels {
     };
 }
 
-kernels!(baseline, Plain);
+kernels!(baseline, Plain, 0);
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2, Avx2, "avx2,fma");
+kernels!(avx2, Avx2, 0, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx512, Avx512, "avx512f");
+kernels!(avx512, Avx512, 0, "avx512f,fma");
+// The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2_nine_rows, Avx2, 9, "avx2,fma");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512_nine_rows, Avx512, 9, "avx512f,fma");
 
 impl Kernels {
-    /// Every path that this processor can run, the fastest last.
-    pub fn available() -> Vec<Self> {
+    /// Every path that this processor can run for so many rows, the fastest last.
+    pub fn available(rows: usize) -> Vec<Self> {
         let mut paths = vec![baseline::KERNELS];
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            let fuses = is_x86_feature_detected!("fma");
+            if fuses && is_x86_feature_detected!("avx2") {
                 paths.push(avx2::KERNELS);
+                if rows == 9 {
+                    paths.push(avx2_nine_rows::KERNELS);
+                }
             }
-            if is_x86_feature_detected!("avx512f") {
+            if fuses && is_x86_feature_detected!("avx512f") {
                 paths.push(avx512::KERNELS);
+                if rows == 9 {
+                    paths.push(avx512_nine_rows::KERNELS);
+                }
             }
         }
         paths
@@ -97,6 +118,13 @@ impl Kernels {
     pub fn reachable(self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
         // SAFETY: as above.
         unsafe { (self.reachable)(chain, series, blocks) }
+    }
+
+    /// Splits the state into driven solution and free motion; see [`split`].
+    #[inline]
+    pub fn split(self, chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
+        // SAFETY: as above.
+        unsafe { (self.split)(chain, drive, leap) }
     }
 
     /// Carries the free motion over so many seconds; see [`advance`].

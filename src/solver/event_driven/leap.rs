@@ -50,6 +50,10 @@ const LOOK_AHEAD: f64 = 10.0;
 /// Part of the displacement that may be left out that the terms of a glide may leave out each.
 const GLIDE_SHARE: f64 = 1e-3;
 
+/// Minors of S/m that are taken before they are scaled again. Products of two series of them stay finite up to squared frequencies
+/// of 1e38 1/s².
+const MINORS_PER_SCALE: usize = 4;
+
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
@@ -78,9 +82,10 @@ pub(super) struct Leap {
     decay_rate: f64,
     /// Inverse pivots of S/m, eliminated from the leading edge.
     inverse_pivot: Vec<f64>,
-    /// The same of S'/m, and pivots of S'/m eliminated from the trailing edge.
-    inverse_shifted: Vec<f64>,
-    shifted_before: Vec<f64>,
+    /// Minors of S'/m from the leading and from the trailing edge: that which a block begins, and that which begins beyond it.
+    /// A pivot is the first over the second.
+    ahead: [Vec<f64>; 2],
+    behind: [Vec<f64>; 2],
     /// Inverse complex pivots of (S - mω² + imγω)/m.
     inverse_complex: Vec<[f64; 2]>,
     /// The chain and its state: as they are at the start, the state in the end as it is after the leap.
@@ -118,8 +123,8 @@ impl Leap {
         Self {
             decay_rate: f64::INFINITY,
             inverse_pivot: zeros.clone(),
-            inverse_shifted: zeros.clone(),
-            shifted_before: zeros.clone(),
+            ahead: [zeros.clone(), zeros.clone()],
+            behind: [zeros.clone(), zeros.clone()],
             inverse_complex: vec![[0.0; 2]; blocks],
             diagonal: zeros.clone(),
             pull: zeros.clone(),
@@ -159,15 +164,11 @@ impl Leap {
         layout.unfold(&state.displacement, &mut self.displacement);
         layout.unfold(&state.velocity, &mut self.velocity);
         // Worth another try after so many e-foldings of the free motion, or after the next event.
-        if !self.find_decay(chain) {
+        let Some(largest) = kernels.split(chain, drive, self) else {
             return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
-        }
+        };
         let decay_rate = self.decay_rate;
         let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(horizon) };
-        self.solve_driven(chain, drive);
-        self.split_free_motion(drive.angular_frequency);
-        let energy = self.free_energy(chain);
-        let largest = self.bound_free_motion(chain, energy);
         let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
         let is_short = decay >= horizon;
         if is_short && decay_rate < 0.5 * chain.damping_rate {
@@ -253,6 +254,7 @@ impl Leap {
     }
 
     /// Splits off the free motion: y and w + a y of each block.
+    #[inline(always)]
     fn split_free_motion(&mut self, frequency: f64) {
         for j in 0..self.free.len() {
             let y = self.displacement[j] - self.start[j] - self.wave[j][0];
@@ -264,6 +266,7 @@ impl Leap {
     }
 
     /// Finds the decay rate, from that of the last time, and eliminates; false if there is none.
+    #[inline(always)]
     fn find_decay(&mut self, chain: &Chain) -> bool {
         let fastest = 0.5 * chain.damping_rate;
         self.decay_rate = fastest.min(4.0 * self.decay_rate);
@@ -278,35 +281,48 @@ impl Leap {
     }
 
     /// a (γ - a), by which S/m is shifted, in 1/s².
+    #[inline(always)]
     fn shift(&self, chain: &Chain) -> f64 {
         self.decay_rate * (chain.damping_rate - self.decay_rate)
     }
 
-    /// Pivots of S/m and of S'/m from both ends; false if S' is not positive definite.
+    /// Pivots of S/m and minors of S'/m from both ends; false if S' is not positive definite. A minor follows from the two before
+    /// it, u_j = d_j u_{j+1} - c² u_{j+2}, so that few blocks wait for a division.
+    #[inline(always)]
     fn eliminate(&mut self, chain: &Chain) -> bool {
         let blocks = chain.layout.blocks;
         let shift = self.shift(chain);
-        let coupling_squared = chain.coupling[0][0] * chain.coupling[0][0];
-        let (mut ahead, mut ahead_shifted, mut before_shifted) = (0.0, 0.0, 0.0);
-        let mut least = f64::INFINITY;
+        let squared = chain.coupling[0][0] * chain.coupling[0][0];
+        let diagonal = &self.diagonal[..blocks];
+        let inverse = &mut self.inverse_pivot[..blocks];
+        let [ahead, ahead_beyond] = self.ahead.each_mut().map(|minors| &mut minors[..blocks]);
+        let [behind, behind_beyond] = self.behind.each_mut().map(|minors| &mut minors[..blocks]);
+        // The last minor and the one before it: of S, of S' ahead and of S' behind.
+        let mut minors = [[1.0, 0.0]; 3];
+        let mut is_definite = true;
         for count in 0..blocks {
             let (far, near) = (blocks - 1 - count, count);
-            let diagonal = self.diagonal[far];
-            let pivot = diagonal - coupling_squared * ahead;
-            let pivot_shifted = diagonal - shift - coupling_squared * ahead_shifted;
-            let pivot_before = self.diagonal[near] - shift - coupling_squared * before_shifted;
-            least = least.min(pivot_shifted).min(pivot_before);
-            ahead = 1.0 / pivot;
-            ahead_shifted = 1.0 / pivot_shifted;
-            before_shifted = 1.0 / pivot_before;
-            self.inverse_pivot[far] = ahead;
-            self.inverse_shifted[far] = ahead_shifted;
-            self.shifted_before[near] = pivot_before;
+            let entries = [diagonal[far], diagonal[far] - shift, diagonal[near] - shift];
+            if count % MINORS_PER_SCALE == 0 {
+                for [last, before] in &mut minors {
+                    *before /= *last;
+                    *last = 1.0;
+                }
+            }
+            let [last, last_ahead, last_behind] = minors.map(|[last, _]| last);
+            for ([last, before], entry) in minors.iter_mut().zip(entries) {
+                (*last, *before) = (entry.mul_add(*last, -squared * *before), *last);
+            }
+            inverse[far] = last / minors[0][0];
+            (ahead[far], ahead_beyond[far]) = (minors[1][0], last_ahead);
+            (behind[near], behind_beyond[near]) = (minors[2][0], last_behind);
+            is_definite &= minors[1][0] > 0.0 && minors[2][0] > 0.0;
         }
-        least > 0.0
+        is_definite
     }
 
     /// p0, p1 and q of the driven solution.
+    #[inline(always)]
     fn solve_driven(&mut self, chain: &Chain, drive: &DriveNow) {
         let coupling = chain.coupling[0][0];
         let pulling = drive.stiffness / drive.mass;
@@ -321,13 +337,13 @@ impl Leap {
         let mut carried = 0.0;
         let sources = self.pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
         for ((start, inverse), own) in self.start.iter_mut().zip(&self.inverse_pivot).zip(sources).rev() {
-            carried = own * inverse + coupling * inverse * carried;
+            carried = (coupling * inverse).mul_add(carried, own * inverse);
             *start = carried;
         }
         self.start[0] += pulling * drive.ramp * self.inverse_pivot[0];
         let mut carried = self.start[0];
         for (start, inverse) in self.start.iter_mut().zip(&self.inverse_pivot).skip(1) {
-            carried = *start + coupling * inverse * carried;
+            carried = (coupling * inverse).mul_add(carried, *start);
             *start = carried;
         }
         if drive.amplitude > 0.0 {
@@ -336,6 +352,7 @@ impl Leap {
     }
 
     /// q, with the drive's phase of now in it.
+    #[inline(always)]
     fn solve_wave(&mut self, chain: &Chain, drive: &DriveNow, acceleration: f64) {
         let blocks = chain.layout.blocks;
         let coupling = chain.coupling[0][0];
@@ -359,6 +376,7 @@ impl Leap {
     }
 
     /// E/m of the free motion, in m²/s².
+    #[inline(always)]
     fn free_energy(&self, chain: &Chain) -> f64 {
         let twice_coupling = 2.0 * chain.coupling[0][0];
         let shift = self.shift(chain);
@@ -371,16 +389,20 @@ impl Leap {
     }
 
     /// Bounds |y_j| now into `residue`; returns the largest.
+    #[inline(always)]
     fn bound_free_motion(&mut self, chain: &Chain, energy: f64) -> f64 {
+        let blocks = chain.layout.blocks;
         let shift = self.shift(chain);
-        let mut largest = 0.0_f64;
-        for j in 0..chain.layout.blocks {
-            let ahead = 1.0 / self.inverse_shifted[j];
-            let compliance = 1.0 / (ahead + self.shifted_before[j] - (self.diagonal[j] - shift));
-            self.residue[j] = (2.0 * energy * compliance).sqrt();
-            largest = largest.max(self.residue[j]);
+        let [ahead, ahead_beyond] = self.ahead.each_ref().map(|minors| &minors[..blocks]);
+        let [behind, behind_beyond] = self.behind.each_ref().map(|minors| &minors[..blocks]);
+        let (diagonal, residue) = (&self.diagonal[..blocks], &mut self.residue[..blocks]);
+        for j in 0..blocks {
+            // 1/(ahead/beyond + behind/beyond - diagonal), with one division.
+            let beyond = ahead_beyond[j] * behind_beyond[j];
+            let own = ahead[j] * behind_beyond[j] + behind[j] * ahead_beyond[j] - (diagonal[j] - shift) * beyond;
+            residue[j] = (2.0 * energy * beyond / own).sqrt();
         }
-        largest
+        residue.iter().fold(0.0, |largest, residue| if *residue > largest { *residue } else { largest })
     }
 
     /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's
@@ -459,6 +481,20 @@ impl Leap {
     }
 }
 
+/// Splits the state that was unfolded into driven solution and free motion, and bounds the latter: the largest bound on a
+/// displacement, in m; `None` if it does not decay.
+#[inline(always)]
+pub(super) fn split(chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
+    if !leap.find_decay(chain) {
+        return None;
+    }
+    leap.solve_driven(chain, drive);
+    leap.split_free_motion(drive.angular_frequency);
+    let energy = leap.free_energy(chain);
+    Some(leap.bound_free_motion(chain, energy))
+}
+
+#[inline(always)]
 fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }

@@ -57,7 +57,8 @@ pub(super) fn run(
     observer: &mut dyn Observer,
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
-    let kernels = Kernels::available().pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
+    let rows = Layout::new(parameters.blocks).rows;
+    let kernels = Kernels::available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
     let run = Run::new(parameters, tolerance, limits, kernels);
     Run { audit, ..run }.finished(observer)
 }
@@ -362,7 +363,7 @@ mod tests {
             ..Parameters::default()
         };
         for parameters in [plain, modulated] {
-            let logs: Vec<(&str, Vec<ContactEvent>)> = Kernels::available()
+            let logs: Vec<(&str, Vec<ContactEvent>)> = Kernels::available(Layout::new(parameters.blocks).rows)
                 .into_iter()
                 .map(|kernels| {
                     let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };

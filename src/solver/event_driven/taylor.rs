@@ -5,7 +5,7 @@
 //! terms, times their order, fall under the wanted error. The sum of the terms' magnitudes bounds how far each block
 //! strays within the step.
 
-use super::lanes::{LANES, Layout, Row};
+use super::lanes::{Layout, Row};
 use super::vector::Vector;
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
@@ -150,6 +150,12 @@ impl Series {
         }
     }
 
+    /// Number of rows, which is `R` unless that is 0.
+    #[inline(always)]
+    fn rows_in<const R: usize>(&self) -> usize {
+        if R == 0 { self.rows } else { R }
+    }
+
     /// The coefficients Y_p/p! of one block, in m, written over what is there.
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
@@ -198,30 +204,45 @@ pub(super) struct State {
     pub velocity: Vec<Row>,
 }
 
-/// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
+/// Expands the state into a series; false if it does not converge within [`MOST_ORDER`]. Compiled for `R` rows, or for any
+/// number if that is 0; so are the loops below.
 #[inline(always)]
-pub(super) fn expand<V: Vector>(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-    let rows = series.rows;
-    let length = V::splat(input.length);
-    let square = input.length * input.length;
-    let damping = V::splat(-chain.damping_rate * input.length);
-    for r in 0..rows {
-        V::load(&chain.coupling[r]).times(V::splat(square)).store(&mut series.coupling[r]);
-        V::load(&chain.diagonal[r]).times(V::splat(-square)).store(&mut series.diagonal[r]);
-        series.terms[r] = state.displacement[r];
-        V::load(&state.velocity[r]).times(length).store(&mut series.terms[rows + r]);
+pub(super) fn expand<V: Vector, const R: usize>(
+    chain: &Chain,
+    state: &State,
+    input: &StepInput,
+    series: &mut Series,
+) -> bool {
+    let rows = series.rows_in::<R>();
+    let Series { terms, coupling, diagonal, .. } = series;
+    let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
+    let square = V::splat(input.length * input.length);
+    let minus_square = V::splat(-(input.length * input.length));
+    for (scaled, coupling) in coupling.iter_mut().zip(&chain.coupling[..rows]) {
+        V::load(coupling).times(square).store(scaled);
     }
+    for (scaled, diagonal) in diagonal.iter_mut().zip(&chain.diagonal[..rows]) {
+        V::load(diagonal).times(minus_square).store(scaled);
+    }
+    let (first, second) = terms[..2 * rows].split_at_mut(rows);
+    first.copy_from_slice(&state.displacement[..rows]);
+    let length = V::splat(input.length);
+    for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
+        V::load(velocity).times(length).store(rate);
+    }
+    let damping = V::splat(-chain.damping_rate * input.length);
+    let pulling = input.length * input.length * input.pulling;
     let mut drive = input.drive;
     for p in 0..MOST_ORDER - 1 {
-        let terms = &mut series.terms[p * rows..(p + 3) * rows];
-        sweep::<V>(&series.coupling, &series.diagonal, damping, terms);
+        let terms = &mut terms[p * rows..(p + 3) * rows];
+        sweep::<V>(coupling, diagonal, damping, terms, rows);
         let added = &mut terms[2 * rows..];
         if p == 0 {
-            for (row, pull) in added.iter_mut().zip(&chain.pull) {
-                V::load(pull).fused(V::splat(square), V::load(row)).store(row);
+            for (row, pull) in added.iter_mut().zip(&chain.pull[..rows]) {
+                V::load(pull).fused(square, V::load(row)).store(row);
             }
         }
-        let push = square * input.pulling * drive.take();
+        let push = pulling * drive.take();
         if push != 0.0 {
             V::load(&FIRST_LANE).fused(V::splat(push), V::load(&added[0])).store(&mut added[0]);
         }
@@ -241,12 +262,10 @@ pub(super) fn expand<V: Vector>(chain: &Chain, state: &State, input: &StepInput,
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
 #[inline(always)]
-fn sweep<V: Vector>(coupling: &[Row], diagonal: &[Row], damping: V, terms: &mut [Row]) {
-    let rows = terms.len() / 3;
+fn sweep<V: Vector>(coupling: &[Row], diagonal: &[Row], damping: V, terms: &mut [Row], rows: usize) {
     let (y, rest) = terms.split_at_mut(rows);
     let (rate, next) = rest.split_at_mut(rows);
-    let (coupling, diagonal) = (&coupling[..rows], &diagonal[..rows]);
-    let (rate, next) = (&rate[..rows], &mut next[..rows]);
+    let next = &mut next[..rows];
     let mut before = V::load(&y[rows - 1]).to_next_lane();
     let mut here = V::load(&y[0]);
     let last_after = here.to_lane_before();
@@ -283,26 +302,40 @@ fn largest<V: Vector>(lower: &[Row], higher: &[Row], weights: [f64; 2]) -> V {
     in_lower.times(V::splat(weights[0])).larger(in_higher.times(V::splat(weights[1])))
 }
 
-/// Rows that are taken through all orders together: their sums need not wait for each other.
-const TOGETHER: usize = 3;
+/// Rows that are taken through all orders together, since their sums need not wait for each other: many with many registers.
+const MANY: usize = 9;
+const FEW: usize = 3;
 
 /// State at s in [0, 1] of a step of so many seconds.
 #[inline(always)]
-pub(super) fn evaluate<V: Vector>(series: &Series, s: f64, length: f64, state: &mut State) {
-    let rows = series.rows;
-    let whole = rows - rows % TOGETHER;
-    for r in (0..whole).step_by(TOGETHER) {
-        evaluate_rows::<V, TOGETHER>(series, r, s, length, state);
+pub(super) fn evaluate<V: Vector, const R: usize>(series: &Series, s: f64, length: f64, state: &mut State) {
+    let rows = series.rows_in::<R>();
+    let mut r = 0;
+    while V::HAS_MANY_REGISTERS && r + MANY <= rows {
+        evaluate_rows::<V, MANY>(series, rows, r, s, length, state);
+        r += MANY;
     }
-    for r in whole..rows {
-        evaluate_rows::<V, 1>(series, r, s, length, state);
+    while r + FEW <= rows {
+        evaluate_rows::<V, FEW>(series, rows, r, s, length, state);
+        r += FEW;
+    }
+    while r < rows {
+        evaluate_rows::<V, 1>(series, rows, r, s, length, state);
+        r += 1;
     }
 }
 
 /// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
 #[inline(always)]
-fn evaluate_rows<V: Vector, const G: usize>(series: &Series, first: usize, s: f64, length: f64, state: &mut State) {
-    let (rows, order) = (series.rows, series.order);
+fn evaluate_rows<V: Vector, const G: usize>(
+    series: &Series,
+    rows: usize,
+    first: usize,
+    s: f64,
+    length: f64,
+    state: &mut State,
+) {
+    let order = series.order;
     let inverse_length = V::splat(1.0 / length);
     let mut at = order * rows + first;
     let mut value = [V::splat(0.0); G];
@@ -333,15 +366,25 @@ fn evaluate_rows<V: Vector, const G: usize>(series: &Series, first: usize, s: f6
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
-pub(super) fn reachable<V: Vector>(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
-    let rows = series.rows;
-    let whole = rows - rows % TOGETHER;
+pub(super) fn reachable<V: Vector, const R: usize>(
+    chain: &Chain,
+    series: &mut Series,
+    blocks: &mut Vec<(usize, usize)>,
+) {
+    let rows = series.rows_in::<R>();
     blocks.clear();
-    for r in (0..whole).step_by(TOGETHER) {
-        reachable_rows::<V, TOGETHER>(chain, series, r, blocks);
+    let mut r = 0;
+    while V::HAS_MANY_REGISTERS && r + MANY <= rows {
+        reachable_rows::<V, MANY>(chain, series, rows, r, blocks);
+        r += MANY;
     }
-    for r in whole..rows {
-        reachable_rows::<V, 1>(chain, series, r, blocks);
+    while r + FEW <= rows {
+        reachable_rows::<V, FEW>(chain, series, rows, r, blocks);
+        r += FEW;
+    }
+    while r < rows {
+        reachable_rows::<V, 1>(chain, series, rows, r, blocks);
+        r += 1;
     }
 }
 
@@ -349,10 +392,11 @@ pub(super) fn reachable<V: Vector>(chain: &Chain, series: &mut Series, blocks: &
 fn reachable_rows<V: Vector, const G: usize>(
     chain: &Chain,
     series: &mut Series,
+    rows: usize,
     first: usize,
     blocks: &mut Vec<(usize, usize)>,
 ) {
-    let (rows, order) = (series.rows, series.order);
+    let order = series.order;
     let mut excursion = [V::splat(0.0); G];
     let mut at = first;
     for inverse in &INVERSE_FACTORIAL[1..=order] {
@@ -368,9 +412,10 @@ fn reachable_rows<V: Vector, const G: usize>(
         let x = V::load(&series.terms[r]);
         let above = x.plus(*excursion).reaches(V::load(&chain.upper[r]));
         let below = V::load(&chain.lower[r]).reaches(x.minus(*excursion));
-        let reached = above | below;
-        if reached != 0 {
-            blocks.extend((0..LANES).filter(|lane| reached >> lane & 1 == 1).map(|lane| (r, lane)));
+        let mut reached = above | below;
+        while reached != 0 {
+            blocks.push((r, reached.trailing_zeros() as usize));
+            reached &= reached - 1;
         }
     }
 }

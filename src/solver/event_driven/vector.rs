@@ -6,6 +6,8 @@ use super::lanes::{LANES, Row};
 
 /// Eight doubles, in whatever registers a set of processor features has.
 pub(super) trait Vector: Copy {
+    /// Whether some twenty vectors fit into the registers.
+    const HAS_MANY_REGISTERS: bool = false;
     fn splat(value: f64) -> Self;
     fn load(row: &Row) -> Self;
     fn store(self, row: &mut Row);
@@ -214,6 +216,8 @@ mod x86 {
     }
 
     impl Vector for Avx512 {
+        const HAS_MANY_REGISTERS: bool = true;
+
         #[inline(always)]
         fn splat(value: f64) -> Self {
             unsafe { Self(_mm512_set1_pd(value)) }
