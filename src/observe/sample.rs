@@ -85,6 +85,7 @@ impl Observer for Trace {
     fn advance(&mut self, segment: &Segment<'_>) {
         while let Some(time) = self.sampling.within(segment) {
             let force = segment.force_after(time - segment.start);
+            self.drive.advance_to(time);
             let (driven, _) = self.drive.motion(time);
             self.rows.push(TraceRow {
                 time,
