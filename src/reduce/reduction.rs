@@ -238,7 +238,7 @@ fn gather(
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::Slip;
+    use crate::observe::{Modulation, Slip};
     use crate::solver::Summary;
     use crate::store::storage::Disk;
     use crate::store::tables::{JobLabel, JobRecord, JobResult, JobRow, SlipRow};
@@ -267,6 +267,10 @@ mod tests {
             onset: f64::from(number) * 12.0 * PERIOD,
             interval: (number > 0).then_some(12.0 * PERIOD + 1e-5 * f64::from(number % 3)),
             phase: job.parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
+            modulation: Modulation {
+                period: job.parameters.modulation_period,
+                amplitude: job.parameters.modulation_amplitude,
+            },
             peak_force: 480.0,
             drop: 100.0 + f64::from(number),
             nucleation: 0.0,
