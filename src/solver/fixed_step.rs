@@ -140,6 +140,7 @@ pub(super) fn run(
     if let Some(audit) = audit {
         motion.settle(audit, &interface, &drive, summary.end_time, coupling, mass);
     }
+    observer.end(summary.end_time, &motion.displacement);
     Ok(summary)
 }
 

@@ -90,6 +90,10 @@ impl Observer for Meter<'_> {
     fn is_satisfied(&self) -> bool {
         self.observer.is_satisfied()
     }
+
+    fn end(&mut self, time: f64, displacement: &[f64]) {
+        self.observer.end(time, displacement);
+    }
 }
 
 /// Runs a solver with an audit and draws up the ledger.

@@ -175,7 +175,7 @@ impl<'a> Run<'a> {
         while !observer.is_satisfied() {
             let until_end = self.limits.end_time - self.epoch - self.time;
             if until_end <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
-                return Ok(self.summary(false));
+                return Ok(self.ended(false, observer));
             }
             let mut until_turn = self.drive.cycle_end - self.epoch - self.time;
             if until_turn <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
@@ -207,11 +207,15 @@ impl<'a> Run<'a> {
                 return Err(SimulationError::Interrupted { time: self.epoch + self.time });
             }
         }
-        Ok(self.summary(true))
+        Ok(self.ended(true, observer))
     }
 
-    fn summary(mut self, satisfied: bool) -> Summary {
+    fn ended(mut self, satisfied: bool, observer: &mut dyn Observer) -> Summary {
         self.summary.end_time = self.epoch + self.time;
+        let blocks = 0..self.chain.layout.blocks;
+        let displacement: Vec<f64> =
+            blocks.map(|block| self.origin + self.chain.at(&self.state.displacement, block)).collect();
+        observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit.take() {
             let driven =
