@@ -39,7 +39,12 @@ class Parameters:
     V0: float = 1e-4
     Delta: float = 0.0
     T: float | None = None
+    T_to: float | None = None
+    Delta_to: float | None = None
+    ramp_time: float = 0.0
     break_on: str = "magnitude"
+    #: A maximum of the modulation, in s, from which its phase is counted.
+    cycle_start: float = 0.0
 
     def __post_init__(self):
         if self.break_on not in ("magnitude", "tension"):
@@ -69,18 +74,30 @@ class Parameters:
 
     def phase(self, time):
         """Phase of the modulation at a time in s, in rad, whole periods taken off."""
-        return 2 * np.pi * ((time / self.T) % 1.0) if self.Delta > 0 else 0.0
+        return 2 * np.pi * (((time - self.cycle_start) / self.T) % 1.0) if self.Delta > 0 else 0.0
 
     def drive(self, time):
         """Displacement V0 t + Δ (cos(2πt/T) - 1) of the driven end, in m."""
         return self.V0 * time + self.Delta * (np.cos(self.phase(time)) - 1.0)
+
+    def cycles(self):
+        """The cycles of a ramped modulation: the parameters of each, and where it ends, in s; the last one is endless."""
+        cycle = self
+        while self.ramp_time > 0 and cycle.cycle_start < 2 * self.ramp_time:
+            end = cycle.cycle_start + cycle.T
+            yield cycle, end
+            share = max(0.0, 1.0 - abs(end / self.ramp_time - 1.0))
+            ends = ((self.T, self.T_to), (self.Delta, self.Delta_to))
+            period, amplitude = (a if b is None else (1.0 - share) * a + share * b for a, b in ends)
+            cycle = dataclasses.replace(self, T=period, Delta=amplitude, cycle_start=end)
+        yield cycle, np.inf
 
 
 def add_options(parser):
     """Adds one option for the log and one for each parameter to a command line."""
     parser.add_argument("log", help="contact log (Parquet)")
     group = parser.add_argument_group("parameters", "SI units; they win over those in the footer of the log")
-    for field in dataclasses.fields(Parameters):
+    for field in dataclasses.fields(Parameters)[:-1]:
         kind = {"N": int, "Ns": int, "break_on": str}.get(field.name, float)
         group.add_argument("--" + field.name.replace("_", "-"), dest=field.name, type=kind, default=argparse.SUPPRESS)
 

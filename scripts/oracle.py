@@ -295,9 +295,16 @@ class Replay:
 
     def run(self):
         """Replays the log to its end, or to the last wanted break."""
+        cycles = self.parameters.cycles()
+        cycle, cycle_end = next(cycles)
         while self.row < self.end:
-            self.motion = Motion(self.parameters, self.contacts, self.time, self.displacement, self.velocity)
-            if self.log["is_break"][self.row]:
+            self.motion = Motion(cycle, self.contacts, self.time, self.displacement, self.velocity)
+            if cycle_end < self.log["time"][self.row]:
+                self.watch(cycle_end - self.time)
+                self.move_to(cycle_end - self.time)
+                self.time = cycle_end
+                cycle, cycle_end = next(cycles)
+            elif self.log["is_break"][self.row]:
                 self.take_breaks()
             else:
                 self.take_reattachment()

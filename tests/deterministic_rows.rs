@@ -9,7 +9,7 @@ use stickslip::model::theory::{
     rigid_block_friction, total_strength,
 };
 use stickslip::model::{Change, Parameters};
-use stickslip::observe::ContactLog;
+use stickslip::observe::{ContactLog, Profile};
 use stickslip::solver::{Limits, Solver, simulate};
 
 /// Asserts agreement to half a unit of the reference's last digit.
@@ -95,4 +95,27 @@ fn identical_contacts_first_break_together_at_the_quasi_static_load() {
     agrees(force, 241.7, 0.1);
     let together = breaks.iter().filter(|event| event.time == first.time && event.block == 0).count();
     assert_eq!(together, parameters.contacts_per_block);
+}
+
+#[test]
+fn displacements_before_the_first_break_decay_as_eq_1_in_both_solvers() {
+    let parameters = Parameters { threshold_deviation: 0.0, ..Parameters::default() }.validated().unwrap();
+    let exact = 2.0 * libm::asinh(0.5 * (1e8_f64 / 6.9e9).sqrt());
+    for solver in [Solver::EventDriven { tolerance: 1e-8 }, Solver::FixedStep { time_step: 1e-6 }] {
+        let mut profile = Profile::new(&parameters);
+        let limits = Limits { end_time: 0.063, events: 1_000_000, interrupt: None };
+        let summary = simulate(&parameters, solver, limits, &mut profile).unwrap();
+        assert!(summary.breaks == 0 && profile.rows.len() == 70);
+        let (first, x): (_, Vec<f64>) = (profile.rows[0], profile.rows.iter().map(|row| row.displacement).collect());
+        assert!(first.block == 1 && (first.time - 0.063).abs() < 2e-6 && (first.position - 0.15 / 70.0).abs() < 1e-15);
+        // Up to block 40, what the free end reflects is e^(-60 κ) = 7e-4 of the displacement, and 2e-5 of the exponent.
+        let decay = libm::log(x[0] / x[39]) / 39.0;
+        assert!((decay / exact - 1.0).abs() < 1e-3, "{decay} against {exact} with {solver:?}");
+        // The free end mirrors the rest. Damping m γ v against K_s x holds the slider back by 2e-4 a decay length.
+        for (j, x_j) in x.iter().enumerate() {
+            let mirrored = |j: usize| libm::cosh(exact * (69.5 - j as f64));
+            let expected = x[0] * mirrored(j) / mirrored(0);
+            assert!((x_j / expected - 1.0).abs() < 3e-3, "block {}: {x_j} against {expected}", j + 1);
+        }
+    }
 }

@@ -16,10 +16,16 @@ fn residual(parameters: &Parameters, solver: Solver) -> f64 {
     ledger.residual().abs()
 }
 
-fn drives() -> [Parameters; 2] {
+fn drives() -> [Parameters; 3] {
     let modulated =
         Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
-    [Parameters::default(), modulated]
+    let ramped = Parameters {
+        turning_period: Some(1.0 / 80.0),
+        turning_amplitude: Some(5e-7),
+        ramp_time: 0.1,
+        ..modulated.clone()
+    };
+    [Parameters::default(), modulated, ramped]
 }
 
 #[test]

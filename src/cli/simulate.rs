@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::figure::{self, Picture};
 use stickslip::model::{ContactEvent, Parameters, Symbol, Value};
-use stickslip::observe::{AttachedMap, ContactLog, MapRow, SlipObserver, Together, Trace, TraceRow};
+use stickslip::observe::{AttachedMap, ContactLog, MapRow, Profile, SlipObserver, Together, Trace, TraceRow};
 use stickslip::run::limits;
 use stickslip::solver::{self, Observer, Summary};
 use stickslip::store::columns::Table;
@@ -68,6 +68,9 @@ pub struct Arguments {
     /// Write the attached fraction of every block over time, as Parquet
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
+    /// Write the displacement of every block at the end, as Parquet
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
     /// Write every contact event, as Parquet
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
@@ -140,6 +143,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let mut slips = SlipObserver::new(parameters, sweep.recording());
     let mut trace = Trace::new(parameters, arguments.sample);
     let mut map = AttachedMap::new(parameters, arguments.sample);
+    let mut profile = Profile::new(parameters);
     let mut log = ContactLog::default();
     let mut others: Vec<&mut dyn Observer> = Vec::new();
     let plots = arguments.plot.is_some();
@@ -148,6 +152,9 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     }
     if plots || arguments.map.is_some() {
         others.push(&mut map);
+    }
+    if arguments.profile.is_some() {
+        others.push(&mut profile);
     }
     if arguments.contacts.is_some() {
         others.push(&mut log);
@@ -160,6 +167,9 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 
     let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
     write_records(arguments, &footer, &trace.rows, &map.rows, &log.events)?;
+    if let Some(path) = &arguments.profile {
+        write_table(path, records::profile(), &footer, profile.rows.iter().copied())?;
+    }
     let label = JobLabel {
         job_id: sweep.job_id(parameters).to_string(),
         set_id: sweep.set_id(parameters).to_string(),
@@ -273,6 +283,7 @@ fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) 
     let outputs = [
         ("--trace", &arguments.trace),
         ("--map", &arguments.map),
+        ("--profile", &arguments.profile),
         ("--contacts", &arguments.contacts),
         ("--slip-table", &arguments.slip_table),
         ("--plot", &arguments.plot),

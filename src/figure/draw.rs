@@ -1,6 +1,6 @@
 //! All figures that fit the reduced data of a sweep, written together.
 
-use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture, backbone, histograms, intervals};
+use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture, backbone, drag, histograms, intervals};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::{HistogramBin, SetLabel, WRITER, read_backbone, read_few_sets, read_histograms, read_points};
 use crate::store::commit::{Commit, alone, create_folder};
@@ -9,7 +9,7 @@ use crate::store::storage::Storage;
 use std::path::PathBuf;
 
 /// Draws the figures of a results directory into `figures/`, each as SVG and PNG: φ against η and τ against T if the drive
-/// is modulated, histograms of τ if there are few sets.
+/// is modulated, both along the way if the modulation is ramped, histograms of τ if there are few sets.
 ///
 /// Returns the files, in the order in which they were written.
 ///
@@ -24,6 +24,9 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
     }
     if points.iter().any(|point| point.period.is_some() && point.interval.is_some()) {
         pictures.push(intervals(&points)?);
+    }
+    if points.iter().any(|point| point.way.is_some() && point.interval.is_some()) {
+        pictures.push(drag(&points)?);
     }
     // Each panel may hold a second set, of identical contacts.
     let sets = read_few_sets(storage, layout, 2 * MOST_PANELS)?;
@@ -181,6 +184,8 @@ mod tests {
             amplitude: 1e-6,
             period: Some(period),
             eta: 0.5 + f64::from(step),
+            way: None,
+            onset: 1.0,
             interval: Some(4.0 * period),
             periods: Some(4),
             phase: Some(-0.01 * f64::from(step)),

@@ -91,6 +91,8 @@ mod tests {
             amplitude: 1e-6,
             period: Some(0.01),
             eta: 20.0,
+            way: None,
+            onset: 1.0,
             interval: Some(n as f64 * 0.01),
             periods: Some(n),
             phase: Some(-0.5),

@@ -2,6 +2,7 @@
 
 mod axis;
 mod backbone;
+mod drag;
 mod draw;
 mod frame;
 mod histograms;
@@ -12,6 +13,7 @@ mod simulation;
 mod work_precision;
 
 pub use backbone::backbone;
+pub use drag::drag;
 pub use draw::draw_all;
 pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
 pub use intervals::intervals;

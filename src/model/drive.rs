@@ -1,9 +1,13 @@
 //! The drive: a ramp and a cosine, u(t) = V0 t + Δ (cos(2πt/T) - 1), so that the shear force starts at zero.
+//!
+//! T and Δ may themselves be ramped, cycle by cycle: each cycle starts at a maximum, at t_c, and is a plain cosine,
+//! u(t) = V0 t + Δ_c (cos(2π (t - t_c)/T_c) - 1), with the T_c and Δ_c that the ramp has at t_c. So u and u' are continuous
+//! where cycles join. The [`Drive`] is that of one cycle, the one in force; without a ramp, and after it, a cycle has no end.
 
 use super::Parameters;
 use std::f64::consts::TAU;
 
-/// The far end of the driving spring.
+/// The far end of the driving spring, within one cycle of the modulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive {
     /// Stiffness `K_d`, in N/m.
@@ -15,19 +19,81 @@ pub struct Drive {
     /// Angular frequency 2π/T of the modulation, in rad/s; 0 when it is off.
     pub angular_frequency: f64,
     /// Period T, in s; 0 when the modulation is off.
-    period: f64,
+    pub period: f64,
+    /// A maximum of the modulation, in s: the cycle starts there.
+    pub cycle_start: f64,
+    /// Where the next cycle starts, in s; infinite if none does.
+    pub cycle_end: f64,
+    ramp: Option<Ramp>,
+}
+
+/// Period and amplitude on their linear way to the turning point and back.
+#[derive(Clone, Copy, Debug)]
+struct Ramp {
+    /// Duration of either way, in s.
+    time: f64,
+    /// At the start and at the turning point: period in s, amplitude in m.
+    period: [f64; 2],
+    amplitude: [f64; 2],
+}
+
+impl Ramp {
+    fn new(parameters: &Parameters) -> Option<Self> {
+        let Parameters { modulation_amplitude: amplitude, ramp_time: time, .. } = *parameters;
+        let period = parameters.modulation_period.filter(|_| time > 0.0)?;
+        Some(Self {
+            time,
+            period: [period, parameters.turning_period.unwrap_or(period)],
+            amplitude: [amplitude, parameters.turning_amplitude.unwrap_or(amplitude)],
+        })
+    }
+
+    /// Period in s and amplitude in m at a time in s.
+    fn at(&self, time: f64) -> (f64, f64) {
+        let way = time / self.time;
+        let turned = if way <= 1.0 { way } else { (2.0 - way).max(0.0) };
+        // So weighed, both ends are met exactly, and nothing between them falls to zero.
+        let between = |[start, turning]: [f64; 2]| (1.0 - turned) * start + turned * turning;
+        (between(self.period), between(self.amplitude))
+    }
+
+    fn is_over(&self, time: f64) -> bool {
+        time >= 2.0 * self.time
+    }
 }
 
 impl Drive {
-    /// The drive of a set of parameters.
+    /// The drive of a set of parameters, in its first cycle.
     #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
+        let period = parameters.modulation_period.unwrap_or(0.0);
+        let ramp = Ramp::new(parameters);
         Self {
             stiffness: parameters.drive_stiffness,
             velocity: parameters.drive_velocity,
             amplitude: parameters.modulation_amplitude,
             angular_frequency: parameters.modulation_frequency(),
-            period: parameters.modulation_period.unwrap_or(0.0),
+            period,
+            cycle_start: 0.0,
+            cycle_end: if ramp.is_some() { period } else { f64::INFINITY },
+            ramp,
+        }
+    }
+
+    /// Goes on to the next cycle, if there is one.
+    pub fn next_cycle(&mut self) {
+        let Some(ramp) = self.ramp else { return };
+        let start = self.cycle_end;
+        (self.period, self.amplitude) = ramp.at(start);
+        self.angular_frequency = TAU / self.period;
+        self.cycle_start = start;
+        self.cycle_end = if ramp.is_over(start) { f64::INFINITY } else { start + self.period };
+    }
+
+    /// Goes on to the cycle at a time in s, which is not before the one in force.
+    pub fn advance_to(&mut self, time: f64) {
+        while time >= self.cycle_end {
+            self.next_cycle();
         }
     }
 
@@ -37,10 +103,16 @@ impl Drive {
         self.amplitude > 0.0
     }
 
-    /// Phase of the modulation at a time in s, in [0, 2π) rad; reduced before scaling, so that it stays exact in long runs.
+    /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate; 0 without modulation.
+    #[must_use]
+    pub fn eta(&self) -> f64 {
+        self.angular_frequency * self.amplitude / self.velocity
+    }
+
+    /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long runs.
     #[must_use]
     pub fn phase(&self, time: f64) -> f64 {
-        if self.is_modulated() { TAU * (time / self.period).fract() } else { 0.0 }
+        if self.is_modulated() { TAU * ((time - self.cycle_start) / self.period).fract() } else { 0.0 }
     }
 
     /// Displacement u(t) in m and velocity u'(t) in m/s of the driven end, at a time in s.
@@ -53,5 +125,56 @@ impl Drive {
         } else {
             (ramp, self.velocity)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// T from 0.03 s to 0.05 s and Δ from 1 µm to 0, within 1 s, and back.
+    fn ramped() -> Drive {
+        Drive::new(&Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.03),
+            turning_period: Some(0.05),
+            turning_amplitude: Some(0.0),
+            ramp_time: 1.0,
+            ..Parameters::default()
+        })
+    }
+
+    #[test]
+    fn where_cycles_join_displacement_and_velocity_are_continuous() {
+        let mut drive = ramped();
+        let mut joints = 0;
+        while drive.cycle_end.is_finite() {
+            let joint = drive.cycle_end;
+            let before = drive.motion(joint);
+            drive.next_cycle();
+            let after = drive.motion(joint);
+            assert!((before.0 - after.0).abs() < 1e-18, "{before:?} and {after:?} at {joint} s");
+            assert!((before.1 - after.1).abs() < 1e-15, "{before:?} and {after:?} at {joint} s");
+            joints += 1;
+        }
+        // The mean frequency over the ramp is ln(0.05/0.03)/0.02 Hz.
+        assert!((f64::from(joints) - 2.0 * 25.54).abs() < 2.0, "{joints}");
+    }
+
+    #[test]
+    fn cycles_follow_the_ramp_to_its_turning_point_and_back() {
+        let mut drive = ramped();
+        assert_eq!((drive.period, drive.amplitude), (0.03, 1e-6));
+        drive.advance_to(0.5);
+        assert!(drive.cycle_start <= 0.5 && drive.cycle_end > 0.5);
+        let up = drive.cycle_start;
+        assert!(
+            (drive.period - (0.03 + 0.02 * up)).abs() < 1e-15 && (drive.amplitude - 1e-6 * (1.0 - up)).abs() < 1e-20
+        );
+        drive.advance_to(1.7);
+        let down = 2.0 - drive.cycle_start;
+        assert!((drive.period - (0.03 + 0.02 * down)).abs() < 1e-15);
+        drive.advance_to(100.0);
+        assert_eq!((drive.period, drive.amplitude, drive.cycle_end), (0.03, 1e-6, f64::INFINITY));
     }
 }

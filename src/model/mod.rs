@@ -14,4 +14,4 @@ pub(crate) use parameters::Shortest;
 pub use parameters::{BreakOn, Description, ParameterError, Parameters, Symbol, Value};
 
 /// Version of the equations and definitions; part of every job id. Raised when the same parameters give other results.
-pub const MODEL_VERSION: u32 = 1;
+pub const MODEL_VERSION: u32 = 2;

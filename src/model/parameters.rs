@@ -73,6 +73,12 @@ pub struct Parameters {
     pub modulation_amplitude: f64,
     /// Period T of the modulation, in s. Some value > 0 exactly when Δ > 0.
     pub modulation_period: Option<f64>,
+    /// Period `T_to` at the turning point of the ramp, in s. > 0; none: the period is not ramped.
+    pub turning_period: Option<f64>,
+    /// Amplitude `Δ_to` at the turning point of the ramp, in m. >= 0; none: the amplitude is not ramped.
+    pub turning_amplitude: Option<f64>,
+    /// Duration of the ramp's way to its turning point, and of its way back, in s. Above 0 exactly when one of the two is ramped.
+    pub ramp_time: f64,
     /// Normal force `F_N`, in N. > 0. Enters reported ratios only.
     pub normal_force: f64,
     /// Slider length L, in m. > 0. Enters positions and front speeds only.
@@ -99,6 +105,9 @@ impl Default for Parameters {
             drive_velocity: 1e-4,
             modulation_amplitude: 0.0,
             modulation_period: None,
+            turning_period: None,
+            turning_amplitude: None,
+            ramp_time: 0.0,
             normal_force: 4000.0,
             slider_length: 0.15,
             break_on: BreakOn::Magnitude,
@@ -124,6 +133,9 @@ pub enum Symbol {
     V0,
     Delta,
     T,
+    TTo,
+    DeltaTo,
+    RampTime,
     FN,
     L,
     BreakOn,
@@ -149,17 +161,22 @@ const fn describe(key: &'static str, unit: &'static str, meaning: &'static str, 
 
 const POSITIVE: &str = "a finite number > 0";
 const NOT_NEGATIVE: &str = "a finite number >= 0";
+const TURNING_PERIOD: &str = "a finite number > 0, given only with Delta > 0 and ramp_time > 0";
+const TURNING_AMPLITUDE: &str = "a finite number >= 0, given only with Delta > 0 and ramp_time > 0";
+const RAMP_TIME: &str = "a finite number >= 0, at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to";
 
 /// Largest number of blocks, and of contacts per block.
 const MOST_PER_AXIS: usize = 100_000;
 /// Largest number of contacts; a job holds about 100 bytes for each.
 const MOST_CONTACTS: usize = 10_000_000;
+/// Longest ramp, in periods: each is one cycle to be stepped over.
+const MOST_RAMPED_PERIODS: f64 = 1e9;
 /// Largest integer that a double, and so every reader of a table, holds exactly.
 const MOST_SEED: u64 = (1 << 53) - 1;
 
 impl Symbol {
     /// Every symbol, in the order of tables and documentation.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 20] = [
         Self::N,
         Self::Ns,
         Self::M,
@@ -173,6 +190,9 @@ impl Symbol {
         Self::V0,
         Self::Delta,
         Self::T,
+        Self::TTo,
+        Self::DeltaTo,
+        Self::RampTime,
         Self::FN,
         Self::L,
         Self::BreakOn,
@@ -198,6 +218,21 @@ impl Symbol {
             Self::V0 => describe("V0", "m/s", "drive velocity", POSITIVE),
             Self::Delta => describe("Delta", "m", "amplitude of the modulation, 0 is off", NOT_NEGATIVE),
             Self::T => describe("T", "s", "period of the modulation", "a finite number > 0, given when Delta > 0"),
+            Self::TTo => {
+                describe("T_to", "s", "period at the turning point of the ramp; null: not ramped", TURNING_PERIOD)
+            }
+            Self::DeltaTo => describe(
+                "Delta_to",
+                "m",
+                "amplitude at the turning point of the ramp; null: not ramped",
+                TURNING_AMPLITUDE,
+            ),
+            Self::RampTime => describe(
+                "ramp_time",
+                "s",
+                "duration of the ramp to T_to and Delta_to, and of that back; 0 is off",
+                RAMP_TIME,
+            ),
             Self::FN => describe("FN", "N", "normal force, enters reported ratios only", POSITIVE),
             Self::L => describe("L", "m", "slider length, enters positions and front speeds only", POSITIVE),
             Self::BreakOn => {
@@ -211,6 +246,12 @@ impl Symbol {
     #[must_use]
     pub const fn key(self) -> &'static str {
         self.description().key
+    }
+
+    /// Whether it says how the modulation is ramped.
+    #[must_use]
+    pub const fn is_ramp(self) -> bool {
+        matches!(self, Self::TTo | Self::DeltaTo | Self::RampTime)
     }
 
     /// The symbol with this key.
@@ -229,7 +270,7 @@ pub enum Value {
     Real(f64),
     /// The rule for breaking.
     BreakOn(BreakOn),
-    /// A period that is not there because the modulation is off.
+    /// A period that is not there because the modulation is off, or the end of a ramp that is not there.
     Absent,
 }
 
@@ -286,6 +327,9 @@ impl Parameters {
             Symbol::V0 => Value::Real(self.drive_velocity),
             Symbol::Delta => Value::Real(self.modulation_amplitude),
             Symbol::T => self.modulation_period.map_or(Value::Absent, Value::Real),
+            Symbol::TTo => self.turning_period.map_or(Value::Absent, Value::Real),
+            Symbol::DeltaTo => self.turning_amplitude.map_or(Value::Absent, Value::Real),
+            Symbol::RampTime => Value::Real(self.ramp_time),
             Symbol::FN => Value::Real(self.normal_force),
             Symbol::L => Value::Real(self.slider_length),
             Symbol::BreakOn => Value::BreakOn(self.break_on),
@@ -311,6 +355,7 @@ impl Parameters {
             Value::Real(real) if real >= 0.0 && real <= MOST_SEED as f64 && real.fract() == 0.0 => Ok(real as u64),
             _ => Err(refuse()),
         };
+        let real_or_absent = || if value == Value::Absent { Ok(None) } else { real().map(Some) };
         let size = || usize::try_from(count()?).map_err(|_| refuse());
         match symbol {
             Symbol::N => self.blocks = size()?,
@@ -325,12 +370,10 @@ impl Parameters {
             Symbol::Gamma => self.damping_rate = real()?,
             Symbol::V0 => self.drive_velocity = real()?,
             Symbol::Delta => self.modulation_amplitude = real()?,
-            Symbol::T => {
-                self.modulation_period = match value {
-                    Value::Absent => None,
-                    _ => Some(real()?),
-                }
-            }
+            Symbol::T => self.modulation_period = real_or_absent()?,
+            Symbol::TTo => self.turning_period = real_or_absent()?,
+            Symbol::DeltaTo => self.turning_amplitude = real_or_absent()?,
+            Symbol::RampTime => self.ramp_time = real()?,
             Symbol::FN => self.normal_force = real()?,
             Symbol::L => self.slider_length = real()?,
             Symbol::BreakOn => match value {
@@ -348,6 +391,7 @@ impl Parameters {
     /// # Errors
     /// Names the first parameter that is out of range, its value and what is allowed.
     pub fn validated(mut self) -> Result<Self, ParameterError> {
+        let can_ramp = self.modulation_amplitude != 0.0 && self.ramp_time != 0.0;
         for symbol in Symbol::ALL {
             let value = self.get(symbol);
             let allowed = match (symbol, value) {
@@ -359,6 +403,9 @@ impl Parameters {
                 (Symbol::Seed, Value::Count(seed)) => seed <= MOST_SEED,
                 (Symbol::Dfs, Value::Real(real)) => real >= 0.0 && real <= self.mean_threshold,
                 (Symbol::Gamma | Symbol::Delta, Value::Real(real)) => real >= 0.0 && real.is_finite(),
+                (Symbol::DeltaTo, Value::Real(real)) => real >= 0.0 && real.is_finite() && can_ramp,
+                (Symbol::TTo, Value::Real(real)) => real > 0.0 && real.is_finite() && can_ramp,
+                (Symbol::RampTime, Value::Real(real)) => real >= 0.0 && real <= self.longest_ramp(),
                 (_, Value::Real(real)) => real > 0.0 && real.is_finite(),
                 (Symbol::T, Value::Absent) => self.modulation_amplitude == 0.0,
                 _ => true,
@@ -372,9 +419,21 @@ impl Parameters {
         }
         // Adding zero turns -0.0 into 0.0: equal parameters must have equal bits.
         self.modulation_amplitude += 0.0;
+        self.turning_amplitude = self.turning_amplitude.map(|amplitude| amplitude + 0.0);
+        self.ramp_time += 0.0;
         self.damping_rate += 0.0;
         self.threshold_deviation += 0.0;
         Ok(self)
+    }
+
+    /// The longest that a ramp between these periods and amplitudes may take each way, in s; 0 if nothing is ramped.
+    fn longest_ramp(&self) -> f64 {
+        if self.turning_period.is_none() && self.turning_amplitude.is_none() {
+            return 0.0;
+        }
+        let shortest =
+            [self.modulation_period, self.turning_period].into_iter().flatten().fold(f64::INFINITY, f64::min);
+        (MOST_RAMPED_PERIODS * shortest).min(f64::MAX)
     }
 
     /// Mass of one block m = M/N, in kg.
@@ -405,6 +464,12 @@ impl Parameters {
     #[must_use]
     pub fn modulation_frequency(&self) -> f64 {
         self.modulation_period.map_or(0.0, |period| TAU / period)
+    }
+
+    /// The largest angular frequency of the modulation on its ramp, in rad/s; 0 when it is off.
+    #[must_use]
+    pub fn largest_modulation_frequency(&self) -> f64 {
+        self.turning_period.map_or(0.0, |period| TAU / period).max(self.modulation_frequency())
     }
 
     /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate; 0 without modulation.
@@ -438,8 +503,14 @@ mod tests {
 
     #[test]
     fn every_value_survives_a_round_trip_through_its_symbol() {
-        let original =
-            Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.01), ..Parameters::default() };
+        let original = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.01),
+            turning_period: Some(0.02),
+            turning_amplitude: Some(0.0),
+            ramp_time: 4.0,
+            ..Parameters::default()
+        };
         let mut copy = Parameters { seed: 9, blocks: 3, ..Parameters::default() };
         for symbol in Symbol::ALL {
             copy.set(symbol, original.get(symbol)).unwrap();
@@ -468,6 +539,26 @@ mod tests {
         assert_eq!(refused(Symbol::N, 1e6), Symbol::N);
         assert_eq!(refused(Symbol::Dfs, 1.4), Symbol::Dfs);
         assert_eq!(refused(Symbol::Delta, 1e-6), Symbol::T);
+    }
+
+    #[test]
+    fn half_a_ramp_is_refused_by_name() {
+        let ramp = Parameters {
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.03),
+            turning_period: Some(0.04),
+            turning_amplitude: Some(0.0),
+            ramp_time: 10.0,
+            ..Parameters::default()
+        };
+        let refused = |parameters: Parameters| parameters.validated().expect_err("must be refused").symbol;
+        assert_eq!(ramp.clone().validated().unwrap(), ramp);
+        assert_eq!(refused(Parameters { modulation_amplitude: 0.0, ..ramp.clone() }), Symbol::TTo);
+        assert_eq!(refused(Parameters { ramp_time: 0.0, ..ramp.clone() }), Symbol::TTo);
+        assert_eq!(refused(Parameters { turning_period: None, ramp_time: 0.0, ..ramp.clone() }), Symbol::DeltaTo);
+        assert_eq!(refused(Parameters { turning_period: Some(0.0), ..ramp.clone() }), Symbol::TTo);
+        assert_eq!(refused(Parameters { turning_period: Some(0.9e-8), ..ramp.clone() }), Symbol::RampTime);
+        assert_eq!(refused(Parameters { turning_period: None, turning_amplitude: None, ..ramp }), Symbol::RampTime);
     }
 
     #[test]

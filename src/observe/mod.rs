@@ -9,8 +9,8 @@ mod slip;
 
 pub use phase::{OVERSHOOT, phase};
 pub use rupture::{Rupture, advance_speed};
-pub use sample::{AttachedMap, ContactLog, MapRow, Together, Trace, TraceRow};
-pub use slip::{Precursor, Slip, SlipObserver};
+pub use sample::{AttachedMap, ContactLog, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
+pub use slip::{Modulation, Precursor, Slip, SlipObserver};
 
 /// What a job records: how many slips, from where, and which tables.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -25,6 +25,11 @@ impl Observer for Together<'_> {
     fn is_satisfied(&self) -> bool {
         self.lead.is_satisfied()
     }
+
+    fn end(&mut self, time: f64, displacement: &[f64]) {
+        self.lead.end(time, displacement);
+        self.others.iter_mut().for_each(|other| other.end(time, displacement));
+    }
 }
 
 /// Regular instants, 0, d, 2d, ..., as time passes.
@@ -85,6 +90,7 @@ impl Observer for Trace {
     fn advance(&mut self, segment: &Segment<'_>) {
         while let Some(time) = self.sampling.within(segment) {
             let force = segment.force_after(time - segment.start);
+            self.drive.advance_to(time);
             let (driven, _) = self.drive.motion(time);
             self.rows.push(TraceRow {
                 time,
@@ -161,6 +167,57 @@ impl Observer for AttachedMap {
 
     fn is_satisfied(&self) -> bool {
         false
+    }
+}
+
+/// The displacement of one block at the end of a run (Eq. 1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfileRow {
+    /// Time of the end, in s.
+    pub time: f64,
+    /// Block, counted from 1 at the trailing edge.
+    pub block: u64,
+    /// Its position j L/N, in m.
+    pub position: f64,
+    /// Its displacement since the start, in m.
+    pub displacement: f64,
+}
+
+/// An observer that keeps where the blocks are at the end.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    spacing: f64,
+    /// One row a block; empty until the end.
+    pub rows: Vec<ProfileRow>,
+}
+
+impl Profile {
+    /// The profile of a slider.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Self {
+        Self { spacing: parameters.slider_length / parameters.blocks as f64, rows: Vec::new() }
+    }
+}
+
+impl Observer for Profile {
+    fn advance(&mut self, _segment: &Segment<'_>) {}
+
+    fn contact(&mut self, _event: &ContactEvent) {}
+
+    fn is_satisfied(&self) -> bool {
+        false
+    }
+
+    fn end(&mut self, time: f64, displacement: &[f64]) {
+        self.rows = (1..)
+            .zip(displacement)
+            .map(|(block, &displacement)| ProfileRow {
+                time,
+                block,
+                position: block as f64 * self.spacing,
+                displacement,
+            })
+            .collect();
     }
 }
 

@@ -7,8 +7,30 @@
 use super::Recording;
 use super::phase::phase;
 use super::rupture::{Rupture, advance_speed};
-use crate::model::{Change, ContactEvent, Parameters};
+use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
+
+/// The cycle of the modulation in force at an onset.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Modulation {
+    /// Its period, in s; `None` without modulation.
+    pub period: Option<f64>,
+    /// Its amplitude, in m; 0 without modulation.
+    pub amplitude: f64,
+}
+
+impl Modulation {
+    fn of(drive: &Drive) -> Self {
+        Self { period: (drive.period > 0.0).then_some(drive.period), amplitude: drive.amplitude }
+    }
+
+    /// Number n of periods nearest to an interval in s; `None` without modulation.
+    #[must_use]
+    pub fn periods(&self, interval: f64) -> Option<u64> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "intervals are > 0")]
+        self.period.map(|period| (interval / period).round() as u64)
+    }
+}
 
 /// One slip: a rupture that breaks contacts at every block.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +43,8 @@ pub struct Slip {
     pub interval: Option<f64>,
     /// Phase φ of the onset against the modulation, in rad; `None` without modulation.
     pub phase: Option<f64>,
+    /// The modulation at the onset.
+    pub modulation: Modulation,
     /// Shear force `F_S` at the onset, in N.
     pub peak_force: f64,
     /// Stress drop: peak force minus the least shear force during the slip, in N.
@@ -52,6 +76,8 @@ pub struct Precursor {
     pub onset: f64,
     /// Interval since the onset of the previous precursor of the same slip, in s; `None` for the first.
     pub interval: Option<f64>,
+    /// The modulation at the onset.
+    pub modulation: Modulation,
     /// Time of the first break, in s.
     pub nucleation: f64,
     /// Block of the first break, counted from 1.
@@ -87,7 +113,9 @@ impl Peak {
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
     parameters: Parameters,
-    eta: f64,
+    /// The drive in its cycle at the last slip's onset, and at the last precursor's.
+    at_slip: Drive,
+    at_precursor: Drive,
     recording: Recording,
     precursor_size: u64,
     crossing_time: f64,
@@ -142,7 +170,8 @@ impl SlipObserver {
         let start = Peak { time: 0.0, force: 0.0 };
         Self {
             parameters: parameters.clone(),
-            eta: parameters.eta(),
+            at_slip: Drive::new(parameters),
+            at_precursor: Drive::new(parameters),
             recording: *recording,
             precursor_size: recording.precursor_size.unwrap_or(parameters.contacts_per_block as u64),
             crossing_time: parameters.wave_crossing_time(),
@@ -232,12 +261,16 @@ impl SlipObserver {
         // A rupture of all blocks has reached the leading edge.
         let onset = active.onset.unwrap_or(self.since_slip);
         let discard = self.recording.discard;
+        self.at_slip.advance_to(onset.time);
         if self.slips_seen >= discard {
+            let drive = &self.at_slip;
+            let modulation = Modulation::of(drive);
             self.slips.push(Slip {
                 number: self.slips_seen - discard,
                 onset: onset.time,
                 interval: self.last_onset.map(|last| onset.time - last),
-                phase: self.parameters.modulation_period.map(|period| phase(onset.time, period, self.eta)),
+                phase: modulation.period.map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
+                modulation,
                 peak_force: onset.force,
                 drop: onset.force - active.least_at_last_break,
                 nucleation: rupture.first_time,
@@ -268,11 +301,13 @@ impl SlipObserver {
         let rupture = &active.rupture;
         let onset = active.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
+            self.at_precursor.advance_to(onset);
             self.precursors.push(Precursor {
                 slip: self.slips_seen - self.recording.discard,
                 precursor: self.pending,
                 onset,
                 interval: self.last_precursor_onset.map(|last| onset - last),
+                modulation: Modulation::of(&self.at_precursor),
                 nucleation: rupture.first_time,
                 nucleation_block: rupture.first_block as u64 + 1,
                 duration: rupture.last_time - rupture.first_time,

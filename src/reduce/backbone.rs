@@ -65,8 +65,11 @@ fn bin_of(eta: f64) -> i32 {
 }
 
 impl Backbone {
-    /// Adds a set; one without modulation has no phase and is left out.
+    /// Adds a set. One without modulation has no phase and is left out, one with a ramp no single η.
     pub(super) fn push(&mut self, set: &FinishedSet) {
+        if set.row.jobs.parameters.ramp_time > 0.0 {
+            return;
+        }
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;

@@ -14,7 +14,7 @@ mod set;
 pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
 pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
 pub use moments::{Moments, quantile};
-pub use point::{MOST_POINTS, Point, points};
+pub use point::{MOST_POINTS, Point, Way, points};
 pub use read::{SetLabel, read_backbone, read_few_sets, read_histograms, read_points};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
@@ -30,7 +30,11 @@ pub const BELOW_MARGIN: f64 = 0.15;
 /// What a reduction takes from a row of the slips table, in the table's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct SlipSample {
+    onset: f64,
     interval: Option<f64>,
+    /// The modulation at the onset: period in s, amplitude in m.
+    period: Option<f64>,
+    amplitude: f64,
     periods: Option<u64>,
     phase: Option<f64>,
     peak_force: f64,
@@ -39,6 +43,13 @@ struct SlipSample {
     precursors: f64,
     front_speed: Option<f64>,
     slow_front_speed: Option<f64>,
+}
+
+impl SlipSample {
+    /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
+    fn eta(&self, drive_velocity: f64) -> f64 {
+        self.period.map_or(0.0, |period| TAU / period * self.amplitude / drive_velocity)
+    }
 }
 
 /// Where phases can lie at some η.

@@ -1,7 +1,7 @@
 //! Reduced tables back as rows, for figures.
 
 use super::rows::{ParameterColumns, count, real};
-use super::{BackboneBin, HistogramBin, Point, reduced_file};
+use super::{BackboneBin, HistogramBin, Point, Way, reduced_file};
 use crate::model::Parameters;
 use crate::store::dataset::{Batch, DatasetError, Reader};
 use crate::store::layout::Layout;
@@ -38,11 +38,14 @@ pub fn read_points(storage: &dyn Storage, layout: &Layout) -> Result<Vec<Point>,
         let (drive_velocity, amplitude) = (batch.reals("V0")?, batch.reals("Delta")?);
         let (period, eta, interval) = (batch.reals("T")?, batch.reals("eta")?, batch.reals("interval")?);
         let (periods, phase, locked) = (batch.counts("n")?, batch.reals("phase")?, batch.flags("locked")?);
+        let (way, onset) = (batch.texts("way")?, batch.reals("onset")?);
         points.extend((0..batch.rows.num_rows()).map(|row| Point {
             drive_velocity: drive_velocity.value(row),
             amplitude: amplitude.value(row),
             period: real(period, row),
             eta: eta.value(row),
+            way: Way::from_word(way.value(row)),
+            onset: onset.value(row),
             interval: real(interval, row),
             periods: count(periods, row),
             phase: real(phase, row),

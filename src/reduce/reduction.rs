@@ -6,7 +6,7 @@
 
 use super::backbone::{Backbone, BackboneBin, backbone};
 use super::histogram::{histogram, histograms};
-use super::point::{Point, points, spacing};
+use super::point::{Point, Way, points, spacing};
 use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
 use super::set::{SetSlips, sets};
 use super::{PhaseLimits, SetJobs};
@@ -214,14 +214,21 @@ fn gather(
             let Some(&index) = index.get(set_id) else { return };
             let (set, slips, points) = &mut gathered[index];
             let parameters = &set.parameters;
-            let eta = parameters.eta();
-            slips.push(slip, &limits[index]);
+            let is_ramped = parameters.ramp_time > 0.0;
+            let eta = slip.eta(parameters.drive_velocity);
+            if is_ramped {
+                slips.push(slip, &PhaseLimits::at(eta));
+            } else {
+                slips.push(slip, &limits[index]);
+            }
             if here % spacing == 0 {
                 let point = Point {
                     drive_velocity: parameters.drive_velocity,
-                    amplitude: parameters.modulation_amplitude,
-                    period: parameters.modulation_period,
+                    amplitude: slip.amplitude,
+                    period: slip.period,
                     eta,
+                    way: is_ramped.then(|| Way::at(slip.onset, parameters.ramp_time)),
+                    onset: slip.onset,
                     interval: slip.interval,
                     periods: slip.periods,
                     phase: slip.phase,
@@ -238,7 +245,7 @@ fn gather(
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::Slip;
+    use crate::observe::{Modulation, Slip};
     use crate::solver::Summary;
     use crate::store::storage::Disk;
     use crate::store::tables::{JobLabel, JobRecord, JobResult, JobRow, SlipRow};
@@ -267,6 +274,10 @@ mod tests {
             onset: f64::from(number) * 12.0 * PERIOD,
             interval: (number > 0).then_some(12.0 * PERIOD + 1e-5 * f64::from(number % 3)),
             phase: job.parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
+            modulation: Modulation {
+                period: job.parameters.modulation_period,
+                amplitude: job.parameters.modulation_amplitude,
+            },
             peak_force: 480.0,
             drop: 100.0 + f64::from(number),
             nucleation: 0.0,

@@ -8,9 +8,12 @@ use arrow_array::{Array, Float64Array, Int64Array, StringArray};
 use std::collections::BTreeMap;
 
 /// Columns of the slips table that a reduction needs.
-pub(super) const SLIP_COLUMNS: [&str; 10] = [
+pub(super) const SLIP_COLUMNS: [&str; 13] = [
     "set_id",
+    "onset",
     "interval",
+    "T_onset",
+    "Delta_onset",
     "n",
     "phase",
     "peak_force",
@@ -32,13 +35,17 @@ pub(super) fn count(array: &Int64Array, row: usize) -> Option<u64> {
 /// The slips of a batch, each with the id of its set, in order.
 pub(super) fn for_each_slip(batch: &Batch, mut visit: impl FnMut(&str, &SlipSample)) -> Result<(), DatasetError> {
     let set_id = batch.texts("set_id")?;
+    let (onset, period, amplitude) = (batch.reals("onset")?, batch.reals("T_onset")?, batch.reals("Delta_onset")?);
     let (interval, periods, phase) = (batch.reals("interval")?, batch.counts("n")?, batch.reals("phase")?);
     let (peak_force, drop, duration) = (batch.reals("peak_force")?, batch.reals("drop")?, batch.reals("duration")?);
     let precursors = batch.counts("precursors")?;
     let (front_speed, slow_front_speed) = (batch.reals("front_speed")?, batch.reals("slow_front_speed")?);
     for row in 0..batch.rows.num_rows() {
         let slip = SlipSample {
+            onset: onset.value(row),
             interval: real(interval, row),
+            period: real(period, row),
+            amplitude: amplitude.value(row),
             periods: count(periods, row),
             phase: real(phase, row),
             peak_force: peak_force.value(row),

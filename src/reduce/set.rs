@@ -20,6 +20,8 @@ pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
     intervals: Vec<f64>,
+    /// Each interval in periods of the modulation at its end.
+    periods: Vec<f64>,
     slips: u64,
     phases: Directions,
     /// Load phases, for η < 1.
@@ -37,6 +39,7 @@ impl SetSlips {
     pub(super) fn push(&mut self, slip: &SlipSample, limits: &PhaseLimits) {
         self.slips += 1;
         self.intervals.extend(slip.interval);
+        self.periods.extend(slip.interval.zip(slip.period).map(|(interval, period)| interval / period));
         if let Some(phase) = slip.phase {
             self.phases.push(phase);
             if let Some(load) = limits.load_phase(phase) {
@@ -56,14 +59,12 @@ impl SetSlips {
     pub(super) fn finish(mut self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
-        let period = jobs.parameters.modulation_period;
-        let (mut tau, mut locking) = (Moments::default(), Directions::default());
-        for &interval in &self.intervals {
-            tau.push(interval);
-            if let Some(period) = period {
-                // The whole turns go first: they would cost the sine its digits.
-                locking.push(TAU * (interval / period).fract());
-            }
+        let (mut tau, mut periods, mut locking) = (Moments::default(), Moments::default(), Directions::default());
+        tau.extend(self.intervals.iter().copied());
+        for &count in &self.periods {
+            periods.push(count);
+            // The whole turns go first: they would cost the sine its digits.
+            locking.push(TAU * count.fract());
         }
         self.intervals.sort_by(f64::total_cmp);
         let has_limit = limits.minimum.is_some() && self.phases.count() > 0;
@@ -76,7 +77,7 @@ impl SetSlips {
             tau_mean: tau.mean(),
             tau_deviation: tau.deviation(),
             tau_quantiles: QUANTILES.map(|share| quantile(&self.intervals, share)),
-            periods_mean: tau.mean().zip(period).map(|(mean, period)| mean / period),
+            periods_mean: periods.mean(),
             locking_index: locking.resultant_length(),
             phase_mean: self.phases.mean(limits.top),
             resultant_length,
@@ -183,7 +184,7 @@ pub fn sets() -> Table<SetRow> {
         Column::new("tau_50", "s", "median", OptionalReal(|row| row.tau_quantiles[2])),
         Column::new("tau_75", "s", "75 % quantile", OptionalReal(|row| row.tau_quantiles[3])),
         Column::new("tau_95", "s", "95 % quantile", OptionalReal(|row| row.tau_quantiles[4])),
-        Column::new("periods_mean", "", "mean interval over T", OptionalReal(|row| row.periods_mean)),
+        Column::new("periods_mean", "", "mean of the intervals over T at their onset", OptionalReal(|row| row.periods_mean)),
         Column::new(
             "locking_index",
             "",
@@ -264,7 +265,10 @@ pub(super) mod tests {
 
     pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> SlipSample {
         SlipSample {
+            onset: 1.0,
             interval,
+            period: None,
+            amplitude: 1e-6,
             phase,
             periods: None,
             drop: 100.0,
@@ -286,13 +290,16 @@ pub(super) mod tests {
     #[test]
     fn intervals_of_whole_periods_lock_whatever_their_number() {
         let period = 1.0 / 29.0;
-        let tau = |n: u32| Some(f64::from(n) * period);
-        let row = reduced(jobs(1e-6, period), [3, 4, 4, 5, 400].map(|n| slip(tau(n), Some(-1.2))));
+        let slip = |n: f64, period| SlipSample { period: Some(period), ..slip(Some(n * period), Some(-1.2)) };
+        let row = reduced(jobs(1e-6, period), [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)));
         assert!(row.locking_index.unwrap() > 1.0 - 1e-9);
         assert!((row.periods_mean.unwrap() - 83.2).abs() < 1e-9);
         assert!((row.phase_mean.unwrap() + 1.2).abs() < 1e-12);
-        let halves = reduced(jobs(1e-6, period), [3.0, 3.5, 4.0, 4.5].map(|n| slip(Some(n * period), Some(-1.2))));
+        let halves = reduced(jobs(1e-6, period), [3.0, 3.5, 4.0, 4.5].map(|n| slip(n, period)));
         assert!(halves.locking_index.unwrap() < 1e-9);
+        // On a ramp, of the periods at the onsets.
+        let ramped = reduced(jobs(1e-6, period), [0.03, 0.0313, 0.0371].map(|period| slip(4.0, period)));
+        assert!(ramped.locking_index.unwrap() > 1.0 - 1e-9 && (ramped.periods_mean.unwrap() - 4.0).abs() < 1e-12);
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub(super) fn run(
 ) -> Result<Summary, SimulationError> {
     let blocks = parameters.blocks;
     let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
-    let drive = Drive::new(parameters);
+    let mut drive = Drive::new(parameters);
     let mut interface = Interface::new(parameters);
     let mut motion =
         Motion { displacement: vec![0.0; blocks], velocity: vec![0.0; blocks], acceleration: vec![0.0; blocks] };
@@ -106,6 +106,7 @@ pub(super) fn run(
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
             audit.damping += mass * parameters.damping_rate * time_step * squares;
         }
+        drive.advance_to(time);
         let (driven, drive_velocity) = drive.motion(time);
         let next_force = drive.stiffness * (driven - motion.displacement[0]);
         motion.accelerate(&interface, next_force, coupling, mass);
@@ -143,6 +144,7 @@ pub(super) fn run(
     if let Some(audit) = audit {
         motion.settle(audit, &interface, &drive, summary.end_time, coupling, mass);
     }
+    observer.end(summary.end_time, &motion.displacement);
     Ok(summary)
 }
 

@@ -74,6 +74,8 @@ struct Meter<'a> {
 
 impl Observer for Meter<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
+        // Rounding may put the ends of a segment beyond those of its cycle, but not its middle.
+        self.drive.advance_to(segment.start + 0.5 * segment.duration);
         self.work += work(&self.drive, &self.quadrature, segment);
         self.observer.advance(segment);
     }
@@ -87,6 +89,10 @@ impl Observer for Meter<'_> {
 
     fn is_satisfied(&self) -> bool {
         self.observer.is_satisfied()
+    }
+
+    fn end(&mut self, time: f64, displacement: &[f64]) {
+        self.observer.end(time, displacement);
     }
 }
 

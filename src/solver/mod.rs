@@ -73,6 +73,12 @@ pub trait Observer {
 
     /// Whether the simulation may end. Asked after each segment and its events.
     fn is_satisfied(&self) -> bool;
+
+    /// The simulation has ended, at a time in s, with the blocks at these displacements in m. Told once, and only if nothing
+    /// went wrong.
+    fn end(&mut self, time: f64, displacement: &[f64]) {
+        let _ = (time, displacement);
+    }
 }
 
 /// Bounds on a simulation, whatever its observer wants.

@@ -1,7 +1,7 @@
-//! The tables that one simulation writes on request: trace, map, contact log.
+//! The tables that one simulation writes on request: trace, map, profile, contact log.
 
 use crate::model::{Change, ContactEvent};
-use crate::observe::{MapRow, TraceRow};
+use crate::observe::{MapRow, ProfileRow, TraceRow};
 use crate::store::columns::{Column, Getter, Table};
 
 /// Shear force and displacement at regular instants.
@@ -36,6 +36,25 @@ pub fn map() -> Table<MapRow> {
                 "",
                 "attached contacts over the contacts of the block",
                 Getter::Real(|row| row.attached_fraction),
+            ),
+        ],
+    }
+}
+
+/// Displacement of each block at the end.
+pub fn profile() -> Table<ProfileRow> {
+    Table {
+        name: "profile",
+        meaning: "One row per block, at the end of a simulation",
+        columns: vec![
+            Column::new("time", "s", "time of the end", Getter::Real(|row| row.time)),
+            Column::new("block", "", "block, counted from 1 at the trailing edge", Getter::Count(|row| row.block)),
+            Column::new("position", "m", "position j L/N of the block", Getter::Real(|row| row.position)),
+            Column::new(
+                "displacement",
+                "m",
+                "displacement of the block since the start",
+                Getter::Real(|row| row.displacement),
             ),
         ],
     }

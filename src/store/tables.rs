@@ -89,16 +89,13 @@ impl JobRow<'_> {
     }
 }
 
-/// Number n of periods T nearest to an interval between slips; `None` without modulation.
-fn periods(slip: &SlipRow<'_>) -> Option<u64> {
-    let ratio = slip.slip.interval? / slip.job.parameters.modulation_period?;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "intervals are > 0")]
-    Some(ratio.round() as u64)
-}
-
 const JOB_ID: (&str, &str) = ("job_id", "hash of all that defines the job");
 const SET_ID: (&str, &str) = ("set_id", "hash of the same but the seed: common to all realisations");
 const ETA: (&str, &str) = ("eta", "2 pi Delta / (T V0), harmonic against uniform loading rate; 0 without modulation");
+const PERIOD_AT_ONSET: (&str, &str) =
+    ("T_onset", "period of the modulation at the onset, T unless ramped; null without modulation");
+const AMPLITUDE_AT_ONSET: (&str, &str) =
+    ("Delta_onset", "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation");
 
 /// The parameters that label every slip and precursor; the others stand in the jobs table.
 const LABELS: [Symbol; 4] = [Symbol::V0, Symbol::Delta, Symbol::T, Symbol::Seed];
@@ -127,7 +124,14 @@ pub fn slips<'a>() -> Table<SlipRow<'a>> {
             Real(|row| row.slip.onset),
         ),
         Column::new("interval", "s", "time since the previous onset", OptionalReal(|row| row.slip.interval)),
-        Column::new("n", "", "interval in periods T, rounded; null without modulation", OptionalCount(periods)),
+        Column::new(PERIOD_AT_ONSET.0, "s", PERIOD_AT_ONSET.1, OptionalReal(|row| row.slip.modulation.period)),
+        Column::new(AMPLITUDE_AT_ONSET.0, "m", AMPLITUDE_AT_ONSET.1, Real(|row| row.slip.modulation.amplitude)),
+        Column::new(
+            "n",
+            "",
+            "interval in periods T_onset, rounded; null without modulation",
+            OptionalCount(|row| row.slip.modulation.periods(row.slip.interval?)),
+        ),
         Column::new("phase", "rad", "phase of the onset against the modulation", OptionalReal(|row| row.slip.phase)),
         Column::new("peak_force", "N", "shear force at the onset", Real(|row| row.slip.peak_force)),
         Column::new("drop", "N", "peak force minus the least shear force during the slip", Real(|row| row.slip.drop)),
@@ -182,6 +186,8 @@ pub fn precursors<'a>() -> Table<PrecursorRow<'a>> {
             "time since the onset of the previous precursor of the same slip",
             OptionalReal(|row| row.precursor.interval),
         ),
+        Column::new(PERIOD_AT_ONSET.0, "s", PERIOD_AT_ONSET.1, OptionalReal(|row| row.precursor.modulation.period)),
+        Column::new(AMPLITUDE_AT_ONSET.0, "m", AMPLITUDE_AT_ONSET.1, Real(|row| row.precursor.modulation.amplitude)),
         Column::new("nucleation", "s", "time of the first break", Real(|row| row.precursor.nucleation)),
         Column::new(
             "nucleation_block",
@@ -294,6 +300,7 @@ pub fn markdown() -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::observe::Modulation;
     use crate::store::columns::tests::assert_documented;
     use arrow_array::cast::AsArray;
     use arrow_array::types::Int64Type;
@@ -304,6 +311,7 @@ pub(crate) mod tests {
             onset: 1.0,
             interval: Some(0.137),
             phase: None,
+            modulation: Modulation::default(),
             peak_force: 477.0,
             drop: 100.0,
             nucleation: 1.001,
@@ -330,25 +338,18 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn n_counts_periods_and_is_null_without_modulation() {
-        let label = |amplitude, period| JobLabel {
-            job_id: "0".repeat(32),
-            set_id: "1".repeat(32),
-            parameters: Parameters {
-                modulation_amplitude: amplitude,
-                modulation_period: period,
-                ..Parameters::default()
-            },
-        };
-        let (still, modulated) = (label(0.0, None), label(1e-6, Some(1.0 / 29.0)));
-        let (second, first) = (slip(1), Slip { interval: None, ..slip(0) });
+    fn n_counts_periods_at_the_onset_and_is_null_without_modulation() {
+        let job = JobLabel { job_id: "0".repeat(32), set_id: "1".repeat(32), parameters: Parameters::default() };
+        let (still, first) = (slip(1), Slip { interval: None, ..slip(0) });
+        let modulated = |period| Slip { modulation: Modulation { period: Some(period), amplitude: 1e-6 }, ..slip(1) };
         let (table, mut buffer) = (slips(), slips().buffer());
-        table.push(&mut buffer, &SlipRow { job: &still, slip: &second });
-        table.push(&mut buffer, &SlipRow { job: &modulated, slip: &second });
-        table.push(&mut buffer, &SlipRow { job: &modulated, slip: &first });
+        let all = [still, first, modulated(1.0 / 29.0), modulated(1.0 / 58.0)];
+        for slip in &all {
+            table.push(&mut buffer, &SlipRow { job: &job, slip });
+        }
         let batch = buffer.take().unwrap();
         let n: Vec<_> = batch.column_by_name("n").unwrap().as_primitive::<Int64Type>().iter().collect();
-        assert_eq!(n, [None, Some(4), None]);
+        assert_eq!(n, [None, None, Some(4), Some(8)]);
     }
 
     #[test]

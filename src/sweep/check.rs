@@ -2,7 +2,8 @@
 //!
 //! Single values were checked where they were read. What is left are bounds on combinations (`N N_s`, `dfs <= fs`, the
 //! period behind η), each monotonic in its quantities: if the two worst corners of the grid are valid, all points are. If
-//! not, the points are walked through, since a corner may be no point, or dropped by a condition.
+//! not, or if the modulation is ramped, the points are walked through, since a corner may be no point, or dropped by a
+//! condition.
 
 use super::axes::Axis;
 use super::plan::Sweep;
@@ -82,7 +83,9 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(file.source.error(place_of("axes"), problem));
     }
     period(sweep, places)?;
-    if !corners_are_valid(sweep)
+    let is_ramped =
+        places.set.iter().any(|place| matches!(place.quantity, Quantity::Parameter(symbol) if symbol.is_ramp()));
+    if (is_ramped || !corners_are_valid(sweep))
         && let Some((quantity, problem)) = sweep.walk().find_map(|point| invalid(sweep, &point))
     {
         return Err(places.error(quantity, problem));

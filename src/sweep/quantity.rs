@@ -61,18 +61,25 @@ impl Quantity {
     pub fn checked(self, value: Value) -> Option<Value> {
         match (self, value) {
             (Self::Parameter(symbol), _) => {
-                // Nothing here limits another parameter: N Ns <= 1e7, dfs <= fs, a period with every amplitude.
+                // Nothing here limits another parameter: N Ns <= 1e7, dfs <= fs, a period with every amplitude, a ramp that
+                // may take as long as it likes.
                 let mut probe = Parameters {
                     blocks: 1,
                     contacts_per_block: 1,
                     mean_threshold: f64::MAX,
                     threshold_deviation: 0.0,
-                    modulation_period: Some(1.0),
+                    modulation_amplitude: 1.0,
+                    modulation_period: Some(f64::MAX),
+                    turning_period: Some(f64::MAX),
+                    ramp_time: 1.0,
                     ..Parameters::default()
                 };
                 probe.set(symbol, value).ok()?;
                 let canonical = probe.get(symbol);
-                probe.validated().ok()?;
+                // Without amplitude or duration it is the ramp that is refused.
+                if probe.validated().is_err_and(|error| error.symbol == symbol) {
+                    return None;
+                }
                 Some(match canonical {
                     // Adding zero turns -0.0 into 0.0.
                     Value::Real(real) => Value::Real(real + 0.0),

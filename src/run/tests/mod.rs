@@ -6,7 +6,7 @@ mod faulty_disk;
 
 use super::*;
 use crate::model::Parameters;
-use crate::observe::{Precursor, Slip};
+use crate::observe::{Modulation, Precursor, Slip};
 use crate::solver::{SimulationError, Summary};
 use crate::store::columns::Table;
 use crate::store::dataset::Reader;
@@ -38,6 +38,7 @@ fn measure(parameters: &Parameters) -> JobResult {
         onset: onset(number),
         interval: (number > 0).then_some(1.0),
         phase: None,
+        modulation: Modulation::default(),
         peak_force: 477.0,
         drop: 100.0,
         nucleation: onset(number),
@@ -53,6 +54,7 @@ fn measure(parameters: &Parameters) -> JobResult {
         precursor: 0,
         onset: onset(slip) - 0.1,
         interval: None,
+        modulation: Modulation::default(),
         nucleation: onset(slip),
         nucleation_block: 1,
         duration: 0.001,

@@ -110,6 +110,8 @@ pub(super) struct Leap {
 pub(super) struct Bounds {
     /// Time to the next reattachment or to the end, in s.
     pub horizon: f64,
+    /// Time to the next cycle of a ramped modulation, in s; not before the horizon.
+    pub until_turn: f64,
     /// Displacement that may be left out, in m.
     pub error: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
@@ -151,7 +153,7 @@ impl Leap {
         chain: &Chain,
         kernels: Kernels,
         drive: &DriveNow,
-        Bounds { horizon, error, passed }: Bounds,
+        Bounds { horizon, until_turn, error, passed }: Bounds,
         state: &mut State,
         emit: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
@@ -189,7 +191,7 @@ impl Leap {
         }
         let path = self.force_path(drive);
         let segment = Segment { start: 0.0, duration: elapsed, path };
-        if largest > error && !self.hides_no_peak(chain, drive, &segment, moving, left, passed) {
+        if largest > error && !self.hides_no_peak(chain, drive, &segment, [moving, until_turn], left, passed) {
             return wait(0.7);
         }
         emit(segment);
@@ -207,13 +209,13 @@ impl Leap {
     }
 
     /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
-    /// one as large is on record, or comes later in the segment, or comes after it and before any break.
+    /// one as large is on record, or comes later in the segment, or comes after it, within `until_turn` s and before any break.
     fn hides_no_peak(
         &self,
         chain: &Chain,
         drive: &DriveNow,
         segment: &Segment<'_>,
-        moving: f64,
+        [moving, until_turn]: [f64; 2],
         left: f64,
         passed: f64,
     ) -> bool {
@@ -236,7 +238,7 @@ impl Leap {
         } else {
             (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
         };
-        let ahead = moving + further;
+        let ahead = (moving + further).min(until_turn);
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
     }
 
@@ -348,6 +350,9 @@ impl Leap {
         }
         if drive.amplitude > 0.0 {
             self.solve_wave(chain, drive, pulling * drive.amplitude);
+        } else if self.wave[0] != [0.0; 2] {
+            // A ramp has switched the modulation off.
+            self.wave.fill([0.0; 2]);
         }
     }
 

@@ -129,7 +129,8 @@ impl<'a> Run<'a> {
         let layout = Layout::new(parameters.blocks);
         let interface = Interface::new(parameters);
         let mass = parameters.block_mass();
-        let fastest = largest_frequency(parameters).max(drive.angular_frequency).max(parameters.damping_rate);
+        let fastest =
+            largest_frequency(parameters).max(parameters.largest_modulation_frequency()).max(parameters.damping_rate);
         let longest_step = LONGEST_STEP / fastest;
         let mut run = Self {
             limits,
@@ -178,15 +179,21 @@ impl<'a> Run<'a> {
         while !observer.is_satisfied() {
             let until_end = self.limits.end_time - self.epoch - self.time;
             if until_end <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
-                return Ok(self.summary(false));
+                return Ok(self.ended(false, observer));
             }
+            let mut until_turn = self.drive.cycle_end - self.epoch - self.time;
+            if until_turn <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
+                self.next_cycle();
+                until_turn = self.drive.cycle_end - self.epoch - self.time;
+            }
+            let until_change = until_turn.min(until_end);
             let until_attach = self.interface.next_reattachment() - self.time;
-            let horizon = until_attach.min(until_end);
+            let horizon = until_attach.min(until_change);
             let leapt = horizon > WORTHWHILE_LEAP * self.longest_step
                 && self.time >= self.next_leap
-                && self.try_leap(horizon, observer);
+                && self.try_leap(horizon, until_turn, observer);
             if !leapt {
-                self.step(until_end, observer)?;
+                self.step(until_change, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
                 let (time, events) = (self.epoch + self.time, self.limits.events);
@@ -204,11 +211,15 @@ impl<'a> Run<'a> {
                 return Err(SimulationError::Interrupted { time: self.epoch + self.time });
             }
         }
-        Ok(self.summary(true))
+        Ok(self.ended(true, observer))
     }
 
-    fn summary(mut self, satisfied: bool) -> Summary {
+    fn ended(mut self, satisfied: bool, observer: &mut dyn Observer) -> Summary {
         self.summary.end_time = self.epoch + self.time;
+        let blocks = 0..self.chain.layout.blocks;
+        let displacement: Vec<f64> =
+            blocks.map(|block| self.origin + self.chain.at(&self.state.displacement, block)).collect();
+        observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit.take() {
             let driven =
@@ -222,8 +233,17 @@ impl<'a> Run<'a> {
         self.drive.phase(self.epoch) + self.drive.angular_frequency * self.time
     }
 
-    /// Tries a leap of at most `horizon` s; false if it is not yet allowed.
-    fn try_leap(&mut self, horizon: f64, observer: &mut dyn Observer) -> bool {
+    /// Takes up the next cycle of a ramped modulation, at the maximum where the two join.
+    fn next_cycle(&mut self) {
+        let before = self.drive.amplitude;
+        self.drive.next_cycle();
+        self.ramp_at_epoch += before - self.drive.amplitude;
+        self.swing = [self.drive.amplitude, 0.0];
+    }
+
+    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false if it is
+    /// not yet allowed.
+    fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
         let drive = DriveNow {
             stiffness: self.drive.stiffness,
             mass: self.mass,
@@ -234,7 +254,7 @@ impl<'a> Run<'a> {
             angular_frequency: self.drive.angular_frequency,
         };
         let start = self.epoch + self.time;
-        let bounds = Bounds { horizon, error: self.left_out, passed: self.passed_force };
+        let bounds = Bounds { horizon, until_turn, error: self.left_out, passed: self.passed_force };
         let mut shown = None;
         let emit = |segment: Segment<'static>| {
             let segment = Segment { start, ..segment };
