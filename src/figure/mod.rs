@@ -2,6 +2,7 @@
 
 mod axis;
 mod backbone;
+mod colour_bar;
 mod draw;
 mod frame;
 mod histograms;
