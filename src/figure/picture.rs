@@ -63,7 +63,7 @@ pub(super) const RED: Ink = "#d62020";
 /// The paper's averages.
 pub(super) const BLUE: Ink = "#1f55c4";
 
-/// For lines beside each other: colours that colour-blind readers tell apart.
+/// For lines beside each other: colours that colour-blind readers tell apart (Okabe and Ito).
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// A line's look.
