@@ -97,7 +97,6 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
     std::fs::create_dir_all(folder.path("theirs/data")).unwrap();
     std::fs::create_dir(folder.path("empty")).unwrap();
     folder.ends(0, "run good.toml --out good");
-    folder.write("grid.toml", "name = \"grid\"\n[axes]\nV0 = [1e-5, 1e-4]\nseed = { count = 3 }\n");
     folder.write("other-model.toml", &GOOD.replace("N = 3", "N = 4"));
     folder.write("other-recording.toml", &GOOD.replace("slips = 2", "slips = 3"));
     folder.write("other-solver.toml", &format!("{GOOD}[solver]\ntolerance = 1e-7\n"));
@@ -137,6 +136,24 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("reduce good extra", &["extra"]),
         ("plot theirs", &["theirs: is no results directory", "such as results/"]),
         ("plot good --from 3", &["--from"]),
+        ("completions", &["<SHELL>"]),
+        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
+    ];
+    assert!(table.len() >= 25);
+    for (arguments, words) in table {
+        assert_refused(&folder, arguments, words);
+    }
+}
+
+#[test]
+fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
+    let folder = Folder::new();
+    folder.write("good.toml", GOOD);
+    folder.write("grid.toml", "name = \"grid\"\n[axes]\nV0 = [1e-5, 1e-4]\nseed = { count = 3 }\n");
+    folder.write("plain.txt", "no TOML, no directory");
+    std::fs::create_dir(folder.path("empty")).unwrap();
+
+    let table: &[(&str, &[&str])] = &[
         // Parameters of a simulation.
         ("simulate --set V0", &["--set V0: must be KEY=VALUE, such as --set V0=1e-5"]),
         ("simulate --set velocity=3", &["--set velocity: no such key", "V0", "eta"]),
@@ -193,8 +210,6 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("simulate good.toml --solver event-driven", &["'[SWEEP.toml]'", "--solver"]),
         ("simulate good.toml --tolerance 1e-4", &["'[SWEEP.toml]'", "--tolerance"]),
         ("simulate good.toml --dt 1e-6", &["'[SWEEP.toml]'", "--dt"]),
-        ("completions", &["<SHELL>"]),
-        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
     ];
     assert!(table.len() >= 25);
     for (arguments, words) in table {

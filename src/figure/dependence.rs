@@ -145,7 +145,9 @@ fn draw(sheet: &mut Sheet, frame: &Frame, points: &[(f64, Estimate)], ink: Ink) 
     let values = || points.iter().map(|&(x, estimate)| (x, estimate.value));
     frame.clipped(sheet, |sheet| {
         frame.curve(sheet, values(), stroke(ink));
-        points.iter().for_each(|&(x, estimate)| frame.error_bar(sheet, x, estimate.interval, ink));
+        for &(x, estimate) in points {
+            frame.error_bar(sheet, x, estimate.interval, ink);
+        }
     });
     frame.points(sheet, values(), Dot { ink, radius: 4.0, opacity: 1.0 });
 }

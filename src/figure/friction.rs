@@ -67,7 +67,9 @@ pub fn friction(sets: &[SetSummary]) -> Option<Picture> {
         let dot = Dot { ink, radius: 4.5, opacity: 1.0 };
         frame.clipped(sheet, |sheet| {
             frame.curve(sheet, points.iter().map(|&(x, friction)| (x, friction.value)), Stroke::solid(ink, 1.4));
-            points.iter().for_each(|&(x, friction)| frame.error_bar(sheet, x, friction.interval, ink));
+            for &(x, friction) in &points {
+                frame.error_bar(sheet, x, friction.interval, ink);
+            }
         });
         frame.points(sheet, points.iter().map(|&(x, friction)| (x, friction.value)), dot);
         let name = period.map_or_else(|| "Δ = 0".to_owned(), frequency);

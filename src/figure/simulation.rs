@@ -165,13 +165,10 @@ mod tests {
         let trace = [(0.0, 1.0), (1.0, 2.0)];
         let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
         let (force, position, bar) = (">Shear force Fₛ (N)<", ">Position x (mm)<", ">detached contacts (%)<");
-        let panels: [(Option<&[(f64, f64)]>, _, &[&str]); 3] = [
-            (Some(&trace), None, &[force]),
-            (None, Some(map), &[position, bar]),
-            (Some(&trace), Some(map), &[force, position, bar]),
-        ];
-        for (trace, map, labels) in panels {
-            let svg = simulation(trace, map).unwrap().svg();
+        let panels =
+            [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
+        for (has_trace, has_map, labels) in panels {
+            let svg = simulation(has_trace.then_some(&trace[..]), has_map.then_some(map)).unwrap().svg();
             for label in [force, position, bar] {
                 assert_eq!(svg.matches(label).count(), usize::from(labels.contains(&label)), "{label}");
             }
