@@ -1,7 +1,7 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The flags are turned into the text of a sweep with one point, so that values, messages and the id of the job are those
-//! of a sweep file.
+//! The job is that of a sweep file, or of flags, which are turned into the text of a sweep with one point: values, messages
+//! and the id of the job are the same.
 
 mod outputs;
 
@@ -98,7 +98,14 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What a sweep file tells in their place.
+impl Arguments {
+    /// Whether there is a plot with this panel.
+    fn draws(&self, panel: Panel) -> bool {
+        !self.plot.is_empty() && (self.panel == panel || self.panel == Panel::Both)
+    }
+}
+
+/// Flags of the job; a sweep file tells them all.
 const JOB_FLAGS: [&str; 9] =
     ["settings", "slips", "time", "discard", "max_events", "precursor_size", "solver", "tolerance", "dt"];
 
@@ -164,11 +171,10 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let mut map = AttachedMap::new(parameters, arguments.sample);
     let mut log = ContactLog::default();
     let mut others: Vec<&mut dyn Observer> = Vec::new();
-    let plots = !arguments.plot.is_empty();
-    if plots || arguments.trace.is_some() {
+    if arguments.trace.is_some() || arguments.draws(Panel::Force) {
         others.push(&mut trace);
     }
-    if plots || arguments.map.is_some() {
+    if arguments.map.is_some() || arguments.draws(Panel::Map) {
         others.push(&mut map);
     }
     if arguments.contacts.is_some() {

@@ -6,7 +6,7 @@ use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, UNDER};
 use super::picture::{Dot, INKS, Ink, Picture, Sheet, Stroke};
 use super::sets::{Grid, distinct, modulation, swept};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
-use crate::reduce::{Estimate, SetSummary};
+use crate::reduce::{SetSummary, Statistic};
 
 const PANEL: (f64, f64) = (300.0, 230.0);
 /// Between two columns, for the numbers of the right one.
@@ -18,24 +18,16 @@ const MODULATIONS: f64 = 270.0;
 const LEAST: usize = 3;
 const MILLISECONDS: f64 = 1e3;
 
-type Statistic = fn(&SetSummary) -> Option<Estimate>;
+type Getter = fn(&SetSummary) -> Option<Statistic>;
 /// The panels, row by row.
-const PANELS: [(&str, Statistic); 4] = [
+const PANELS: [(&str, Getter); 4] = [
     ("Locking index", |set| set.locking_index),
-    ("Mean interval τ (ms)", |set| set.tau_mean.map(in_milliseconds)),
+    ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS))),
     ("Resultant length of φ", |set| set.resultant_length),
     ("Standard deviation of τ (ms)", |set| {
-        set.tau_deviation.map(|value| in_milliseconds(Estimate { value, interval: None }))
+        set.tau_deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
     }),
 ];
-
-fn in_milliseconds(estimate: Estimate) -> Estimate {
-    let scaled = |value| MILLISECONDS * value;
-    Estimate {
-        value: scaled(estimate.value),
-        interval: estimate.interval.map(|(low, high)| (scaled(low), scaled(high))),
-    }
-}
 
 /// Draws sets in which, besides the modulation, one parameter has [`LEAST`] values or more, for each of up to six
 /// modulations; `None` for others.
@@ -44,9 +36,8 @@ pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     let [symbol] = swept(&all)[..] else { return None };
     let values = distinct(sets, |parameters| number(parameters, symbol));
     let least = if symbol == Symbol::BreakOn { 2 } else { LEAST };
-    let lines = lines(sets);
-    let is_swept_for_each = lines.iter().all(|line| line.len() >= least);
-    if values.len() < least || lines.len() > INKS.len() || !is_swept_for_each {
+    let lines = lines(sets)?;
+    if lines.iter().any(|line| line.len() < least) {
         return None;
     }
     let x = match symbol {
@@ -61,8 +52,7 @@ pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     let mut sheet = Sheet::new("dependence", size);
     for (index, (y_label, statistic)) in PANELS.into_iter().enumerate() {
         let (row, column) = (index / 2, index % 2);
-        let estimates = sets.iter().filter_map(statistic);
-        let ends = estimates.flat_map(|estimate| [estimate.value].into_iter().chain(ends(estimate)));
+        let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
         // Shares of one, and lengths of time from zero on.
         let high = if column == 0 { 1.0 } else { bounds(ends).map_or(1.0, |(_, high)| high) };
         let frame = Frame {
@@ -91,21 +81,18 @@ pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     Some(sheet.finish())
 }
 
-fn ends(estimate: Estimate) -> impl Iterator<Item = f64> {
-    estimate.interval.into_iter().flat_map(|(low, high)| [low, high])
-}
-
-/// The sets of each modulation, as they come.
-fn lines(sets: &[SetSummary]) -> Vec<Vec<&SetSummary>> {
+/// The sets of each modulation, as they come, if there are no more than inks.
+fn lines(sets: &[SetSummary]) -> Option<Vec<Vec<&SetSummary>>> {
     let modulation = |set: &SetSummary| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
     let mut lines: Vec<Vec<&SetSummary>> = Vec::new();
     for set in sets {
-        match lines.iter_mut().find(|line| modulation(line[0]) == modulation(set)) {
-            Some(line) => line.push(set),
+        match lines.iter().position(|line| modulation(line[0]) == modulation(set)) {
+            Some(line) => lines[line].push(set),
+            None if lines.len() == INKS.len() => return None,
             None => lines.push(vec![set]),
         }
     }
-    lines
+    Some(lines)
 }
 
 /// Where a parameter stands on the axis: its value, the spread of thresholds over their mean, the place of a rule.
@@ -141,12 +128,12 @@ const fn stroke(ink: Ink) -> Stroke {
     Stroke::solid(ink, 1.6)
 }
 
-fn draw(sheet: &mut Sheet, frame: &Frame, points: &[(f64, Estimate)], ink: Ink) {
-    let values = || points.iter().map(|&(x, estimate)| (x, estimate.value));
+fn draw(sheet: &mut Sheet, frame: &Frame, points: &[(f64, Statistic)], ink: Ink) {
+    let values = || points.iter().map(|&(x, statistic)| (x, statistic.value));
     frame.clipped(sheet, |sheet| {
         frame.curve(sheet, values(), stroke(ink));
-        for &(x, estimate) in points {
-            frame.error_bar(sheet, x, estimate.interval, ink);
+        for &(x, statistic) in points {
+            frame.error_bar(sheet, x, statistic.interval, ink);
         }
     });
     frame.points(sheet, values(), Dot { ink, radius: 4.0, opacity: 1.0 });
@@ -177,6 +164,8 @@ mod tests {
         let mut two = sets;
         two[0].parameters.blocks = 9;
         assert!(dependence(&two).is_none(), "two parameters");
+        let many = (0..7).flat_map(|step| [0.0, 0.0137, 0.137].map(|dfs| spread(dfs, 1e-6 + 1e-7 * f64::from(step))));
+        assert!(dependence(&many.collect::<Vec<_>>()).is_none(), "seven modulations");
     }
 
     #[test]
@@ -195,7 +184,7 @@ mod tests {
         let lines = |sets: &[SetSummary]| dependence(sets).unwrap().svg().matches("<path").count();
         let with = lines(&sets);
         for set in &mut sets {
-            set.locking_index = set.locking_index.map(|index| Estimate { interval: None, ..index });
+            set.locking_index = set.locking_index.map(|index| Statistic { interval: None, ..index });
         }
         assert_eq!(with - lines(&sets), 3);
     }

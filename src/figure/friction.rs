@@ -4,7 +4,7 @@ use super::axis::{Axis, bounds};
 use super::frame::{Frame, LEGEND, LegendPlace, Mark};
 use super::picture::{BLACK, Dot, GREY, INKS, LIGHT_GREY, Picture, Sheet, Stroke};
 use super::sets::{distinct, frequency, swept};
-use crate::reduce::{Estimate, SetSummary};
+use crate::reduce::{SetSummary, Statistic};
 
 const SIZE: (f64, f64) = (840.0, 460.0);
 /// Least amplitudes, zero included, and most periods of the figure.
@@ -24,60 +24,34 @@ pub fn friction(sets: &[SetSummary]) -> Option<Picture> {
     if !fits || !swept(&all).is_empty() {
         return None;
     }
-    let free = sets.iter().find(|set| set.parameters.modulation_period.is_none());
-    let free = free.and_then(|set| Some((set.peak_force?, set.mean_friction?)));
-    let (peak, mean) = free.map_or((1.0, 1.0), |(peak, friction)| (peak, friction.value));
-    let (x_label, y_label) = match free {
-        Some(_) => ("Force amplitude ΔFₛ / peak force Fₘ at Δ = 0", "Mean friction over that at Δ = 0"),
-        None => ("Force amplitude ΔFₛ (N)", "Mean friction (N)"),
-    };
-    let over = |estimate: Estimate| Estimate {
-        value: estimate.value / mean,
-        interval: estimate.interval.map(|(low, high)| (low / mean, high / mean)),
-    };
-    let point = |set: &SetSummary| {
-        let force = set.parameters.drive_stiffness * set.parameters.modulation_amplitude;
-        Some((force / peak, over(set.mean_friction?)))
-    };
-    let (_, high) = bounds(sets.iter().filter_map(point).map(|point| point.0))?;
-    let ends = |(_, friction): (f64, Estimate)| {
-        let (low, high) = friction.interval.unwrap_or((friction.value, friction.value));
-        [low, friction.value, high]
-    };
-    let (least, most) = bounds(sets.iter().filter_map(point).flat_map(ends))?;
-    let frame = Frame::filling(
-        SIZE,
-        LEGEND,
-        Axis::linear(x_label, -0.02 * high, 1.04 * high),
-        Axis::around(y_label, least, most),
-    );
-
+    let scale = Scale::of(sets);
+    let frame = frame(sets, &scale)?;
     let mut sheet = Sheet::new("friction", SIZE);
     let mut entries = Vec::new();
-    if free.is_some() {
+    if scale.is_relative {
         frame.clipped(&mut sheet, |sheet| {
             frame.stripe(sheet, REDUCTION.0, REDUCTION.1, LIGHT_GREY, 0.4);
             frame.curve(sheet, [(frame.x.low, 1.0), (frame.x.high, 1.0)], FREE);
         });
     }
-    let mut draw = |sheet: &mut Sheet, period: Option<f64>, ink| {
+    let modulated = periods.iter().zip(INKS).map(|(&period, ink)| (Some(period), ink, frequency(period)));
+    let free = scale.is_relative.then(|| (None, BLACK, "Δ = 0".to_owned()));
+    for (period, ink, name) in modulated.chain(free) {
         let such = sets.iter().filter(|set| set.parameters.modulation_period == period);
-        let mut points: Vec<(f64, Estimate)> = such.filter_map(point).collect();
+        let mut points: Vec<(f64, Statistic)> = such.filter_map(|set| scale.point(set)).collect();
         points.sort_by(|left, right| left.0.total_cmp(&right.0));
-        let dot = Dot { ink, radius: 4.5, opacity: 1.0 };
-        frame.clipped(sheet, |sheet| {
-            frame.curve(sheet, points.iter().map(|&(x, friction)| (x, friction.value)), Stroke::solid(ink, 1.4));
+        let values = || points.iter().map(|&(x, friction)| (x, friction.value));
+        frame.clipped(&mut sheet, |sheet| {
+            frame.curve(sheet, values(), Stroke::solid(ink, 1.4));
             for &(x, friction) in &points {
                 frame.error_bar(sheet, x, friction.interval, ink);
             }
         });
-        frame.points(sheet, points.iter().map(|&(x, friction)| (x, friction.value)), dot);
-        let name = period.map_or_else(|| "Δ = 0".to_owned(), frequency);
+        let dot = Dot { ink, radius: 4.5, opacity: 1.0 };
+        frame.points(&mut sheet, values(), dot);
         entries.push((Mark::Dot(dot), name));
-    };
-    periods.iter().zip(INKS).for_each(|(&period, ink)| draw(&mut sheet, Some(period), ink));
-    if free.is_some() {
-        draw(&mut sheet, None, BLACK);
+    }
+    if scale.is_relative {
         entries.push((Mark::Patch(LIGHT_GREY, 0.4), "paper's threshold".to_owned()));
     }
     frame.axes(&mut sheet, true);
@@ -85,6 +59,42 @@ pub fn friction(sets: &[SetSummary]) -> Option<Picture> {
     frame.y_label(&mut sheet);
     frame.legend(&mut sheet, LegendPlace::Beside, &entries);
     Some(sheet.finish())
+}
+
+/// In what forces are told: in the peak force and the mean friction at Δ = 0, or in N.
+struct Scale {
+    peak: f64,
+    mean: f64,
+    is_relative: bool,
+}
+
+impl Scale {
+    fn of(sets: &[SetSummary]) -> Self {
+        let free = sets.iter().find(|set| set.parameters.modulation_period.is_none());
+        match free.and_then(|set| Some((set.peak_force?, set.mean_friction?.value))) {
+            Some((peak, mean)) => Self { peak, mean, is_relative: true },
+            None => Self { peak: 1.0, mean: 1.0, is_relative: false },
+        }
+    }
+
+    /// `K_d` Δ and the mean friction of a set.
+    fn point(&self, set: &SetSummary) -> Option<(f64, Statistic)> {
+        let force = set.parameters.drive_stiffness * set.parameters.modulation_amplitude;
+        Some((force / self.peak, set.mean_friction?.times(1.0 / self.mean)))
+    }
+}
+
+fn frame(sets: &[SetSummary], scale: &Scale) -> Option<Frame> {
+    let (x_label, y_label) = if scale.is_relative {
+        ("Force amplitude ΔFₛ / peak force Fₘ at Δ = 0", "Mean friction over that at Δ = 0")
+    } else {
+        ("Force amplitude ΔFₛ (N)", "Mean friction (N)")
+    };
+    let points = || sets.iter().filter_map(|set| scale.point(set));
+    let (_, widest) = bounds(points().map(|point| point.0))?;
+    let (least, most) = bounds(points().flat_map(|point| point.1.ends()))?;
+    let x = Axis::linear(x_label, -0.02 * widest, 1.04 * widest);
+    Some(Frame::filling(SIZE, LEGEND, x, Axis::around(y_label, least, most)))
 }
 
 #[cfg(test)]

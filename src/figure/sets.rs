@@ -149,25 +149,25 @@ impl Periods {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::reduce::Estimate;
+    use crate::reduce::Statistic;
 
     /// A set at Δ in m and T in s that locks to `periods` of T.
     pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetSummary {
         let tau = periods * period;
-        let estimate = |value: f64| Some(Estimate { value, interval: Some((0.9 * value, 1.1 * value)) });
+        let statistic = |value: f64| Some(Statistic { value, interval: Some((0.9 * value, 1.1 * value)) });
         let parameters =
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() };
         SetSummary {
             set_id: format!("{amplitude:e} {period:e}"),
             parameters: parameters.validated().unwrap(),
-            tau_mean: estimate(tau),
+            tau_mean: statistic(tau),
             tau_deviation: Some(0.1 * tau),
             tau_quartiles: Some([0.98 * tau, tau, 1.02 * tau]),
             is_locked: amplitude > 0.0,
-            locking_index: estimate(0.8).filter(|_| amplitude > 0.0),
-            resultant_length: estimate(0.7).filter(|_| amplitude > 0.0),
+            locking_index: statistic(0.8).filter(|_| amplitude > 0.0),
+            resultant_length: statistic(0.7).filter(|_| amplitude > 0.0),
             peak_force: Some(480.0),
-            mean_friction: estimate(280.0 - 1e7 * amplitude),
+            mean_friction: statistic(280.0 - 1e7 * amplitude),
         }
     }
 

@@ -15,24 +15,39 @@ pub struct SetSummary {
     pub set_id: String,
     /// The seed is the default.
     pub parameters: Parameters,
-    pub tau_mean: Option<Estimate>,
+    pub tau_mean: Option<Statistic>,
     pub tau_deviation: Option<f64>,
     /// Quantiles of τ at 25, 50 and 75 %.
     pub tau_quartiles: Option<[f64; 3]>,
     pub is_locked: bool,
-    pub locking_index: Option<Estimate>,
-    pub resultant_length: Option<Estimate>,
+    pub locking_index: Option<Statistic>,
+    pub resultant_length: Option<Statistic>,
     pub peak_force: Option<f64>,
-    pub mean_friction: Option<Estimate>,
+    pub mean_friction: Option<Statistic>,
 }
 
 /// A statistic and, where it is known, its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct Statistic {
     /// The statistic.
     pub value: f64,
     /// Lower and upper end of the interval.
     pub interval: Option<(f64, f64)>,
+}
+
+impl Statistic {
+    /// Scaled by a factor > 0, as into another unit.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        let interval = self.interval.map(|(low, high)| (factor * low, factor * high));
+        Self { value: factor * self.value, interval }
+    }
+
+    /// Lower and upper end of what is known to belong to it: the interval, or the value alone.
+    #[must_use]
+    pub fn ends(self) -> [f64; 2] {
+        self.interval.map_or([self.value; 2], |(low, high)| [low.min(self.value), high.max(self.value)])
+    }
 }
 
 fn rows<Row>(
@@ -114,11 +129,12 @@ pub fn read_sets(storage: &dyn Storage, layout: &Layout, most: usize) -> Result<
         let batch = batch?;
         let (set_id, intervals) = (batch.texts("set_id")?, batch.counts("intervals")?);
         let parameters = ParameterColumns::of(&batch)?;
-        let (tau_mean, tau_deviation) = (Estimates::of(&batch, "tau_mean")?, batch.reals("tau_sd")?);
+        let (tau_mean, tau_deviation) = (StatisticColumns::of(&batch, "tau_mean")?, batch.reals("tau_sd")?);
         let quartiles = [batch.reals("tau_25")?, batch.reals("tau_50")?, batch.reals("tau_75")?];
-        let (locked, locking_index) = (batch.flags("locked")?, Estimates::of(&batch, "locking_index")?);
-        let resultant_length = Estimates::of(&batch, "resultant_length")?;
-        let (peak_force, mean_friction) = (batch.reals("peak_force_mean")?, Estimates::of(&batch, "mean_friction")?);
+        let (locked, locking_index) = (batch.flags("locked")?, StatisticColumns::of(&batch, "locking_index")?);
+        let resultant_length = StatisticColumns::of(&batch, "resultant_length")?;
+        let (peak_force, mean_friction) =
+            (batch.reals("peak_force_mean")?, StatisticColumns::of(&batch, "mean_friction")?);
         for row in (0..batch.rows.num_rows()).filter(|&row| intervals.value(row) > 0) {
             if sets.len() == most {
                 return Ok(Vec::new());
@@ -142,12 +158,12 @@ pub fn read_sets(storage: &dyn Storage, layout: &Layout, most: usize) -> Result<
 }
 
 /// The columns of a statistic: `NAME` and, if the table has them, `NAME_low` and `NAME_high`.
-struct Estimates<'a> {
+struct StatisticColumns<'a> {
     values: &'a Float64Array,
     ends: Option<(&'a Float64Array, &'a Float64Array)>,
 }
 
-impl<'a> Estimates<'a> {
+impl<'a> StatisticColumns<'a> {
     fn of(batch: &'a Batch, name: &str) -> Result<Self, DatasetError> {
         let (low, high) = (format!("{name}_low"), format!("{name}_high"));
         let has_ends = batch.rows.column_by_name(&low).is_some();
@@ -155,9 +171,9 @@ impl<'a> Estimates<'a> {
         Ok(Self { values: batch.reals(name)?, ends })
     }
 
-    fn row(&self, row: usize) -> Option<Estimate> {
+    fn row(&self, row: usize) -> Option<Statistic> {
         let interval = self.ends.and_then(|(low, high)| real(low, row).zip(real(high, row)));
-        real(self.values, row).map(|value| Estimate { value, interval })
+        real(self.values, row).map(|value| Statistic { value, interval })
     }
 }
 
@@ -200,13 +216,13 @@ mod tests {
     fn a_statistic_has_an_interval_only_where_the_table_tells_both_ends() {
         let values = ("tau_mean", [Some(0.1), Some(0.2)]);
         let without = batch(&[values]);
-        let row = Estimates::of(&without, "tau_mean").unwrap().row(1);
-        assert_eq!(row, Some(Estimate { value: 0.2, interval: None }));
+        let row = StatisticColumns::of(&without, "tau_mean").unwrap().row(1);
+        assert_eq!(row, Some(Statistic { value: 0.2, interval: None }));
         let with = batch(&[values, ("tau_mean_low", [Some(0.09), None]), ("tau_mean_high", [Some(0.12), Some(0.3)])]);
-        let estimates = Estimates::of(&with, "tau_mean").unwrap();
-        assert_eq!(estimates.row(0), Some(Estimate { value: 0.1, interval: Some((0.09, 0.12)) }));
-        assert_eq!(estimates.row(1), Some(Estimate { value: 0.2, interval: None }));
+        let columns = StatisticColumns::of(&with, "tau_mean").unwrap();
+        assert_eq!(columns.row(0), Some(Statistic { value: 0.1, interval: Some((0.09, 0.12)) }));
+        assert_eq!(columns.row(1), Some(Statistic { value: 0.2, interval: None }));
         let half = batch(&[values, ("tau_mean_low", [None, None])]);
-        assert!(Estimates::of(&half, "tau_mean").is_err());
+        assert!(StatisticColumns::of(&half, "tau_mean").is_err());
     }
 }

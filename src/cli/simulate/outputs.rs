@@ -35,12 +35,9 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
         let problem = format!("--until {until}: must be a finite number > {}, the first instant, in s", arguments.from);
         return Err(UsageError(problem).into());
     }
-    let plots = !arguments.plot.is_empty();
-    let cells = match arguments {
-        _ if plots || arguments.map.is_some() => parameters.blocks,
-        Arguments { trace: Some(_), .. } => 1,
-        _ => 0,
-    };
+    let maps = arguments.map.is_some() || arguments.draws(Panel::Map);
+    let traces = arguments.trace.is_some() || arguments.draws(Panel::Force);
+    let cells = if maps { parameters.blocks } else { usize::from(traces) };
     let slips = recording.slips as f64 + recording.discard as f64;
     let time = (slips * predicted_interval(parameters)).min(longest);
     if time / sample * cells as f64 > MOST_SAMPLES {
@@ -160,7 +157,7 @@ fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map:
         fractions: &fractions,
         length: parameters.slider_length,
     };
-    let trace = (arguments.panel != Panel::Map).then_some(samples.as_slice());
-    figure::simulation(trace, (arguments.panel != Panel::Force).then_some(map))
+    let trace = arguments.draws(Panel::Force).then_some(samples.as_slice());
+    figure::simulation(trace, arguments.draws(Panel::Map).then_some(map))
         .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.from))))
 }
