@@ -42,7 +42,7 @@ pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     }
     let x = match symbol {
         Symbol::BreakOn => Axis::words("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
-        _ => Grid::of(values).axis(&label(symbol)),
+        _ => Grid::of(values).wider_axis(&label(symbol)),
     };
     let (rows, columns) = (PANELS.len() / 2, 2.0);
     let size = (

@@ -1,6 +1,6 @@
 //! Sets beside each other: in what they differ, what each is called, and the grid on which they lie.
 
-use super::axis::Axis;
+use super::axis::{Axis, logarithmic_bounds};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::SetSummary;
 
@@ -80,10 +80,20 @@ impl Grid {
         Self { values, is_linear }
     }
 
-    /// An axis that ends half a step beyond the values.
+    /// An axis for cells: it ends half a step beyond the values.
     pub(super) fn axis(&self, label: &str) -> Axis {
         let (low, high) = (self.cell(0).0, self.cell(self.values.len() - 1).1);
         if self.is_linear { Axis::linear(label, low, high) } else { Axis::logarithmic(label, low, high) }
+    }
+
+    /// An axis for points at the values, a little wider than them.
+    pub(super) fn wider_axis(&self, label: &str) -> Axis {
+        const MARGIN: f64 = 0.05;
+        let (low, high) = (self.values[0], self.values[self.values.len() - 1]);
+        match logarithmic_bounds(self.values.iter().copied()) {
+            Some((low, high)) if !self.is_linear => Axis::logarithmic(label, low, high),
+            _ => Axis::linear(label, low - MARGIN * (high - low), high + MARGIN * (high - low)),
+        }
     }
 
     /// The ends of the cell around the value with this index: halfway to its neighbours.

@@ -145,7 +145,9 @@ fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
 }
 
 fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map: &[MapRow]) -> Result<Picture> {
-    let shown = arguments.from..=arguments.until.unwrap_or(f64::INFINITY);
+    // The sample at an end is shown, however its time is rounded.
+    let slack = 1e-6 * arguments.sample;
+    let shown = arguments.from - slack..=arguments.until.unwrap_or(f64::INFINITY) + slack;
     let samples: Vec<(f64, f64)> =
         trace.iter().filter(|row| shown.contains(&row.time)).map(|row| (row.time, row.force)).collect();
     let cells = || map.iter().filter(|row| shown.contains(&row.time));
