@@ -1,7 +1,7 @@
 //! Frames: a rectangle with two axes, the data in it, and a legend.
 
 use super::axis::Axis;
-use super::picture::{Anchor, BLACK, Dot, Ink, Sheet, Stroke};
+use super::picture::{Anchor, BLACK, Dot, Ink, Sheet, Stroke, snapped};
 
 /// Size of numbers at ticks. All sizes stay readable when a figure is printed at half its size.
 pub(super) const TICK_TEXT: u32 = 16;
@@ -80,9 +80,10 @@ impl Frame {
         (self.x_of(x), self.y_of(y))
     }
 
-    /// x, y, width and height of a rectangle of data.
+    /// x, y, width and height of a rectangle of data, on whole pixels.
     pub(super) fn box_of(&self, x: (f64, f64), y: (f64, f64)) -> [f64; 4] {
-        let ((left, top), (right, bottom)) = (self.place((x.0, y.1)), self.place((x.1, y.0)));
+        let [left, right] = [x.0, x.1].map(|value| snapped(self.x_of(value)));
+        let [top, bottom] = [y.1, y.0].map(|value| snapped(self.y_of(value)));
         [left, top, right - left, bottom - top]
     }
 
@@ -170,7 +171,7 @@ impl Frame {
             LegendPlace::UpperRight => (right - INSET - width, self.top + INSET),
             LegendPlace::LowerRight => (right - INSET - width, bottom - INSET - height),
             LegendPlace::Beside => (right + PADDING, self.top),
-            LegendPlace::Above => (self.left + 0.5 * (self.width - width), self.top - height),
+            LegendPlace::Above => (self.left + 0.5 * (self.width - width), self.top - height - AXIS.width),
         };
         sheet.rectangle((left, top), (width, height), "#ffffff", 0.85);
         for (index, (mark, text)) in entries.iter().enumerate() {

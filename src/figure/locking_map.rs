@@ -45,8 +45,13 @@ pub fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
         y: amplitudes.axis("Amplitude Δ (µm)"),
     };
     let drive_velocity = modulated[0].parameters.drive_velocity;
-    let colours: [fn(&SetSummary) -> Option<Color>; 2] =
-        [|set| whole_periods(set).map(colour), |set| set.locking_index.map(|index| shade(index.value))];
+    let colours: [fn(&SetSummary) -> Option<Color>; 2] = [
+        |set| {
+            let colour = colour(whole_periods(set)?);
+            Some(if set.is_locked { colour } else { paler(colour) })
+        },
+        |set| set.locking_index.map(|index| shade(index.value)),
+    ];
     let index_ticks = [0.0, 0.25, 0.5, 0.75, 1.0].map(|index: f64| (index, index.to_string())).to_vec();
     let bars = [periods_bar(&modulated), ColourBar { label: "locking index", colours: shades(), ticks: index_ticks }];
     for (panel, (colour, bar)) in colours.into_iter().zip(bars).enumerate() {
@@ -55,7 +60,10 @@ pub fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
             let cells = modulated.iter().filter_map(|set| {
                 let period = periods.place(set.parameters.modulation_period?);
                 let amplitude = MICROMETRES * set.parameters.modulation_amplitude;
-                Some((frame.box_of(periods.grid.cell_of(period), amplitudes.cell_of(amplitude)), colour(set)?))
+                let [left, top, width, height] =
+                    frame.box_of(periods.grid.cell_of(period), amplitudes.cell_of(amplitude));
+                // A hair over the next cell: viewers that scale show no seams.
+                Some(([left, top, width + 0.5, height + 0.5], colour(set)?))
             });
             sheet.rectangles(cells);
             for stroke in [CASING, LINE] {
@@ -74,11 +82,11 @@ pub fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
     Some(sheet.finish())
 }
 
-/// The median interval in periods, rounded, of a locked set.
+/// The median interval in periods, rounded.
 fn whole_periods(set: &SetSummary) -> Option<usize> {
     let periods = set.tau_quartiles?[1] / set.parameters.modulation_period?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
-    set.is_locked.then_some(periods.round() as usize)
+    Some(periods.round() as usize)
 }
 
 /// The colour of a number of periods, told apart from its neighbours by colour-blind readers, too.
@@ -95,8 +103,17 @@ fn colour(periods: usize) -> Color {
 
 /// Halfway to black.
 fn darker(ink: Color) -> Color {
+    each_part(ink, |part| part / 2)
+}
+
+/// Most of the way to white.
+fn paler(ink: Color) -> Color {
+    each_part(ink, |part| 255 - (255 - part) / 4)
+}
+
+fn each_part(ink: Color, change: impl Fn(u8) -> u8) -> Color {
     match ink {
-        Color::Rgb(red, green, blue) => Color::Rgb(red / 2, green / 2, blue / 2),
+        Color::Rgb(red, green, blue) => Color::Rgb(change(red), change(green), change(blue)),
         other => other,
     }
 }
@@ -108,7 +125,7 @@ fn periods_bar(sets: &[&SetSummary]) -> ColourBar {
     let count = (last - first + 1) as f64;
     let number = |periods: usize| if periods > MOST_PERIODS { format!(">{MOST_PERIODS}") } else { periods.to_string() };
     ColourBar {
-        label: "τ / T where locked",
+        label: "τ / T (pale: not locked)",
         colours: (first..=last).map(colour).collect(),
         ticks: (first..=last).map(|periods| (((periods - first) as f64 + 0.5) / count, number(periods))).collect(),
     }
@@ -147,12 +164,28 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_neighbouring_numbers_differ_and_only_locked_sets_have_one() {
+    fn each_number_of_periods_has_its_colour() {
         let hex = |periods| format!("{:?}", colour(periods));
         let all: std::collections::BTreeSet<String> = (0..=MOST_PERIODS + 1).map(hex).collect();
         assert_eq!(all.len(), MOST_PERIODS + 2);
         assert_eq!(hex(13), hex(40));
         assert_eq!(whole_periods(&set(1e-6, 0.02, 3.02)), Some(3));
-        assert_eq!(whole_periods(&SetSummary { is_locked: false, ..set(1e-6, 0.02, 3.0) }), None);
+    }
+
+    #[test]
+    fn sets_that_are_not_locked_are_pale() {
+        let mut sets = grid(8, 8);
+        let is_drawn = |sets: &[SetSummary], pale: bool| {
+            let ink = if pale { paler(colour(1)) } else { colour(1) };
+            let mut hex = String::new();
+            ink.write_svg(&mut hex);
+            // Besides the colour bar.
+            locking_map(sets).unwrap().svg().matches(&hex).count() > usize::from(!pale)
+        };
+        assert!(is_drawn(&sets, false) && !is_drawn(&sets, true));
+        for set in &mut sets {
+            set.is_locked = false;
+        }
+        assert!(!is_drawn(&sets, false) && is_drawn(&sets, true));
     }
 }

@@ -49,6 +49,12 @@ pub(super) struct Sheet {
     clips: usize,
 }
 
+/// The nearest whole pixel of the PNG: edges of cells that lie there show no seams.
+pub(super) fn snapped(place: f64) -> f64 {
+    let scale = f64::from(PIXELS_PER_UNIT);
+    (scale * place).round() / scale
+}
+
 /// An opaque colour, `#rrggbb`.
 pub(super) type Ink = &'static str;
 

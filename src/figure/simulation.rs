@@ -4,7 +4,7 @@ use super::FigureError;
 use super::axis::{Axis, bounds};
 use super::colour_bar::{COLOUR_BAR, ColourBar, shade, shades};
 use super::frame::{ABOVE, Frame, LEFT, RIGHT, UNDER};
-use super::picture::{BLACK, Picture, Sheet, Stroke};
+use super::picture::{BLACK, Picture, Sheet, Stroke, snapped};
 use kuva::render::color::Color;
 
 const NAME: &str = "simulation";
@@ -103,8 +103,6 @@ fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (map.times[instants - 1] - map.times[0]) / (instants - 1) as f64;
     let start_of = |column: usize| column * instants / columns;
-    // On whole pixels of the PNG, so that no seams appear.
-    let snapped = |place: f64| (2.0 * place).round() / 2.0;
     let left_of =
         |column: usize| snapped(frame.x_of(map.times[0] + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
     let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / map.blocks as f64));
