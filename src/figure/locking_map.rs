@@ -3,7 +3,7 @@
 
 use super::colour_bar::{COLOUR_BAR, ColourBar, shade, shades};
 use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, UNDER};
-use super::picture::{BLACK, INKS, LIGHT_GREY, Picture, Sheet, Stroke};
+use super::picture::{BLACK, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
 use super::sets::{Grid, MICROMETRES, Periods, distinct, swept};
 use crate::reduce::SetSummary;
 use kuva::render::color::Color;
@@ -19,7 +19,8 @@ const LEAST: usize = 8;
 const MOST_PERIODS: usize = 2 * INKS.len();
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
-const CASING: Stroke = Stroke::solid("#ffffff", 4.4);
+const CASING: Stroke = Stroke::solid(WHITE, 4.4);
+const WHITE: Ink = "#ffffff";
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of [`LEAST`] amplitudes and
 /// periods or more; `None` for others.
@@ -92,7 +93,7 @@ fn whole_periods(set: &SetSummary) -> Option<usize> {
 /// The colour of a number of periods, told apart from its neighbours by colour-blind readers, too.
 fn colour(periods: usize) -> Color {
     match periods {
-        0 => Color::from(BLACK),
+        0 => Color::from(WHITE),
         1..=MOST_PERIODS => {
             let ink = Color::from(INKS[(periods - 1) % INKS.len()]);
             if periods <= INKS.len() { ink } else { darker(ink) }
@@ -164,11 +165,13 @@ mod tests {
     }
 
     #[test]
-    fn each_number_of_periods_has_its_colour() {
-        let hex = |periods| format!("{:?}", colour(periods));
-        let all: std::collections::BTreeSet<String> = (0..=MOST_PERIODS + 1).map(hex).collect();
-        assert_eq!(all.len(), MOST_PERIODS + 2);
-        assert_eq!(hex(13), hex(40));
+    fn each_number_of_periods_has_its_colour_and_its_pale_colour() {
+        let hex = |colour: Color| format!("{colour:?}");
+        let pale = (1..=MOST_PERIODS + 1).map(|periods| hex(paler(colour(periods))));
+        let all: std::collections::BTreeSet<String> =
+            (0..=MOST_PERIODS + 1).map(|periods| hex(colour(periods))).chain(pale).collect();
+        assert_eq!(all.len(), 2 * MOST_PERIODS + 3);
+        assert_eq!(hex(colour(13)), hex(colour(40)));
         assert_eq!(whole_periods(&set(1e-6, 0.02, 3.02)), Some(3));
     }
 
