@@ -136,6 +136,24 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("reduce good extra", &["extra"]),
         ("plot theirs", &["theirs: is no results directory", "such as results/"]),
         ("plot good --from 3", &["--from"]),
+        ("completions", &["<SHELL>"]),
+        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
+    ];
+    assert!(table.len() >= 25);
+    for (arguments, words) in table {
+        assert_refused(&folder, arguments, words);
+    }
+}
+
+#[test]
+fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
+    let folder = Folder::new();
+    folder.write("good.toml", GOOD);
+    folder.write("grid.toml", "name = \"grid\"\n[axes]\nV0 = [1e-5, 1e-4]\nseed = { count = 3 }\n");
+    folder.write("plain.txt", "no TOML, no directory");
+    std::fs::create_dir(folder.path("empty")).unwrap();
+
+    let table: &[(&str, &[&str])] = &[
         // Parameters of a simulation.
         ("simulate --set V0", &["--set V0: must be KEY=VALUE, such as --set V0=1e-5"]),
         ("simulate --set velocity=3", &["--set velocity: no such key", "V0", "eta"]),
@@ -169,13 +187,29 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("simulate --trace a.parquet --slip-table a.parquet", &["--slip-table a.parquet", "give each its own"]),
         ("simulate --plot picture.pdf", &["--plot picture.pdf: must end in .svg or .png"]),
         ("simulate --plot picture", &["--plot picture: must end in .svg or .png"]),
-        ("simulate --plot a.png --time 1 --from 2", &["--from 2: must lie before the end, --time 1"]),
+        ("simulate --plot a.png --time 1 --from 2", &["--from 2: must lie before the end, 1 s"]),
         ("simulate --plot a.png --from -1", &["--from -1: must be a finite number >= 0, in s"]),
         ("simulate --trace a.parquet --sample 0", &["--sample 0: must be a finite number > 0, in s"]),
         ("simulate --trace a.parquet --sample 1e-12", &["--sample", "more than 1e8 samples", "take a longer one"]),
-        ("simulate fast", &["fast"]),
-        ("completions", &["<SHELL>"]),
-        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
+        ("simulate --plot a.png --until 0", &["--until 0: must be a finite number > 0, the first instant, in s"]),
+        ("simulate --plot a.png --from 1 --until 1", &["--until 1: must be a finite number > 1, the first instant"]),
+        ("simulate --plot a.png --plot a.png", &["--plot a.png", "give each its own"]),
+        ("simulate --plot a.png --plot b.pdf", &["--plot b.pdf: must end in .svg or .png"]),
+        ("simulate --plot a.png --panel drop", &["--panel", "force, map, both"]),
+        ("simulate --panel map", &["--plot"]),
+        ("simulate --until 1", &["--plot"]),
+        // Its sweep file.
+        ("simulate fast", &["fast: cannot be read", "check the path"]),
+        ("simulate grid.toml", &["sweep grid: has 6 jobs", "give each axis one value, or use `stickslip run`"]),
+        ("simulate good.toml --set N=4", &["'[SWEEP.toml]'", "--set"]),
+        ("simulate good.toml --slips 4", &["'[SWEEP.toml]'", "--slips"]),
+        ("simulate good.toml --time 1", &["'[SWEEP.toml]'", "--time"]),
+        ("simulate good.toml --discard 5", &["'[SWEEP.toml]'", "--discard"]),
+        ("simulate good.toml --max-events 5", &["'[SWEEP.toml]'", "--max-events"]),
+        ("simulate good.toml --precursor-size 5", &["'[SWEEP.toml]'", "--precursor-size"]),
+        ("simulate good.toml --solver event-driven", &["'[SWEEP.toml]'", "--solver"]),
+        ("simulate good.toml --tolerance 1e-4", &["'[SWEEP.toml]'", "--tolerance"]),
+        ("simulate good.toml --dt 1e-6", &["'[SWEEP.toml]'", "--dt"]),
     ];
     assert!(table.len() >= 25);
     for (arguments, words) in table {

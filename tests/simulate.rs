@@ -168,3 +168,36 @@ fn a_time_limit_ends_a_simulation() {
     // Slips of nine blocks are some 0.03 s apart, and five are start-up.
     assert!((1..=6).contains(&slips), "{slips}");
 }
+
+#[test]
+fn a_sweep_file_of_one_job_is_simulated_like_its_flags() {
+    let folder = Folder::new();
+    let text =
+        "name = \"one\"\n[model]\nN = 9\nDelta = 1e-6\nseed = 3\n[axes]\nfrequency = [58]\n[record]\nslips = 3\n";
+    folder.write("one.toml", text);
+    let simulated = |job: &str, table: &str| {
+        let report = folder.ends(0, &format!("simulate {job} --slip-table {table} --json")).stdout;
+        (program::json(&report)["job_id"].clone(), folder.file(table).cells)
+    };
+    let from_file = simulated("one.toml", "file.parquet");
+    let from_flags = simulated("--set N=9 --set Delta=1e-6 --set seed=3 --set frequency=58 --slips 3", "flags.parquet");
+    assert_eq!(from_file.1.len(), 3);
+    assert!(from_file == from_flags);
+}
+
+#[test]
+fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
+    let folder = Folder::new();
+    let asked = "--panel force --from 0.1 --until 0.18 --plot force.svg --plot force.png";
+    folder.ends(0, &format!("simulate --set N=9 --slips 4 {asked}"));
+    let force = std::fs::read_to_string(folder.path("force.svg")).unwrap();
+    assert!(std::fs::read(folder.path("force.png")).unwrap().starts_with(b"\x89PNG"));
+    assert!(force.contains("Shear force") && !force.contains("Position x"));
+    // The ends of the axis bear numbers, though 1800 samples of 1e-4 s are a hair more than 0.18 s; nothing lies beyond.
+    for (time, is_shown) in [("0.08", false), ("0.10", true), ("0.18", true), ("0.20", false)] {
+        assert_eq!(force.contains(&format!(">{time}<")), is_shown, "{time}");
+    }
+    folder.ends(0, "simulate --set N=9 --slips 4 --panel map --plot map.svg");
+    let map = std::fs::read_to_string(folder.path("map.svg")).unwrap();
+    assert!(map.contains("Position x") && map.contains("detached contacts (%)") && !map.contains("Shear force"));
+}

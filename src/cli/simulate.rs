@@ -1,28 +1,28 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The flags are turned into the text of a sweep with one point, so that values, messages and the id of the job are those
-//! of a sweep file.
+//! The job is that of a sweep file, or of flags, which are turned into the text of a sweep with one point: values, messages
+//! and the id of the job are the same.
 
+mod outputs;
+
+use self::outputs::{Records, check_outputs, write_pictures, write_records, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
-use anyhow::{Context, Result, anyhow};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-use stickslip::figure::{self, Picture};
-use stickslip::model::{ContactEvent, Parameters, Symbol, Value};
-use stickslip::observe::{AttachedMap, ContactLog, MapRow, Profile, SlipObserver, Together, Trace, TraceRow};
+use stickslip::model::{Parameters, Symbol, Value};
+use stickslip::observe::{AttachedMap, ContactLog, Profile, SlipObserver, Together, Trace};
 use stickslip::run::limits;
 use stickslip::solver::{self, Observer, Summary};
-use stickslip::store::columns::Table;
-use stickslip::store::dataset::{Footer, TableWriter};
-use stickslip::store::storage::Disk;
+use stickslip::store::dataset::Footer;
+use stickslip::store::tables;
 use stickslip::store::tables::{JobLabel, SlipRow};
-use stickslip::store::{records, tables};
-use stickslip::sweep::{Sweep, SweepError, predicted_interval};
+use stickslip::sweep::{Job, Sweep, SweepError};
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
@@ -31,10 +31,14 @@ Examples:
   stickslip simulate --slips 20
   stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
   stickslip simulate --set dfs=0 --slips 1 --contacts contacts.parquet
+  stickslip simulate sweeps/fig1d.toml --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
 
 Every key of the model can be set: N Ns M K Kd k fs dfs tau_r gamma V0 Delta T FN L break_on seed, in SI
 units; and eta or frequency (Hz) in place of T.")]
 pub struct Arguments {
+    /// Sweep file with exactly one job, in the place of the flags that name one
+    #[arg(value_name = "SWEEP.toml", conflicts_with_all = JOB_FLAGS)]
+    sweep: Option<PathBuf>,
     /// Set a parameter of the model; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
@@ -77,18 +81,42 @@ pub struct Arguments {
     /// Write the slips with the columns of a sweep, as Parquet
     #[arg(long, value_name = "FILE")]
     slip_table: Option<PathBuf>,
-    /// Draw the shear force and the attached fraction, as .svg or .png
+    /// Draw the shear force and the attached fraction, as .svg or .png; repeatable
     #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
+    plot: Vec<PathBuf>,
+    /// Panels of the plot
+    #[arg(long, value_enum, default_value_t = Panel::Both, requires = "plot")]
+    panel: Panel,
     /// Time between samples of trace, map and plot, in s
     #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
     sample: f64,
     /// First instant of the plot, in s
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "plot")]
     from: f64,
+    /// Last instant of the plot, in s [default: the end]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", requires = "plot")]
+    until: Option<f64>,
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    /// Whether there is a plot with this panel.
+    fn draws(&self, panel: Panel) -> bool {
+        !self.plot.is_empty() && (self.panel == panel || self.panel == Panel::Both)
+    }
+}
+
+/// Flags of the job; a sweep file tells them all.
+const JOB_FLAGS: [&str; 9] =
+    ["settings", "slips", "time", "discard", "max_events", "precursor_size", "solver", "tolerance", "dt"];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Panel {
+    Force,
+    Map,
+    Both,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -99,8 +127,6 @@ enum Method {
 
 /// Version of [`Report`] as JSON.
 const FORMAT: u32 = 1;
-/// More samples than this, of 24 bytes each, are a mistake.
-const MOST_SAMPLES: f64 = 1e8;
 
 #[derive(Serialize)]
 struct Report {
@@ -135,8 +161,11 @@ fn number(text: &str) -> Result<String, &'static str> {
 }
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
-    let sweep = Sweep::parse(&as_sweep(arguments)?, Path::new("flags")).map_err(as_flags)?;
-    let job = sweep.jobs().next().ok_or_else(|| UsageError("the flags name no job".to_owned()))?;
+    let sweep = match &arguments.sweep {
+        Some(path) => Sweep::from_file(path)?,
+        None => Sweep::parse(&as_sweep(arguments)?, Path::new("flags")).map_err(as_flags)?,
+    };
+    let job = only_job(&sweep)?;
     let parameters = &job.parameters;
     check_outputs(arguments, &sweep, parameters)?;
 
@@ -146,11 +175,10 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let mut profile = Profile::new(parameters);
     let mut log = ContactLog::default();
     let mut others: Vec<&mut dyn Observer> = Vec::new();
-    let plots = arguments.plot.is_some();
-    if plots || arguments.trace.is_some() {
+    if arguments.trace.is_some() || arguments.draws(Panel::Force) {
         others.push(&mut trace);
     }
-    if plots || arguments.map.is_some() {
+    if arguments.map.is_some() || arguments.draws(Panel::Map) {
         others.push(&mut map);
     }
     if arguments.profile.is_some() {
@@ -166,10 +194,8 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let wall = begin.elapsed().as_secs_f64();
 
     let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
-    write_records(arguments, &footer, &trace.rows, &map.rows, &log.events)?;
-    if let Some(path) = &arguments.profile {
-        write_table(path, records::profile(), &footer, profile.rows.iter().copied())?;
-    }
+    let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
+    write_records(arguments, &footer, recorded)?;
     let label = JobLabel {
         job_id: sweep.job_id(parameters).to_string(),
         set_id: sweep.set_id(parameters).to_string(),
@@ -179,11 +205,23 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         let rows = slips.slips().iter().map(|slip| SlipRow { job: &label, slip });
         write_table(path, tables::slips(), &footer, rows)?;
     }
-    if let Some(path) = &arguments.plot {
-        write_picture(path, &draw(parameters, &trace.rows, &map.rows, arguments.from)?)?;
-    }
+    write_pictures(arguments, parameters, &trace.rows, &map.rows)?;
     report(arguments.json, &label, &slips, &summary, wall)?;
     Ok(Exit::Done)
+}
+
+fn only_job(sweep: &Sweep) -> Result<Job> {
+    let mut jobs = sweep.jobs();
+    match (jobs.next(), jobs.count()) {
+        (Some(job), 0) => Ok(job),
+        (_, others) => {
+            let (name, count) = (sweep.name(), others + 1);
+            let problem = format!(
+                "sweep {name}: has {count} jobs, and one can be simulated; give each axis one value, or use `stickslip run`"
+            );
+            Err(UsageError(problem).into())
+        }
+    }
 }
 
 /// The flags as the text of a sweep with one point.
@@ -246,128 +284,6 @@ fn as_flags(error: SweepError) -> anyhow::Error {
         SweepError::Invalid { problem, .. } => UsageError(format!("in the flags: {problem}")).into(),
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     }
-}
-
-/// Refuses what could not be written, before anything runs.
-fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
-    let sample = arguments.sample;
-    if !(sample > 0.0 && sample.is_finite()) {
-        return Err(UsageError(format!("--sample {sample}: must be a finite number > 0, in s")).into());
-    }
-    if !(arguments.from >= 0.0 && arguments.from.is_finite()) {
-        return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.from)).into());
-    }
-    let recording = sweep.recording();
-    let longest = recording.max_time.unwrap_or(f64::INFINITY);
-    if arguments.plot.is_some() && arguments.from >= longest {
-        let problem = format!("--from {}: must lie before the end, --time {longest}", arguments.from);
-        return Err(UsageError(problem).into());
-    }
-    let cells = match arguments {
-        Arguments { map: None, plot: None, trace: None, .. } => 0,
-        Arguments { map: None, plot: None, .. } => 1,
-        _ => parameters.blocks,
-    };
-    let slips = recording.slips as f64 + recording.discard as f64;
-    let time = (slips * predicted_interval(parameters)).min(longest);
-    if time / sample * cells as f64 > MOST_SAMPLES {
-        let problem =
-            format!("--sample {sample}: more than {MOST_SAMPLES:e} samples in about {time:.3} s; take a longer one");
-        return Err(UsageError(problem).into());
-    }
-    if let Some(path) = &arguments.plot
-        && !matches!(path.extension().and_then(|extension| extension.to_str()), Some("svg" | "png"))
-    {
-        return Err(UsageError(format!("--plot {}: must end in .svg or .png", path.display())).into());
-    }
-    let outputs = [
-        ("--trace", &arguments.trace),
-        ("--map", &arguments.map),
-        ("--profile", &arguments.profile),
-        ("--contacts", &arguments.contacts),
-        ("--slip-table", &arguments.slip_table),
-        ("--plot", &arguments.plot),
-    ];
-    let mut paths = Vec::new();
-    for (flag, path) in outputs.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))) {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        // A device is not to be replaced by a file.
-        if !folder.is_dir() || (path.exists() && !path.is_file()) {
-            let path = path.display();
-            let problem = format!("{flag} {path}: cannot be written; its folder must exist, and it must be a file");
-            return Err(UsageError(problem).into());
-        }
-        if paths.contains(&path) {
-            let problem = format!("{flag} {}: another flag writes this file, too; give each its own", path.display());
-            return Err(UsageError(problem).into());
-        }
-        paths.push(path);
-    }
-    Ok(())
-}
-
-fn write_records(
-    arguments: &Arguments,
-    footer: &Footer,
-    trace: &[TraceRow],
-    map: &[MapRow],
-    events: &[ContactEvent],
-) -> Result<()> {
-    if let Some(path) = &arguments.trace {
-        write_table(path, records::trace(), footer, trace.iter().copied())?;
-    }
-    if let Some(path) = &arguments.map {
-        write_table(path, records::map(), footer, map.iter().copied())?;
-    }
-    if let Some(path) = &arguments.contacts {
-        write_table(path, records::contacts(), footer, events.iter().copied())?;
-    }
-    Ok(())
-}
-
-/// Writes a table beside its place and moves it there, so that no half of a file looks whole.
-fn write_table<Row>(path: &Path, table: Table<Row>, footer: &Footer, rows: impl Iterator<Item = Row>) -> Result<()> {
-    replace(path, |draft| {
-        let mut writer = TableWriter::create(&Disk, draft, table, footer)?;
-        for row in rows {
-            writer.push(&row)?;
-        }
-        Ok(writer.finish()?)
-    })
-}
-
-fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
-    let is_svg = path.extension().is_some_and(|extension| extension == "svg");
-    let bytes = if is_svg { picture.svg().into_bytes() } else { picture.png()? };
-    replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))
-}
-
-fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut draft = path.as_os_str().to_owned();
-    draft.push(".draft");
-    let draft = PathBuf::from(draft);
-    write(&draft)
-        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
-        .inspect_err(|_| {
-            // What remains of a draft is of no use; the first error is the one to tell.
-            let _ = std::fs::remove_file(&draft);
-        })
-        .with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn draw(parameters: &Parameters, trace: &[TraceRow], map: &[MapRow], from: f64) -> Result<Picture> {
-    let samples: Vec<(f64, f64)> =
-        trace.iter().filter(|row| row.time >= from).map(|row| (row.time, row.force)).collect();
-    let cells = || map.iter().filter(|row| row.time >= from);
-    let times: Vec<f64> = cells().step_by(parameters.blocks).map(|row| row.time).collect();
-    let fractions: Vec<f64> = cells().map(|row| row.attached_fraction).collect();
-    let map = figure::AttachedMap {
-        times: &times,
-        blocks: parameters.blocks,
-        fractions: &fractions,
-        length: parameters.slider_length,
-    };
-    figure::simulation(&samples, Some(map)).map_err(|error| anyhow!(UsageError(format!("--from {from}: {error}"))))
 }
 
 /// The parameters as JSON, under their keys.

@@ -90,6 +90,13 @@ impl Axis {
         Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
     }
 
+    /// Words at 0, 1, 2, ...
+    pub(super) fn words(label: &str, words: &[&str]) -> Self {
+        let ticks = words.iter().enumerate().map(|(place, word)| (place as f64, (*word).to_owned())).collect();
+        let high = words.len() as f64 - 0.5;
+        Self { label: label.to_owned(), low: -0.5, high, scale: Scale::Linear, ticks, minor: Vec::new() }
+    }
+
     /// Place of a value, 0 at the low end and 1 at the high end.
     pub(super) fn place(&self, value: f64) -> f64 {
         match self.scale {

@@ -1,15 +1,21 @@
 //! All figures that fit the reduced data of a sweep, written together.
 
-use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture, backbone, drag, histograms, intervals};
-use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{HistogramBin, SetLabel, WRITER, read_backbone, read_few_sets, read_histograms, read_points};
+use super::sets::{modulation, setting, swept};
+use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture};
+use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, staircase};
+use crate::model::{Parameters, Symbol};
+use crate::reduce::{HistogramBin, SetSummary, WRITER, read_backbone, read_histograms, read_points, read_sets};
 use crate::store::commit::{Commit, alone, create_folder};
 use crate::store::layout::Layout;
 use crate::store::storage::Storage;
 use std::path::PathBuf;
 
+/// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
+const MOST_SETS: usize = 100_000;
+
 /// Draws the figures of a results directory into `figures/`, each as SVG and PNG: φ against η and τ against T if the drive
-/// is modulated, both along the way if the modulation is ramped, histograms of τ if there are few sets.
+/// is modulated, both along the way if the modulation is ramped, histograms of τ if there are few sets, and those figures of
+/// sets whose conditions hold.
 ///
 /// Returns the files, in the order in which they were written.
 ///
@@ -28,9 +34,13 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
     if points.iter().any(|point| point.way.is_some() && point.interval.is_some()) {
         pictures.push(drag(&points)?);
     }
+    let sets = read_sets(storage, layout, MOST_SETS)?;
+    for figure in [locking_map, staircase, dependence, friction] {
+        pictures.extend(figure(&sets));
+    }
     // Each panel may hold a second set, of identical contacts.
-    let sets = read_few_sets(storage, layout, 2 * MOST_PANELS)?;
-    let panels = if sets.is_empty() { Vec::new() } else { panels(&sets, &read_histograms(storage, layout)?) };
+    let are_few = (1..=2 * MOST_PANELS).contains(&sets.len());
+    let panels = if are_few { panels(&sets, &read_histograms(storage, layout)?) } else { Vec::new() };
     if (1..=MOST_PANELS).contains(&panels.len()) {
         pictures.push(histograms(&panels)?);
     }
@@ -54,30 +64,26 @@ fn write(storage: &dyn Storage, layout: &Layout, pictures: &[Picture]) -> Result
 }
 
 /// A panel per set; one of identical contacts goes onto the panel of the set that it otherwise equals.
-fn panels(sets: &[SetLabel], bins: &[HistogramBin]) -> Vec<HistogramPanel> {
-    let bars = |set: &SetLabel| -> Vec<Bar> {
+fn panels(sets: &[SetSummary], bins: &[HistogramBin]) -> Vec<HistogramPanel> {
+    let bars = |set: &SetSummary| -> Vec<Bar> {
         bins.iter().filter(|bin| bin.set_id == set.set_id).map(|bin| (bin.low, bin.high, bin.density)).collect()
     };
     let identical = |parameters: &Parameters| Parameters { threshold_deviation: 0.0, ..parameters.clone() };
-    let is_identical = |set: &SetLabel| set.parameters.threshold_deviation == 0.0;
-    let twin = |set: &SetLabel| {
+    let is_identical = |set: &SetSummary| set.parameters.threshold_deviation == 0.0;
+    let twin = |set: &SetSummary| {
         sets.iter().find(|other| is_identical(other) && other.parameters == identical(&set.parameters))
     };
-    let is_overlaid = |set: &SetLabel| {
+    let is_overlaid = |set: &SetSummary| {
         is_identical(set)
             && sets.iter().any(|other| !is_identical(other) && identical(&other.parameters) == set.parameters)
     };
     // By rising frequency, as in Fig. 2; sets come in the order of Δ and then T.
-    let mut shown: Vec<&SetLabel> = sets.iter().filter(|set| !is_overlaid(set)).collect();
+    let mut shown: Vec<&SetSummary> = sets.iter().filter(|set| !is_overlaid(set)).collect();
     shown.sort_by(|left, right| {
         left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
     });
-    let swept: Vec<Symbol> = Symbol::ALL
-        .into_iter()
-        .filter(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed))
-        .filter(|&symbol| shown.iter().any(|set| set.parameters.get(symbol) != shown[0].parameters.get(symbol)))
-        .collect();
-    let panel = |set: &SetLabel| HistogramPanel {
+    let swept = swept(&shown);
+    let panel = |set: &SetSummary| HistogramPanel {
         title: title(&set.parameters, &swept),
         bars: bars(set),
         overlay: twin(set).filter(|_| !is_identical(set)).map(|twin| ("identical contacts".to_owned(), bars(twin))),
@@ -88,32 +94,8 @@ fn panels(sets: &[SetLabel], bins: &[HistogramBin]) -> Vec<HistogramPanel> {
 
 /// Modulation and whatever else differs between the sets.
 fn title(parameters: &Parameters, swept: &[Symbol]) -> String {
-    const MICROMETRES: f64 = 1e6;
-    let mut parts = match parameters.modulation_period {
-        Some(period) => vec![
-            format!("Δ = {} µm", three_digits(MICROMETRES * parameters.modulation_amplitude)),
-            format!("1/T = {} Hz", three_digits(1.0 / period)),
-        ],
-        None => vec!["Δ = 0".to_owned()],
-    };
-    parts.extend(swept.iter().map(|&symbol| {
-        let description = symbol.description();
-        let value = match parameters.get(symbol) {
-            Value::Real(real) => three_digits(real),
-            value => value.to_string(),
-        };
-        format!("{} = {value} {}", description.key, description.unit).trim_end().to_owned()
-    }));
-    parts.join(", ")
-}
-
-fn three_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // Through the decimal form, so that 29.000000000000004 is 29.
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+    let settings = swept.iter().map(|&symbol| setting(parameters, symbol));
+    std::iter::once(modulation(parameters)).chain(settings).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -124,14 +106,14 @@ mod tests {
     use crate::store::storage::Disk;
     use std::fs;
 
-    fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetLabel {
+    fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetSummary {
         let parameters = Parameters {
             threshold_deviation: deviation,
             modulation_amplitude: frequency.map_or(0.0, |_| 1e-6),
             modulation_period: frequency.map(|frequency| 1.0 / frequency),
             ..Parameters::default()
         };
-        SetLabel { set_id: id.to_owned(), parameters }
+        SetSummary { set_id: id.to_owned(), parameters, ..SetSummary::default() }
     }
 
     fn bin(id: &str, low: f64) -> HistogramBin {
@@ -213,11 +195,5 @@ mod tests {
         let still = Point { period: None, periods: None, phase: None, ..modulated(1) };
         let (_root, layout) = reduced(&[still]);
         assert!(draw_all(&Disk, &layout).unwrap().is_empty());
-    }
-
-    #[test]
-    fn numbers_in_titles_are_short() {
-        let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
-        assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
     }
 }

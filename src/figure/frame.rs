@@ -1,7 +1,7 @@
 //! Frames: a rectangle with two axes, the data in it, and a legend.
 
 use super::axis::Axis;
-use super::picture::{Anchor, BLACK, Dot, Ink, Sheet, Stroke};
+use super::picture::{Anchor, BLACK, Dot, Ink, Sheet, Stroke, snapped};
 
 /// Size of numbers at ticks. All sizes stay readable when a figure is printed at half its size.
 pub(super) const TICK_TEXT: u32 = 16;
@@ -21,7 +21,7 @@ const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;
 
-/// Where labels of y axes begin.
+/// Where labels of y axes begin, in the space left of a frame.
 const LABEL_LEFT: f64 = 14.0;
 
 /// Space left of a frame for numbers.
@@ -53,12 +53,13 @@ pub(super) enum Mark {
     Patch(Ink, f64),
 }
 
-/// Where a legend goes: over a corner of the frame that is known to be free, or beside it.
+/// Where a legend goes: over a corner of the frame that is known to be free, beside it, or, with one entry, above it.
 #[derive(Clone, Copy)]
 pub(super) enum LegendPlace {
     UpperRight,
     LowerRight,
     Beside,
+    Above,
 }
 
 impl Frame {
@@ -79,6 +80,13 @@ impl Frame {
         (self.x_of(x), self.y_of(y))
     }
 
+    /// x, y, width and height of a rectangle of data, on whole pixels.
+    pub(super) fn box_of(&self, x: (f64, f64), y: (f64, f64)) -> [f64; 4] {
+        let [left, right] = [x.0, x.1].map(|value| snapped(self.x_of(value)));
+        let [top, bottom] = [y.1, y.0].map(|value| snapped(self.y_of(value)));
+        [left, top, right - left, bottom - top]
+    }
+
     /// What `draw` draws appears inside the frame only.
     pub(super) fn clipped(&self, sheet: &mut Sheet, draw: impl FnOnce(&mut Sheet)) {
         sheet.clipped((self.left, self.top), (self.width, self.height), draw);
@@ -87,6 +95,13 @@ impl Frame {
     /// A curve through data points.
     pub(super) fn curve(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, stroke: Stroke) {
         sheet.line(points.into_iter().map(|point| self.place(point)).collect(), stroke);
+    }
+
+    /// A confidence interval, if there is one.
+    pub(super) fn error_bar(&self, sheet: &mut Sheet, x: f64, interval: Option<(f64, f64)>, ink: Ink) {
+        if let Some((low, high)) = interval {
+            self.curve(sheet, [(x, low), (x, high)], Stroke::solid(ink, 1.6));
+        }
     }
 
     /// Those data points that lie inside.
@@ -141,7 +156,7 @@ impl Frame {
 
     /// Label of the y axis, above its numbers.
     pub(super) fn y_label(&self, sheet: &mut Sheet) {
-        sheet.text((LABEL_LEFT, self.top - 13.0), &self.y.label, LABEL_TEXT, Anchor::Start);
+        sheet.text((self.left - LEFT + LABEL_LEFT, self.top - 13.0), &self.y.label, LABEL_TEXT, Anchor::Start);
     }
 
     /// A legend.
@@ -156,6 +171,7 @@ impl Frame {
             LegendPlace::UpperRight => (right - INSET - width, self.top + INSET),
             LegendPlace::LowerRight => (right - INSET - width, bottom - INSET - height),
             LegendPlace::Beside => (right + PADDING, self.top),
+            LegendPlace::Above => (self.left + 0.5 * (self.width - width), self.top - height - AXIS.width),
         };
         sheet.rectangle((left, top), (width, height), "#ffffff", 0.85);
         for (index, (mark, text)) in entries.iter().enumerate() {

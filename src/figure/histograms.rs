@@ -3,7 +3,7 @@
 use super::FigureError;
 use super::axis::{Axis, bounds};
 use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, RIGHT, UNDER, legend_space};
-use super::picture::{BLACK, Ink, LIGHT_GREY, Picture, RED, Sheet, Stroke};
+use super::picture::{BLACK, GREY, Ink, Picture, RED, Sheet, Stroke};
 
 const WIDTH: f64 = 660.0;
 const PANEL_HEIGHT: f64 = 160.0;
@@ -15,7 +15,7 @@ const MOST_MULTIPLES: f64 = 40.0;
 const BAR_INK: Ink = "#9db4d6";
 const OUTLINE: Stroke = Stroke::solid(BLACK, 1.3);
 const OVERLAY: Stroke = Stroke::dashed(RED, 2.0, (6.0, 3.5));
-const MULTIPLE: Stroke = Stroke::dashed(LIGHT_GREY, 1.1, (3.0, 3.0));
+const MULTIPLE: Stroke = Stroke::dashed(GREY, 1.1, (3.0, 3.0));
 
 /// A bar: from, to, in s, and its height in 1/s.
 pub type Bar = (f64, f64, f64);
@@ -51,13 +51,15 @@ pub fn histograms(panels: &[HistogramPanel]) -> Result<Picture, FigureError> {
     let margin = 0.04 * (high - low);
     for (index, panel) in panels.iter().enumerate() {
         let highest = all_bars(panel).iter().map(|bar| bar.2).fold(0.0, f64::max);
-        let rows = 1 + usize::from(panel.overlay.is_some());
+        let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
+        let multiples = multiples(panel.period, &x);
+        let rows = 1 + usize::from(panel.overlay.is_some()) + usize::from(!multiples.is_empty());
         let frame = Frame {
             left: LEFT,
             top: ABOVE + index as f64 * (PANEL_HEIGHT + GAP),
             width: WIDTH - LEFT - RIGHT,
             height: PANEL_HEIGHT,
-            x: Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin),
+            x,
             // The legend covers no bar.
             y: Axis::few(
                 "Probability density (1/s)",
@@ -65,7 +67,7 @@ pub fn histograms(panels: &[HistogramPanel]) -> Result<Picture, FigureError> {
                 highest * PANEL_HEIGHT / (PANEL_HEIGHT - legend_space(rows)),
             ),
         };
-        draw(&mut sheet, &frame, panel);
+        draw(&mut sheet, &frame, panel, &multiples);
         let is_last = index + 1 == panels.len();
         frame.axes(&mut sheet, is_last);
         if index == 0 {
@@ -78,14 +80,20 @@ pub fn histograms(panels: &[HistogramPanel]) -> Result<Picture, FigureError> {
     Ok(sheet.finish())
 }
 
-fn draw(sheet: &mut Sheet, frame: &Frame, panel: &HistogramPanel) {
+/// The multiples of a period on an axis, unless they are too many.
+fn multiples(period: Option<f64>, axis: &Axis) -> Vec<f64> {
+    let Some(period) = period.filter(|period| (axis.high - axis.low) / period <= MOST_MULTIPLES) else {
+        return Vec::new();
+    };
+    let first = (axis.low / period).ceil();
+    let multiples = (0..).map(|step| (first + f64::from(step)) * period);
+    multiples.take_while(|&multiple| multiple <= axis.high).collect()
+}
+
+fn draw(sheet: &mut Sheet, frame: &Frame, panel: &HistogramPanel, multiples: &[f64]) {
     frame.clipped(sheet, |sheet| {
-        if let Some(period) = panel.period.filter(|period| (frame.x.high - frame.x.low) / period <= MOST_MULTIPLES) {
-            let first = (frame.x.low / period).ceil();
-            let multiples = (0..).map(|step| (first + f64::from(step)) * period);
-            for multiple in multiples.take_while(|&multiple| multiple <= frame.x.high) {
-                frame.curve(sheet, [(multiple, 0.0), (multiple, frame.y.high)], MULTIPLE);
-            }
+        for &multiple in multiples {
+            frame.curve(sheet, [(multiple, 0.0), (multiple, frame.y.high)], MULTIPLE);
         }
         for &(low, high, density) in &panel.bars {
             let (left, top) = (frame.x_of(low), frame.y_of(density));
@@ -100,6 +108,9 @@ fn draw(sheet: &mut Sheet, frame: &Frame, panel: &HistogramPanel) {
     });
     let mut entries = vec![(Mark::Patch(BAR_INK, 1.0), panel.title.clone())];
     entries.extend(panel.overlay.iter().map(|(text, _)| (Mark::Line(OVERLAY), text.clone())));
+    if !multiples.is_empty() {
+        entries.push((Mark::Line(MULTIPLE), "τ = nT".to_owned()));
+    }
     frame.legend(sheet, LegendPlace::UpperRight, &entries);
 }
 
@@ -119,6 +130,15 @@ fn outline(bars: &[Bar]) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn multiples_of_the_period_are_marked_unless_they_would_fill_the_panel() {
+        let axis = Axis::linear("", 0.09, 0.21);
+        let marked = multiples(Some(0.05), &axis);
+        assert_eq!(marked.len(), 3);
+        assert!((marked[0] - 0.1).abs() < 1e-15 && (marked[2] - 0.2).abs() < 1e-15);
+        assert!(multiples(Some(0.001), &axis).is_empty() && multiples(None, &axis).is_empty());
+    }
 
     #[test]
     fn outlines_go_down_where_bars_are_missing() {

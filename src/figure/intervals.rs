@@ -3,19 +3,18 @@
 use super::FigureError;
 use super::axis::{Axis, bounds, logarithmic_bounds};
 use super::frame::{Frame, LEGEND, LegendPlace, Mark};
-use super::picture::{BLACK, Dot, GREY, Ink, Picture, Sheet, Stroke};
+use super::picture::{BLACK, Dot, GREY, INKS, Picture, Sheet, Stroke};
 use crate::reduce::Point;
 use std::collections::BTreeMap;
 
 const SIZE: (f64, f64) = (840.0, 500.0);
 const ANY_SLIP: Dot = Dot { ink: GREY, radius: 1.8, opacity: 0.4 };
 const LOCKED_SLIP: Dot = Dot { ink: BLACK, radius: 1.8, opacity: 0.4 };
-/// One ink per line, told apart by colour-blind readers too (Okabe and Ito).
-const INKS: [Ink; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 /// Least ratio of n between two lines: closer ones would merge.
 const APART: f64 = 1.4;
 
-/// Draws interval against period, both logarithmic, with the lines τ = nT of the most frequent n.
+/// Draws interval against period, both logarithmic, with the lines τ = nT of the most frequent n. Locked slips of such an n
+/// have the colour of its line.
 ///
 /// # Errors
 /// When no point has both an interval and a period.
@@ -43,6 +42,11 @@ pub fn intervals(points: &[Point]) -> Result<Picture, FigureError> {
         }
         for (locked, dot) in [(false, ANY_SLIP), (true, LOCKED_SLIP)] {
             frame.points(sheet, slips.iter().filter(|slip| slip.2 == locked).map(|slip| (slip.0, slip.1)), dot);
+        }
+        for (index, &n) in lines.iter().enumerate() {
+            let such = points.iter().filter(|point| point.is_locked && point.periods == Some(n));
+            let dot = Dot { ink: INKS[index], opacity: 1.0, ..LOCKED_SLIP };
+            frame.points(sheet, such.filter_map(|point| Some((point.period?, point.interval?))), dot);
         }
     });
     frame.axes(&mut sheet, true);

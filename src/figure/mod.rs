@@ -2,24 +2,34 @@
 
 mod axis;
 mod backbone;
+mod colour_bar;
+mod dependence;
 mod drag;
 mod draw;
 mod frame;
+mod friction;
 mod histograms;
 mod intervals;
+mod locking_map;
 mod picture;
 mod scaling;
+mod sets;
 mod simulation;
+mod staircase;
 mod work_precision;
 
 pub use backbone::backbone;
+pub use dependence::dependence;
 pub use drag::drag;
 pub use draw::draw_all;
+pub use friction::friction;
 pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
 pub use intervals::intervals;
+pub use locking_map::locking_map;
 pub use picture::Picture;
 pub use scaling::{Growth, Line, scaling};
 pub use simulation::{AttachedMap, simulation};
+pub use staircase::staircase;
 pub use work_precision::{WorkPrecision, work_precision};
 
 use crate::store::dataset::DatasetError;

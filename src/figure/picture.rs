@@ -49,6 +49,12 @@ pub(super) struct Sheet {
     clips: usize,
 }
 
+/// The nearest whole pixel of the PNG: edges of cells that lie there show no seams.
+pub(super) fn snapped(place: f64) -> f64 {
+    let scale = f64::from(PIXELS_PER_UNIT);
+    (scale * place).round() / scale
+}
+
 /// An opaque colour, `#rrggbb`.
 pub(super) type Ink = &'static str;
 
@@ -63,7 +69,7 @@ pub(super) const RED: Ink = "#d62020";
 /// The paper's averages.
 pub(super) const BLUE: Ink = "#1f55c4";
 
-/// For lines beside each other: colours that colour-blind readers tell apart.
+/// For lines beside each other: colours that colour-blind readers tell apart (Okabe and Ito).
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// A line's look.

@@ -2,18 +2,17 @@
 
 use super::FigureError;
 use super::axis::{Axis, bounds};
-use super::frame::{ABOVE, Frame, LEFT, LEGEND_TEXT, TICK_TEXT, UNDER};
-use super::picture::{Anchor, BLACK, Picture, Sheet, Stroke};
-use kuva::plot::ColorMap;
+use super::colour_bar::{COLOUR_BAR, ColourBar, shade, shades};
+use super::frame::{ABOVE, Frame, LEFT, RIGHT, UNDER};
+use super::picture::{BLACK, Picture, Sheet, Stroke, snapped};
 use kuva::render::color::Color;
 
+const NAME: &str = "simulation";
 const WIDTH: f64 = 760.0;
 const TRACE_HEIGHT: f64 = 230.0;
 const MAP_HEIGHT: f64 = 260.0;
 /// Between the trace and the map, whose label stands there.
 const GAP: f64 = 52.0;
-/// Right of the frames, for the colour bar and its numbers.
-const BESIDE: f64 = 92.0;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 /// A PNG has two pixels per unit; more columns would not be seen.
@@ -34,54 +33,48 @@ pub struct AttachedMap<'a> {
     pub length: f64,
 }
 
-/// Draws shear force in N against time in s, and the map if there is one.
+/// Draws shear force in N against time in s, the map, or the map under the force.
 ///
 /// # Errors
-/// When the trace has fewer than two samples, or the map does not have one fraction per instant and block.
-pub fn simulation(trace: &[(f64, f64)], map: Option<AttachedMap<'_>>) -> Result<Picture, FigureError> {
-    const NAME: &str = "simulation";
-    let map = map.filter(|map| map.times.len() > 1);
-    if map.is_some_and(|map| map.fractions.len() != map.times.len() * map.blocks) {
-        return Err(FigureError::Empty { figure: NAME, what: "fractions for every instant and block" });
+/// When what is given has fewer than two instants, or the map does not have one fraction per instant and block.
+pub fn simulation(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>) -> Result<Picture, FigureError> {
+    let empty = |what| FigureError::Empty { figure: NAME, what };
+    if map.is_some_and(|map| map.times.len() < 2 || map.fractions.len() != map.times.len() * map.blocks) {
+        return Err(empty("fractions for every instant and block"));
     }
-    let empty = FigureError::Empty { figure: NAME, what: "samples of the shear force" };
+    let instants = trace.into_iter().flatten().map(|sample| sample.0);
+    let instants = instants.chain(map.iter().flat_map(|map| map.times).copied());
     let (first, last) =
-        bounds(trace.iter().map(|sample| sample.0)).filter(|(first, last)| last > first).ok_or(empty)?;
-    let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
-    let map_height = map.map_or(0.0, |_| GAP + MAP_HEIGHT);
-    let mut sheet = Sheet::new(NAME, (WIDTH, ABOVE + TRACE_HEIGHT + map_height + UNDER));
-    let frame = Frame {
+        bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
+    let heights = trace.map(|_| TRACE_HEIGHT).into_iter().chain(map.map(|_| MAP_HEIGHT));
+    let height = heights.reduce(|above, below| above + GAP + below).unwrap_or_default();
+    let mut sheet = Sheet::new(NAME, (WIDTH, ABOVE + height + UNDER));
+    let mut frame = Frame {
         left: LEFT,
         top: ABOVE,
-        width: WIDTH - LEFT - BESIDE,
+        width: WIDTH - LEFT - if map.is_some() { COLOUR_BAR } else { RIGHT },
         height: TRACE_HEIGHT,
         x: Axis::linear("Time t (s)", first, last),
-        y: Axis::around("Shear force Fₛ (N)", least.min(0.0), most),
+        y: Axis::linear("", 0.0, 1.0),
     };
-    frame.clipped(&mut sheet, |sheet| frame.curve(sheet, thinned(trace, frame.width), TRACE));
-    frame.axes(&mut sheet, map.is_none());
-    frame.y_label(&mut sheet);
-    let Some(map) = map else {
-        frame.x_label(&mut sheet);
-        return Ok(sheet.finish());
-    };
-
-    let below = Frame {
-        top: ABOVE + TRACE_HEIGHT + GAP,
-        height: MAP_HEIGHT,
-        y: Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES),
-        ..frame
-    };
-    below.clipped(&mut sheet, |sheet| sheet.rectangles(cells(&below, &map)));
-    below.axes(&mut sheet, true);
-    below.x_label(&mut sheet);
-    below.y_label(&mut sheet);
-    colour_bar(&mut sheet, &below);
+    if let Some(trace) = trace {
+        let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
+        frame.y = Axis::around("Shear force Fₛ (N)", least.min(0.0), most);
+        frame.clipped(&mut sheet, |sheet| frame.curve(sheet, thinned(trace, frame.width), TRACE));
+        frame.axes(&mut sheet, map.is_none());
+        frame.y_label(&mut sheet);
+    }
+    if let Some(map) = map {
+        frame.top += trace.map_or(0.0, |_| TRACE_HEIGHT + GAP);
+        frame.height = MAP_HEIGHT;
+        frame.y = Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES);
+        frame.clipped(&mut sheet, |sheet| sheet.rectangles(cells(&frame, &map)));
+        frame.axes(&mut sheet, true);
+        frame.y_label(&mut sheet);
+        colour_bar().draw(&mut sheet, &frame);
+    }
+    frame.x_label(&mut sheet);
     Ok(sheet.finish())
-}
-
-fn colour(fraction: f64) -> Color {
-    Color::from(ColorMap::Viridis.map(fraction.clamp(0.0, 1.0)))
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
@@ -110,8 +103,6 @@ fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (map.times[instants - 1] - map.times[0]) / (instants - 1) as f64;
     let start_of = |column: usize| column * instants / columns;
-    // On whole pixels of the PNG, so that no seams appear.
-    let snapped = |place: f64| (2.0 * place).round() / 2.0;
     let left_of =
         |column: usize| snapped(frame.x_of(map.times[0] + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
     let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / map.blocks as f64));
@@ -129,34 +120,17 @@ fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
         for run in levels.chunk_by(|left, right| left == right) {
             let (left, right) = (left_of(column), left_of(column + run.len()));
             // A hair over the next cell, which covers it: viewers that scale show no seams.
-            cells.push(([left, top, right - left + 0.5, bottom - top + 0.5], colour(run[0] / LEVELS)));
+            cells.push(([left, top, right - left + 0.5, bottom - top + 0.5], shade(run[0] / LEVELS)));
             column += run.len();
         }
     }
     cells
 }
 
-/// The colours beside a frame, in percent.
-fn colour_bar(sheet: &mut Sheet, frame: &Frame) {
-    const STEPS: u32 = 64;
-    const BAR_WIDTH: f64 = 18.0;
-    let left = frame.left + frame.width + 20.0;
-    let height = frame.height / f64::from(STEPS);
-    let bar = (0..STEPS).map(|step| {
-        let top = frame.top + frame.height - f64::from(step + 1) * height;
-        ([left, top, BAR_WIDTH, height + 0.5], colour(f64::from(step) / f64::from(STEPS - 1)))
-    });
-    sheet.clipped((left, frame.top), (BAR_WIDTH, frame.height), |sheet| sheet.rectangles(bar));
-    let (right, bottom) = (left + BAR_WIDTH, frame.top + frame.height);
-    let border = Stroke::solid(BLACK, 1.2);
-    sheet.line(vec![(left, frame.top), (right, frame.top), (right, bottom), (left, bottom), (left, frame.top)], border);
-    for percent in [0.0, 25.0, 50.0, 75.0, 100.0] {
-        let y = bottom - percent / 100.0 * frame.height;
-        sheet.line(vec![(right, y), (right + 5.0, y)], border);
-        let place = (right + 9.0, y + 0.36 * f64::from(TICK_TEXT));
-        sheet.text(place, &percent.to_string(), TICK_TEXT, Anchor::Start);
-    }
-    sheet.text((WIDTH - 14.0, frame.top - 13.0), "attached contacts (%)", LEGEND_TEXT, Anchor::End);
+/// The colours beside a frame, in percent of detached contacts as in Fig. 4: bright where all are attached.
+fn colour_bar() -> ColourBar {
+    let ticks = [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (1.0 - percent / 100.0, percent.to_string()));
+    ColourBar { label: "detached contacts (%)", colours: shades(), ticks: ticks.to_vec() }
 }
 
 #[cfg(test)]
@@ -178,8 +152,25 @@ mod tests {
     fn a_map_of_the_wrong_size_is_refused() {
         let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 5], length: 0.15 };
         let trace = [(0.0, 1.0), (1.0, 2.0)];
-        assert!(simulation(&trace, Some(map)).is_err());
-        assert!(simulation(&trace, Some(AttachedMap { fractions: &[1.0; 6], ..map })).is_ok());
-        assert!(simulation(&trace[..1], None).is_err());
+        assert!(simulation(Some(&trace), Some(map)).is_err());
+        assert!(simulation(Some(&trace), Some(AttachedMap { fractions: &[1.0; 6], ..map })).is_ok());
+        assert!(simulation(Some(&trace[..1]), None).is_err());
+        assert!(simulation(None, None).is_err());
+    }
+
+    #[test]
+    fn what_is_asked_for_is_drawn_and_labelled_once() {
+        let trace = [(0.0, 1.0), (1.0, 2.0)];
+        let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
+        let (force, position, bar) = (">Shear force Fₛ (N)<", ">Position x (mm)<", ">detached contacts (%)<");
+        let panels =
+            [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
+        for (has_trace, has_map, labels) in panels {
+            let svg = simulation(has_trace.then_some(&trace[..]), has_map.then_some(map)).unwrap().svg();
+            for label in [force, position, bar] {
+                assert_eq!(svg.matches(label).count(), usize::from(labels.contains(&label)), "{label}");
+            }
+            assert_eq!(svg.matches(">Time t (s)<").count(), 1);
+        }
     }
 }

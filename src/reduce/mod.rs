@@ -15,7 +15,7 @@ pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
 pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
 pub use moments::{Moments, quantile};
 pub use point::{MOST_POINTS, Point, Way, points};
-pub use read::{SetLabel, read_backbone, read_few_sets, read_histograms, read_points};
+pub use read::{SetSummary, Statistic, read_backbone, read_histograms, read_points, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
 pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow, sets};

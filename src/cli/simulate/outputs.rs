@@ -1,0 +1,172 @@
+//! The files of `stickslip simulate`: tables and pictures, checked before anything runs.
+
+use super::super::exit::UsageError;
+use super::{Arguments, Panel};
+use anyhow::{Context, Result, anyhow};
+use std::path::{Path, PathBuf};
+use stickslip::figure::{self, Picture};
+use stickslip::model::{ContactEvent, Parameters};
+use stickslip::observe::{MapRow, ProfileRow, TraceRow};
+use stickslip::store::columns::Table;
+use stickslip::store::dataset::{Footer, TableWriter};
+use stickslip::store::records;
+use stickslip::store::storage::Disk;
+use stickslip::sweep::{Sweep, predicted_interval};
+
+/// More samples than this, of 24 bytes each, are a mistake.
+const MOST_SAMPLES: f64 = 1e8;
+
+/// Refuses what could not be written, before anything runs.
+pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
+    let sample = arguments.sample;
+    if !(sample > 0.0 && sample.is_finite()) {
+        return Err(UsageError(format!("--sample {sample}: must be a finite number > 0, in s")).into());
+    }
+    if !(arguments.from >= 0.0 && arguments.from.is_finite()) {
+        return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.from)).into());
+    }
+    let recording = sweep.recording();
+    let longest = recording.max_time.unwrap_or(f64::INFINITY);
+    if arguments.from >= longest {
+        let problem = format!("--from {}: must lie before the end, {longest} s", arguments.from);
+        return Err(UsageError(problem).into());
+    }
+    if let Some(until) = arguments.until.filter(|until| !(*until > arguments.from && until.is_finite())) {
+        let problem = format!("--until {until}: must be a finite number > {}, the first instant, in s", arguments.from);
+        return Err(UsageError(problem).into());
+    }
+    let maps = arguments.map.is_some() || arguments.draws(Panel::Map);
+    let traces = arguments.trace.is_some() || arguments.draws(Panel::Force);
+    let cells = if maps { parameters.blocks } else { usize::from(traces) };
+    let slips = recording.slips as f64 + recording.discard as f64;
+    let time = (slips * predicted_interval(parameters)).min(longest);
+    if time / sample * cells as f64 > MOST_SAMPLES {
+        let problem =
+            format!("--sample {sample}: more than {MOST_SAMPLES:e} samples in about {time:.3} s; take a longer one");
+        return Err(UsageError(problem).into());
+    }
+    let is_picture = |path: &&PathBuf| matches!(extension(path), Some("svg" | "png"));
+    if let Some(path) = arguments.plot.iter().find(|path| !is_picture(path)) {
+        return Err(UsageError(format!("--plot {}: must end in .svg or .png", path.display())).into());
+    }
+    let tables = [
+        ("--trace", &arguments.trace),
+        ("--map", &arguments.map),
+        ("--profile", &arguments.profile),
+        ("--contacts", &arguments.contacts),
+        ("--slip-table", &arguments.slip_table),
+    ];
+    let tables = tables.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?)));
+    let mut paths = Vec::new();
+    for (flag, path) in tables.chain(arguments.plot.iter().map(|path| ("--plot", path))) {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        // A device is not to be replaced by a file.
+        if !folder.is_dir() || (path.exists() && !path.is_file()) {
+            let path = path.display();
+            let problem = format!("{flag} {path}: cannot be written; its folder must exist, and it must be a file");
+            return Err(UsageError(problem).into());
+        }
+        if paths.contains(&path) {
+            let problem = format!("{flag} {}: another flag writes this file, too; give each its own", path.display());
+            return Err(UsageError(problem).into());
+        }
+        paths.push(path);
+    }
+    Ok(())
+}
+
+/// What the observers of a simulation recorded; empty where nothing asked for it.
+#[derive(Clone, Copy)]
+pub(super) struct Records<'a> {
+    pub trace: &'a [TraceRow],
+    pub map: &'a [MapRow],
+    pub profile: &'a [ProfileRow],
+    pub events: &'a [ContactEvent],
+}
+
+pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: Records<'_>) -> Result<()> {
+    if let Some(path) = &arguments.trace {
+        write_table(path, records::trace(), footer, recorded.trace.iter().copied())?;
+    }
+    if let Some(path) = &arguments.map {
+        write_table(path, records::map(), footer, recorded.map.iter().copied())?;
+    }
+    if let Some(path) = &arguments.profile {
+        write_table(path, records::profile(), footer, recorded.profile.iter().copied())?;
+    }
+    if let Some(path) = &arguments.contacts {
+        write_table(path, records::contacts(), footer, recorded.events.iter().copied())?;
+    }
+    Ok(())
+}
+
+/// Writes a table beside its place and moves it there, so that no half of a file looks whole.
+pub(super) fn write_table<Row>(
+    path: &Path,
+    table: Table<Row>,
+    footer: &Footer,
+    rows: impl Iterator<Item = Row>,
+) -> Result<()> {
+    replace(path, |draft| {
+        let mut writer = TableWriter::create(&Disk, draft, table, footer)?;
+        for row in rows {
+            writer.push(&row)?;
+        }
+        Ok(writer.finish()?)
+    })
+}
+
+/// Draws the plot into each file that was asked for.
+pub(super) fn write_pictures(
+    arguments: &Arguments,
+    parameters: &Parameters,
+    trace: &[TraceRow],
+    map: &[MapRow],
+) -> Result<()> {
+    if arguments.plot.is_empty() {
+        return Ok(());
+    }
+    let picture = draw(arguments, parameters, trace, map)?;
+    for path in &arguments.plot {
+        let bytes = if extension(path) == Some("svg") { picture.svg().into_bytes() } else { picture.png()? };
+        replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))?;
+    }
+    Ok(())
+}
+
+fn extension(path: &Path) -> Option<&str> {
+    path.extension().and_then(|extension| extension.to_str())
+}
+
+fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let mut draft = path.as_os_str().to_owned();
+    draft.push(".draft");
+    let draft = PathBuf::from(draft);
+    write(&draft)
+        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
+        .inspect_err(|_| {
+            // What remains of a draft is of no use; the first error is the one to tell.
+            let _ = std::fs::remove_file(&draft);
+        })
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map: &[MapRow]) -> Result<Picture> {
+    // The sample at an end is shown, however its time is rounded.
+    let slack = 1e-6 * arguments.sample;
+    let shown = arguments.from - slack..=arguments.until.unwrap_or(f64::INFINITY) + slack;
+    let samples: Vec<(f64, f64)> =
+        trace.iter().filter(|row| shown.contains(&row.time)).map(|row| (row.time, row.force)).collect();
+    let cells = || map.iter().filter(|row| shown.contains(&row.time));
+    let times: Vec<f64> = cells().step_by(parameters.blocks).map(|row| row.time).collect();
+    let fractions: Vec<f64> = cells().map(|row| row.attached_fraction).collect();
+    let map = figure::AttachedMap {
+        times: &times,
+        blocks: parameters.blocks,
+        fractions: &fractions,
+        length: parameters.slider_length,
+    };
+    let trace = arguments.draws(Panel::Force).then_some(samples.as_slice());
+    figure::simulation(trace, arguments.draws(Panel::Map).then_some(map))
+        .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.from))))
+}

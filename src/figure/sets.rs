@@ -1,0 +1,218 @@
+//! Sets beside each other: in what they differ, what each is called, and the grid on which they lie.
+
+use super::axis::{Axis, logarithmic_bounds};
+use crate::model::{Parameters, Symbol, Value};
+use crate::reduce::SetSummary;
+
+/// Steps of an axis that differ by less than this share are even: whole numbers are rounded.
+const EVEN: f64 = 0.02;
+pub(super) const MICROMETRES: f64 = 1e6;
+
+/// Parameters other than those of the modulation in which sets differ.
+pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {
+    let is_swept = |symbol: &Symbol| {
+        !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed)
+            && sets.iter().any(|set| set.parameters.get(*symbol) != sets[0].parameters.get(*symbol))
+    };
+    Symbol::ALL.into_iter().filter(is_swept).collect()
+}
+
+/// The distinct values of a quantity, ascending.
+pub(super) fn distinct<'a>(
+    sets: impl IntoIterator<Item = &'a SetSummary>,
+    quantity: impl Fn(&Parameters) -> Option<f64>,
+) -> Vec<f64> {
+    let mut values: Vec<f64> = sets.into_iter().filter_map(|set| quantity(&set.parameters)).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    values
+}
+
+/// Amplitude and frequency of a modulation, in symbols.
+pub(super) fn modulation(parameters: &Parameters) -> String {
+    let amplitude = amplitude(parameters.modulation_amplitude);
+    match parameters.modulation_period {
+        Some(period) => format!("{amplitude}, {}", frequency(period)),
+        None => amplitude,
+    }
+}
+
+/// An amplitude in m, in symbols.
+pub(super) fn amplitude(amplitude: f64) -> String {
+    if amplitude == 0.0 { "Δ = 0".to_owned() } else { format!("Δ = {} µm", three_digits(MICROMETRES * amplitude)) }
+}
+
+/// The frequency of a period in s, in symbols.
+pub(super) fn frequency(period: f64) -> String {
+    format!("1/T = {} Hz", three_digits(1.0 / period))
+}
+
+/// A parameter and its value, in symbols.
+pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
+    let description = symbol.description();
+    let value = match parameters.get(symbol) {
+        Value::Real(real) => three_digits(real),
+        value => value.to_string(),
+    };
+    format!("{} = {value} {}", description.key, description.unit).trim_end().to_owned()
+}
+
+fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Through the decimal form, so that 29.000000000000004 is 29.
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+/// Values of a swept quantity and how they are spaced.
+pub(super) struct Grid {
+    /// Ascending.
+    values: Vec<f64>,
+    is_linear: bool,
+}
+
+impl Grid {
+    /// Linear if the steps are even or a value is not > 0, else logarithmic. `values` ascend.
+    pub(super) fn of(values: Vec<f64>) -> Self {
+        let is_linear = has_even_steps(&values) || values.first().is_none_or(|&least| least <= 0.0);
+        Self { values, is_linear }
+    }
+
+    /// An axis for cells: it ends half a step beyond the values.
+    pub(super) fn axis(&self, label: &str) -> Axis {
+        let (low, high) = (self.cell(0).0, self.cell(self.values.len() - 1).1);
+        if self.is_linear { Axis::linear(label, low, high) } else { Axis::logarithmic(label, low, high) }
+    }
+
+    /// An axis for points at the values, a little wider than them.
+    pub(super) fn wider_axis(&self, label: &str) -> Axis {
+        const MARGIN: f64 = 0.05;
+        let (low, high) = (self.values[0], self.values[self.values.len() - 1]);
+        match logarithmic_bounds(self.values.iter().copied()) {
+            Some((low, high)) if !self.is_linear => Axis::logarithmic(label, low, high),
+            _ => Axis::linear(label, low - MARGIN * (high - low), high + MARGIN * (high - low)),
+        }
+    }
+
+    /// The ends of the cell around the value with this index: halfway to its neighbours.
+    pub(super) fn cell(&self, index: usize) -> (f64, f64) {
+        let at = |index: usize| if self.is_linear { self.values[index] } else { libm::log(self.values[index]) };
+        let last = self.values.len() - 1;
+        let below = if index > 0 { at(index) - at(index - 1) } else { at(1.min(last)) - at(0) };
+        let above = if index < last { at(index + 1) - at(index) } else { below };
+        let (low, high) = (at(index) - 0.5 * below, at(index) + 0.5 * above);
+        if self.is_linear { (low, high) } else { (libm::exp(low), libm::exp(high)) }
+    }
+
+    /// The cell around a value of the grid.
+    pub(super) fn cell_of(&self, value: f64) -> (f64, f64) {
+        self.cell(self.values.partition_point(|&other| other < value).min(self.values.len() - 1))
+    }
+}
+
+fn has_even_steps(values: &[f64]) -> bool {
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let mean = steps().sum::<f64>() / steps().count() as f64;
+    steps().all(|step| (step - mean).abs() <= EVEN * mean)
+}
+
+/// Periods as an axis: T, or 1/T if its steps are even and those of T are not; over those without modulation if that is
+/// known.
+pub(super) struct Periods {
+    pub(super) grid: Grid,
+    pub(super) label: &'static str,
+    is_inverse: bool,
+    unit: f64,
+}
+
+impl Periods {
+    /// `periods` in s ascend; `free` is the mean interval τ₀ without modulation, in s.
+    pub(super) fn of(periods: &[f64], free: Option<f64>) -> Self {
+        let inverse: Vec<f64> = periods.iter().rev().map(|period| 1.0 / period).collect();
+        let is_inverse = !has_even_steps(periods) && has_even_steps(&inverse);
+        let label = match (is_inverse, free) {
+            (false, None) => "Modulation period T (s)",
+            (false, Some(_)) => "Modulation period T / τ₀",
+            (true, None) => "Modulation frequency 1/T (Hz)",
+            (true, Some(_)) => "Modulation frequency τ₀ / T",
+        };
+        let mut axis = Self { grid: Grid::of(vec![1.0]), label, is_inverse, unit: free.unwrap_or(1.0) };
+        let mut places: Vec<f64> = periods.iter().map(|&period| axis.place(period)).collect();
+        places.sort_by(f64::total_cmp);
+        axis.grid = Grid::of(places);
+        axis
+    }
+
+    /// Where a period in s stands on the axis.
+    pub(super) fn place(&self, period: f64) -> f64 {
+        if self.is_inverse { self.unit / period } else { period / self.unit }
+    }
+
+    /// The period in s at a place; the inverse of [`Periods::place`].
+    pub(super) fn period(&self, place: f64) -> f64 {
+        if self.is_inverse { self.unit / place } else { place * self.unit }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::reduce::Statistic;
+
+    /// A set at Δ in m and T in s that locks to `periods` of T.
+    pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetSummary {
+        let tau = periods * period;
+        let statistic = |value: f64| Some(Statistic { value, interval: Some((0.9 * value, 1.1 * value)) });
+        let parameters =
+            Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() };
+        SetSummary {
+            set_id: format!("{amplitude:e} {period:e}"),
+            parameters: parameters.validated().unwrap(),
+            tau_mean: statistic(tau),
+            tau_deviation: Some(0.1 * tau),
+            tau_quartiles: Some([0.98 * tau, tau, 1.02 * tau]),
+            is_locked: amplitude > 0.0,
+            locking_index: statistic(0.8).filter(|_| amplitude > 0.0),
+            resultant_length: statistic(0.7).filter(|_| amplitude > 0.0),
+            peak_force: Some(480.0),
+            mean_friction: statistic(280.0 - 1e7 * amplitude),
+        }
+    }
+
+    #[test]
+    fn numbers_in_titles_are_short() {
+        let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
+        assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
+    }
+
+    #[test]
+    fn cells_meet_and_lie_around_their_values() {
+        for values in [vec![1.0, 2.0, 3.0, 4.0], vec![0.1, 0.2, 0.4, 3.0], vec![0.0, 1.0, 5.0]] {
+            let grid = Grid::of(values.clone());
+            for index in 0..values.len() {
+                let (low, high) = grid.cell(index);
+                assert!(low < values[index] && values[index] < high, "{values:?}");
+                assert_eq!(grid.cell_of(values[index]), (low, high));
+                if index > 0 {
+                    assert!((grid.cell(index - 1).1 / low - 1.0).abs() < 1e-12, "{values:?}");
+                }
+            }
+        }
+        assert!(Grid::of(vec![7.0]).axis("").ticks.len() < 9, "a single value");
+    }
+
+    #[test]
+    fn what_was_swept_in_even_steps_becomes_the_axis() {
+        let frequencies = [10.0, 20.0, 30.0, 40.0];
+        let mut periods: Vec<f64> = frequencies.iter().map(|frequency| 1.0 / frequency).collect();
+        periods.sort_by(f64::total_cmp);
+        let axis = Periods::of(&periods, None);
+        assert_eq!(axis.label, "Modulation frequency 1/T (Hz)");
+        assert!((axis.place(0.05) - 20.0).abs() < 1e-12 && (axis.period(20.0) - 0.05).abs() < 1e-15);
+        let axis = Periods::of(&[0.1, 0.2, 0.4, 0.8], Some(0.1));
+        assert_eq!(axis.label, "Modulation period T / τ₀");
+        assert!((axis.place(0.2) - 2.0).abs() < 1e-12 && (axis.period(2.0) - 0.2).abs() < 1e-15);
+    }
+}

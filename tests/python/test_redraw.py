@@ -1,0 +1,41 @@
+"""The script that redraws figures shows all reduced data, on what the program wrote."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import redraw  # noqa: E402
+
+
+def drawn(axes):
+    """Number of points in the lines of some axes."""
+    return sum(len(line.get_xdata()) for line in axes.get_lines())
+
+
+def test_every_slip_and_every_set_is_drawn(results):
+    points = pd.read_parquet(results / "reduced" / "points.parquet")
+    bins = pd.read_parquet(results / "reduced" / "backbone.parquet")
+    (axes,) = redraw.phase_eta(results).axes
+    slips = axes.get_lines()[:2]
+    assert sum(len(line.get_xdata()) for line in slips) == points["phase"].notna().sum() > 0
+    assert list(axes.get_lines()[2].get_xdata()) == list(bins["eta_centre"])
+
+    sets = pd.read_parquet(results / "reduced" / "sets.parquet").dropna(subset="T")
+    above, below = redraw.staircase(results).axes
+    assert drawn(above) == drawn(below) == len(sets) > 0
+    assert above.get_lines()[0].get_ydata() == pytest.approx(sets["tau_50"] / sets["T"])
+
+
+def test_the_script_writes_its_figures(results, tmp_path):
+    script = ROOT / "scripts" / "redraw.py"
+    done = subprocess.run([sys.executable, script, results], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["phase-eta.png", "staircase.png"]
+    for name in done.stdout.split():
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
