@@ -158,6 +158,8 @@ def main():
     try:
         log, footer = contact_log.read(options.log)
         parameters = contact_log.parameters_from(options, footer)
+        if parameters.ramp_time > 0:
+            raise LogError("the modulation is ramped, which is not followed here; oracle.py does")
         contact_log.check(log, parameters)
         # A few more than are compared: within the limits, two breaks may come in either order.
         replay = oracle.Replay(parameters, log, options.breaks + parameters.Ns, np.inf).run()
