@@ -94,6 +94,28 @@ impl Segment<'_> {
         Some((time, -mirrored))
     }
 
+    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the first
+    /// and the last maximum and minimum; those in between lie on lines between them.
+    pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
+        match self.path {
+            ForcePath::Polynomial { coefficients, first, scale, .. } => {
+                let last = first + self.duration / scale;
+                polynomial::for_each_turn(coefficients, first, last, &mut |s| {
+                    visit(self.start + (s - first) * scale, polynomial::value(coefficients, s));
+                });
+            }
+            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
+                let crests =
+                    |sign: f64| harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+                let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)].concat().into_iter().flatten().collect();
+                turns.sort_by(f64::total_cmp);
+                for elapsed in turns {
+                    visit(self.start + elapsed, self.force_after(elapsed));
+                }
+            }
+        }
+    }
+
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
