@@ -43,7 +43,7 @@ enum Command {
     Plot(reduce::PlotArguments),
     Verify(verify::Arguments),
     Compact(compact::Arguments),
-    Simulate(simulate::Arguments),
+    Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
     Completions(completions::Arguments),
 }

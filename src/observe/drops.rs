@@ -53,6 +53,14 @@ impl DropDetector {
     }
 
     pub(super) fn advance(&mut self, segment: &Segment<'_>) {
+        let (low, high) = segment.bounds();
+        let tells_nothing = match self.bottom {
+            None => high <= self.top.force && low > self.top.force - self.least,
+            Some(bottom) => low >= bottom.force && high < bottom.force + self.least,
+        };
+        if tells_nothing {
+            return;
+        }
         segment.for_each_turn(|time, force| self.follow(Instant { time, force }));
         self.follow(Instant { time: segment.end(), force: segment.end_force() });
     }
@@ -62,14 +70,13 @@ impl DropDetector {
         match &mut self.bottom {
             None if now.force >= self.top.force => self.top = now,
             None if now.force <= self.top.force - self.least => self.bottom = Some(now),
-            None => {}
             Some(bottom) if now.force <= bottom.force => *bottom = now,
             Some(bottom) if now.force >= bottom.force + self.least => {
                 let bottom = *bottom;
                 self.drops.extend(self.drop_to(bottom));
                 (self.top, self.bottom) = (now, None);
             }
-            Some(_) => {}
+            _ => {}
         }
     }
 
