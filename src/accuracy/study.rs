@@ -60,9 +60,9 @@ impl Study {
     pub fn full() -> Self {
         Self {
             velocities: vec![1e-4, 1e-5, 1e-6],
-            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]),
+            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
             seeds: 8,
-            first_drive_multiple: 10,
+            first_drive_multiple: 8,
             slips: 100,
             breaks: 100,
             followed_breaks: 30_000,
@@ -76,7 +76,6 @@ impl Study {
     #[must_use]
     pub fn quick() -> Self {
         Self {
-            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
             seeds: 2,
             first_drive_multiple: 1,
             slips: 12,

@@ -28,10 +28,10 @@ pub struct Arguments {
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
-    /// Fewer settings and slips
+    /// Fewer slips, or sizes
     #[arg(long)]
     quick: bool,
-    /// Realisations of each ensemble; ten times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
+    /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
     /// [default: 8, with --quick 2]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
