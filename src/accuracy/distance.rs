@@ -1,8 +1,9 @@
-//! After chaos: distances between two samples of slips, with bootstrap intervals.
+//! After chaos: how far the distributions of two samples of slips are apart, with bootstrap intervals.
 //!
-//! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Resampling draws blocks of
-//! consecutive slips, since neighbours are correlated, and is keyed: the same samples give the same intervals. Both distances
-//! are positive even between samples of the same distribution; the floor says how large that is.
+//! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Both are positive even
+//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation have a
+//! sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is keyed: the same
+//! samples give the same intervals.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -30,13 +31,28 @@ pub struct Distance {
     pub floor: f64,
 }
 
-/// Wasserstein-1 and Kolmogorov-Smirnov distances.
+/// A difference with its 95 % interval. Zero outside of the interval: a bias that the samples show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bias {
+    /// Of the sample less the reference.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+}
+
+/// What sets a sample apart from a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distances {
     /// ∫ |F - G|.
     pub wasserstein: Distance,
     /// max |F - G|.
     pub kolmogorov: Distance,
+    /// Of the mean.
+    pub mean: Bias,
+    /// Of the standard deviation.
+    pub deviation: Bias,
 }
 
 /// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. `key` keeps the random numbers
@@ -47,27 +63,63 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
         return None;
     }
     let mut generator = ChaCha8Rng::seed_from_u64(key);
-    let (value_wasserstein, value_kolmogorov) = both(&sorted(sample), &sorted(reference));
-    let (mut wasserstein, mut kolmogorov, mut by_chance) = (Vec::new(), Vec::new(), (Vec::new(), Vec::new()));
+    let (mut resampled, mut by_chance) = (Vec::new(), Vec::new());
     for _ in 0..RESAMPLES {
         let other = resample(reference, reference.len(), &mut generator);
-        let (w, k) = both(&resample(sample, sample.len(), &mut generator), &other);
-        wasserstein.push(w);
-        kolmogorov.push(k);
-        let (w, k) = both(&resample(reference, sample.len(), &mut generator), &other);
-        by_chance.0.push(w);
-        by_chance.1.push(k);
+        resampled.push(differences(&resample(sample, sample.len(), &mut generator), &other));
+        by_chance.push(differences(&resample(reference, sample.len(), &mut generator), &other));
     }
-    let distance = |value: f64, mut resampled: Vec<f64>, mut chance: Vec<f64>| Distance {
-        value,
-        low: quantile(&mut resampled, TAIL),
-        high: quantile(&mut resampled, 1.0 - TAIL),
-        floor: quantile(&mut chance, FLOOR),
+    let found = differences(&sorted(sample), &sorted(reference));
+    let distance = |of: fn(&Differences) -> f64| {
+        let Bias { value, low, high } = shifted(of(&found), resampled.iter().map(of).collect());
+        let floor = quantile(&mut by_chance.iter().map(of).collect::<Vec<_>>(), FLOOR);
+        Distance { value, low: low.max(0.0), high, floor }
     };
+    let bias = |of: fn(&Differences) -> f64| shifted(of(&found), resampled.iter().map(of).collect());
     Some(Distances {
-        wasserstein: distance(value_wasserstein, wasserstein, by_chance.0),
-        kolmogorov: distance(value_kolmogorov, kolmogorov, by_chance.1),
+        wasserstein: distance(|differences| differences.wasserstein),
+        kolmogorov: distance(|differences| differences.kolmogorov),
+        mean: bias(|differences| differences.mean),
+        deviation: bias(|differences| differences.deviation),
     })
+}
+
+/// Differences of two sorted samples.
+struct Differences {
+    wasserstein: f64,
+    kolmogorov: f64,
+    mean: f64,
+    deviation: f64,
+}
+
+fn differences(sample: &[f64], reference: &[f64]) -> Differences {
+    let (wasserstein, kolmogorov) = both(sample, reference);
+    let (mean_of, deviation_of) = (mean(sample), deviation(sample));
+    Differences {
+        wasserstein,
+        kolmogorov,
+        mean: mean_of - mean(reference),
+        deviation: deviation_of - deviation(reference),
+    }
+}
+
+/// Mean of a sample.
+pub(super) fn mean(sample: &[f64]) -> f64 {
+    sample.iter().sum::<f64>() / sample.len() as f64
+}
+
+/// Standard deviation of a sample, by n - 1.
+pub(super) fn deviation(sample: &[f64]) -> f64 {
+    let mean = mean(sample);
+    let squares: f64 = sample.iter().map(|value| (value - mean) * (value - mean)).sum();
+    (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
+}
+
+/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds noise,
+/// and noise makes distances longer.
+fn shifted(value: f64, mut resampled: Vec<f64>) -> Bias {
+    let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
+    Bias { value, low: value + (low - median), high: value + (high - median) }
 }
 
 fn sorted(sample: &[f64]) -> Vec<f64> {
@@ -154,6 +206,31 @@ mod tests {
         assert!(moved.wasserstein.value > 2.0 * moved.wasserstein.floor, "{moved:?}");
         assert!(moved.wasserstein.low < 0.1 && 0.1 < moved.wasserstein.high, "{moved:?}");
         assert!(moved.kolmogorov.value > moved.kolmogorov.floor, "{moved:?}");
+        assert!(moved.mean.low > 0.0 && moved.mean.low < 0.1 && 0.1 < moved.mean.high, "{moved:?}");
+        assert!(moved.deviation.low < 0.0 && 0.0 < moved.deviation.high, "{moved:?}");
+    }
+
+    #[test]
+    fn every_interval_holds_its_value_and_a_wider_sample_is_told_by_its_deviation() {
+        let reference = uniform(1000, 0.0, 1);
+        let wide: Vec<f64> = uniform(500, -0.5, 2).into_iter().map(|value| 1.2 * value + 0.5).collect();
+        for sample in [uniform(500, 0.0, 2), uniform(1000, 0.0, 1), wide.clone()] {
+            let Distances { wasserstein: w, kolmogorov: k, mean, deviation } =
+                distances(&sample, &reference, 3).unwrap();
+            for (value, low, high) in [(w.value, w.low, w.high), (k.value, k.low, k.high)] {
+                assert!(0.0 <= low && low <= value && value <= high, "{low} {value} {high}");
+            }
+            for bias in [mean, deviation] {
+                assert!(bias.low <= bias.value && bias.value <= bias.high, "{bias:?}");
+            }
+        }
+        let wider = distances(&wide, &reference, 3).unwrap();
+        // 0.2 times the deviation of a uniform distribution, 1/sqrt(12).
+        assert!(
+            0.0 < wider.deviation.low && wider.deviation.low < 0.0577 && 0.0577 < wider.deviation.high,
+            "{wider:?}"
+        );
+        assert!(wider.mean.low < 0.0 && 0.0 < wider.mean.high, "{wider:?}");
     }
 
     #[test]

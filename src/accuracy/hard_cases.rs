@@ -195,7 +195,7 @@ impl HardCase {
             drop(done);
             result
         })?;
-        Ok((summary, observer.slips().len() as u64, ledger.residual()))
+        Ok((summary, observer.into_rows().0.len() as u64, ledger.residual()))
     }
 }
 

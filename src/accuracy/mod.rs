@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! breaks.rs     before chaos: break times, contact by contact
-//! distance.rs   after chaos: distances of distributions, with intervals
+//! distance.rs   after chaos: distances of distributions and biases, with intervals
 //! study.rs      every solver under every drive, timed on one thread
 //! scaling.rs    what a slip costs as the slider grows
 //! hard_cases.rs parameters that break a naive code, each audited
@@ -20,6 +20,7 @@ mod tables;
 mod write;
 
 pub use cpu::Cost;
+pub use distance::{Bias, Distance, Distances};
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};

@@ -1,17 +1,20 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; what each costs and how far it errs.
 //!
 //! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of slips
-//! that is timed and whose distributions are held against a reference ensemble of other seeds. A fixed step at low velocity
-//! would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps in one.
+//! that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first drive more
+//! realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A fixed step at low
+//! velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps
+//! in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cpu::{self, Cost};
-use super::distance::{Distances, distances};
+use super::distance::{Distances, deviation, distances, mean};
 use super::{AccuracyError, NO_LIMITS, drive_in_words, failed};
 use crate::model::Parameters;
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Solver, Summary, TOLERANCES, simulate, simulate_audited};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
 const MODULATION: (f64, f64) = (1e-6, 58.0);
@@ -33,8 +36,10 @@ pub struct Study {
     pub velocities: Vec<f64>,
     /// Solvers and their settings.
     pub solvers: Vec<Solver>,
-    /// Realisations of each ensemble.
+    /// Realisations of each ensemble, all timed.
     pub seeds: u64,
+    /// Under the first drive so many times as many, the others not timed.
+    pub first_drive_multiple: u64,
     /// Slips of each realisation, past start-up.
     pub slips: u64,
     /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own way.
@@ -55,8 +60,9 @@ impl Study {
     pub fn full() -> Self {
         Self {
             velocities: vec![1e-4, 1e-5, 1e-6],
-            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]),
+            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
             seeds: 8,
+            first_drive_multiple: 8,
             slips: 100,
             breaks: 100,
             followed_breaks: 30_000,
@@ -70,8 +76,8 @@ impl Study {
     #[must_use]
     pub fn quick() -> Self {
         Self {
-            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
             seeds: 2,
+            first_drive_multiple: 1,
             slips: 12,
             followed_breaks: 10_000,
             fixed_step_breaks_from: 1e-4,
@@ -122,11 +128,18 @@ pub enum Quantity {
     Phase,
     /// Stress drop, in N.
     Drop,
+    /// Shear force at the onset, in N.
+    PeakForce,
+    /// Time from the first to the last break, in s.
+    Duration,
+    /// Speed of the rupture front, in m/s.
+    FrontSpeed,
 }
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Interval, Self::Phase, Self::Drop];
+    pub const ALL: [Self; 6] =
+        [Self::Interval, Self::Phase, Self::Drop, Self::PeakForce, Self::Duration, Self::FrontSpeed];
 
     /// Its name in tables.
     #[must_use]
@@ -135,6 +148,9 @@ impl Quantity {
             Self::Interval => "interval",
             Self::Phase => "phase",
             Self::Drop => "drop",
+            Self::PeakForce => "peak_force",
+            Self::Duration => "duration",
+            Self::FrontSpeed => "front_speed",
         }
     }
 
@@ -143,6 +159,9 @@ impl Quantity {
             Self::Interval => slip.interval,
             Self::Phase => slip.phase,
             Self::Drop => Some(slip.drop),
+            Self::PeakForce => Some(slip.peak_force),
+            Self::Duration => Some(slip.duration),
+            Self::FrontSpeed => slip.front_speed,
         }
     }
 }
@@ -173,6 +192,17 @@ pub struct Findings {
     pub methods: Vec<MethodRow>,
     /// Likewise, quantity by quantity.
     pub distances: Vec<DistanceRow>,
+}
+
+impl Findings {
+    /// How far a distribution is from the reference, for the solver and drive of a row.
+    #[must_use]
+    pub fn distances_of(&self, row: &MethodRow, quantity: Quantity) -> Option<&Distances> {
+        let same = |other: &&DistanceRow| {
+            other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
+        };
+        self.distances.iter().find(same).map(|row| &row.distances)
+    }
 }
 
 /// Slips and cost of one solver so far.
@@ -211,10 +241,8 @@ impl Study {
     /// When a simulation cannot go on.
     pub fn run(&self, tell: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
         let mut findings = Findings::default();
-        for parameters in &self.drives() {
-            tell(&format!("{}: reference ensemble", drive_in_words(parameters)));
-            let reference = self.reference_ensemble(parameters)?;
-            tell("first breaks and energy ledgers");
+        for (index, parameters) in self.drives().iter().enumerate() {
+            tell(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = Solver::EventDriven { tolerance: *TOLERANCES.start() };
             simulate(parameters, tightest, NO_LIMITS, &mut first_breaks).map_err(failed(
@@ -228,9 +256,18 @@ impl Study {
                 checks.push((break_times, self.ledger_residual(parameters, solver)?));
             }
             tell("timed ensembles");
-            let ensembles = self.ensembles(parameters)?;
-            let intervals = sample(&reference, Quantity::Interval);
-            let mean_interval = mean(&intervals);
+            let mut ensembles = self.ensembles(parameters)?;
+            let seeds = self.seeds * if index == 0 { self.first_drive_multiple } else { 1 };
+            tell("reference ensemble, and what the others have more than their timed realisations");
+            let reference = Solver::EventDriven { tolerance: ENSEMBLE_TOLERANCE };
+            let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
+            let reference = self.slips_of(parameters, reference, others)?;
+            for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
+                if !self.is_stretch_only(parameters, solver) {
+                    ensemble.slips.extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
+                }
+            }
+            let mean_interval = mean(&sample(&reference, Quantity::Interval));
             for ((&solver, ensemble), (break_times, ledger_residual)) in self.solvers.iter().zip(&ensembles).zip(checks)
             {
                 findings.methods.push(MethodRow {
@@ -240,22 +277,13 @@ impl Study {
                     break_times,
                     ledger_residual,
                 });
-                for quantity in Quantity::ALL {
-                    let (sample, reference) = (sample(&ensemble.slips, quantity), sample(&reference, quantity));
-                    let key = findings.distances.len() as u64;
-                    if let Some(distances) = distances(&sample, &reference, key) {
-                        findings.distances.push(DistanceRow {
-                            parameters: parameters.clone(),
-                            solver,
-                            quantity,
-                            sizes: (sample.len() as u64, reference.len() as u64),
-                            means: (mean(&sample), mean(&reference)),
-                            deviations: (deviation(&sample), deviation(&reference)),
-                            distances,
-                        });
-                    }
-                }
             }
+            let pairs: Vec<_> = self.solvers.iter().zip(&ensembles).collect();
+            let compared = pairs.into_par_iter().enumerate().flat_map_iter(|(row, (&solver, ensemble))| {
+                let key = index * self.solvers.len() + row;
+                distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
+            });
+            findings.distances.extend(compared.collect::<Vec<_>>());
         }
         Ok(findings)
     }
@@ -264,12 +292,10 @@ impl Study {
         Recording { slips: self.slips, discard: DISCARD, ..Recording::default() }
     }
 
-    /// Slips at a tight tolerance, of other seeds; not timed, so on all threads.
-    fn reference_ensemble(&self, parameters: &Parameters) -> Result<Vec<Slip>, AccuracyError> {
-        let solver = Solver::EventDriven { tolerance: ENSEMBLE_TOLERANCE };
-        let seeds = (0..REFERENCE_SHARE * self.seeds).into_par_iter();
+    /// Slips of these seeds; not timed, so on all threads.
+    fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>, AccuracyError> {
         let realisation = |seed: u64| {
-            let parameters = Parameters { seed: REFERENCE_SEEDS + seed, ..parameters.clone() };
+            let parameters = Parameters { seed, ..parameters.clone() };
             let mut observer = SlipObserver::new(&parameters, &self.recording());
             simulate(&parameters, solver, NO_LIMITS, &mut observer).map_err(failed(
                 drive_in_words,
@@ -278,7 +304,7 @@ impl Study {
             ))?;
             Ok(observer.into_rows().0)
         };
-        let slips: Vec<Vec<Slip>> = seeds.map(realisation).collect::<Result<_, AccuracyError>>()?;
+        let slips: Vec<Vec<Slip>> = seeds.into_par_iter().map(realisation).collect::<Result<_, AccuracyError>>()?;
         Ok(slips.concat())
     }
 
@@ -338,18 +364,32 @@ impl Study {
     }
 }
 
+/// The distributions of one ensemble against those of the reference, of all quantities that there are.
+fn distance_rows(
+    parameters: &Parameters,
+    solver: Solver,
+    slips: &[Slip],
+    reference: &[Slip],
+    key: u64,
+) -> Vec<DistanceRow> {
+    let row = |(place, quantity): (u64, Quantity)| {
+        let (sample, reference) = (sample(slips, quantity), sample(reference, quantity));
+        let key = key * Quantity::ALL.len() as u64 + place;
+        Some(DistanceRow {
+            parameters: parameters.clone(),
+            solver,
+            quantity,
+            sizes: (sample.len() as u64, reference.len() as u64),
+            means: (mean(&sample), mean(&reference)),
+            deviations: (deviation(&sample), deviation(&reference)),
+            distances: distances(&sample, &reference, key)?,
+        })
+    };
+    (0..).zip(Quantity::ALL).filter_map(row).collect()
+}
+
 fn sample(slips: &[Slip], quantity: Quantity) -> Vec<f64> {
     slips.iter().filter_map(|slip| quantity.of(slip)).collect()
-}
-
-fn mean(sample: &[f64]) -> f64 {
-    sample.iter().sum::<f64>() / sample.len() as f64
-}
-
-fn deviation(sample: &[f64]) -> f64 {
-    let mean = mean(sample);
-    let squares: f64 = sample.iter().map(|value| (value - mean) * (value - mean)).sum();
-    (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
 #[cfg(test)]
@@ -363,6 +403,7 @@ mod tests {
             velocities: vec![1e-4],
             solvers: vec![coarse, tight],
             seeds: 1,
+            first_drive_multiple: 3,
             slips: 4,
             breaks: 50,
             followed_breaks: 400,
@@ -379,8 +420,12 @@ mod tests {
                 assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
             }
         }
-        // Interval and drop of each, and the phase where there is a modulation.
-        assert_eq!(findings.distances.len(), 2 * 2 + 2 * 3);
+        // All quantities of both solvers, but no phase where there is no modulation.
+        assert_eq!(findings.distances.len(), 2 * 5 + 2 * 6);
+        for row in &findings.distances {
+            let seeds = if row.parameters.modulation_period.is_none() { 3 } else { 1 };
+            assert_eq!(row.sizes, (4 * seeds, 8 * seeds), "{row:?}");
+        }
     }
 
     #[test]

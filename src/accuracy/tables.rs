@@ -187,13 +187,29 @@ macro_rules! distance {
     };
 }
 
+/// A bias and the ends of its interval.
+macro_rules! bias {
+    ($name:literal, $field:ident, $meaning:literal) => {
+        [
+            Column::new($name, "", $meaning, Getter::Real(|row: &DistanceRow| row.distances.$field.value)),
+            Column::new(
+                concat!($name, "_low"),
+                "",
+                "lower end of its 95 % interval",
+                Getter::Real(|row| row.distances.$field.low),
+            ),
+            Column::new(concat!($name, "_high"), "", "upper end", Getter::Real(|row| row.distances.$field.high)),
+        ]
+    };
+}
+
 /// Distances of distributions from those of the reference ensemble.
 pub fn distances() -> Table<DistanceRow> {
     let samples = [
         Column::new(
             "quantity",
             "",
-            "interval, phase or drop",
+            "interval, phase, drop, peak_force, duration or front_speed",
             Getter::Text(|row: &DistanceRow| row.quantity.name().to_owned()),
         ),
         Column::new("slips", "", "size of the sample", Getter::Count(|row| row.sizes.0)),
@@ -210,11 +226,14 @@ pub fn distances() -> Table<DistanceRow> {
     ];
     let wasserstein = distance!("w1", wasserstein, "Wasserstein-1 distance");
     let kolmogorov = distance!("ks", kolmogorov, "Kolmogorov-Smirnov distance");
+    let mean = bias!("mean_bias", mean, "mean less that of the reference");
+    let deviation = bias!("deviation_bias", deviation, "standard deviation less that of the reference");
+    let biases = mean.into_iter().chain(deviation);
     Table {
         name: "distances",
-        meaning: "One row per drive, solver setting and quantity; means, deviations and w1 are in its unit: s for interval, \
-                  rad for phase, N for drop",
-        columns: solved().into_iter().chain(samples).chain(wasserstein).chain(kolmogorov).collect(),
+        meaning: "One row per drive, solver setting and quantity; means, deviations, their biases and w1 are in its unit, \
+                  that of the column of this name in `slips`",
+        columns: solved().into_iter().chain(samples).chain(biases).chain(wasserstein).chain(kolmogorov).collect(),
     }
 }
 

@@ -1,10 +1,11 @@
-//! What a study leaves behind: tables as Parquet, everything as JSON, and the work-precision figures, put in place together.
+//! What a study leaves behind: tables as Parquet, everything as JSON, and the figures, put in place together.
 
+use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
-use super::study::{DistanceRow, Findings, MethodRow, Quantity, Study};
+use super::study::{Findings, MethodRow, Quantity, Study};
 use super::tables::{distances, exponents, method, methods, sizes, stability};
 use super::{AccuracyError, Stability, cpu};
-use crate::figure::{Growth, Line, Picture, WorkPrecision, scaling, work_precision};
+use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
 use crate::store::columns::Table;
 use crate::store::commit::{Commit, create_folder};
@@ -14,13 +15,14 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Version of the JSON.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// The findings of a study as JSON.
 #[must_use]
 pub fn as_json(study: &Study, findings: &Findings) -> Value {
     document(json!({
         "seeds": study.seeds,
+        "first_drive_multiple": study.first_drive_multiple,
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
@@ -71,9 +73,7 @@ pub fn write(
     output.table(distances(), &findings.distances)?;
     output.json("accuracy.json", &as_json(study, findings))?;
     for &velocity in &study.velocities {
-        for (name, picture) in figures(velocity, findings)? {
-            output.picture(&name, &picture)?;
-        }
+        output.picture(&format!("work-precision-V0-{velocity:e}"), &figure(velocity, findings)?)?;
     }
     output.publish()
 }
@@ -110,32 +110,27 @@ pub fn write_stability(
     output.publish()
 }
 
-/// The figures at one velocity, each with its name: cost against the error of break times, and against the distance of τ.
-fn figures(velocity: f64, findings: &Findings) -> Result<Vec<(String, Picture)>, AccuracyError> {
+/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those of
+/// the reference, in units of the distance that chance alone stays under.
+fn figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
     let breaks = lines(&findings.methods, velocity, |row| {
         let errors = row.break_times?;
         let uncertainty = Some((errors.median, errors.largest));
         Some(WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip })
     });
-    let intervals: Vec<&DistanceRow> =
-        findings.distances.iter().filter(|row| row.quantity == Quantity::Interval).collect();
-    let slips = lines(&findings.methods, velocity, |row| {
-        let same = |other: &&&DistanceRow| other.parameters == row.parameters && other.solver == row.solver;
-        let distance = intervals.iter().find(same)?.distances.wasserstein;
-        let uncertainty = Some((distance.low, distance.high));
-        Some(WorkPrecision { error: distance.value, uncertainty, work: row.cost.per_slip })
-    });
-    let mut figures = Vec::new();
-    for (name, label, lines) in [
-        ("break-times", "median error of the first break times, up to the largest (s)", breaks),
-        ("intervals", "Wasserstein-1 distance of the distribution of τ (s)", slips),
-    ] {
-        if !lines.is_empty() {
-            figures.push((format!("work-precision-{name}-V0-{velocity:e}"), work_precision(label, WORK, &lines)?));
-        }
+    let label = "First break times, error (s)".to_owned();
+    let mut panels = vec![ErrorPanel { label, by_chance: None, methods: breaks }];
+    for (quantity, name) in [(Quantity::Interval, "τ"), (Quantity::FrontSpeed, "front speed")] {
+        let methods = lines(&findings.methods, velocity, |row| {
+            let Distance { value, low, high, floor } = findings.distances_of(row, quantity)?.wasserstein;
+            let uncertainty = Some((low / floor, high / floor));
+            Some(WorkPrecision { error: value / floor, uncertainty, work: row.cost.per_slip })
+        });
+        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance"), by_chance: Some(1.0), methods });
     }
-    Ok(figures)
+    panels.retain(|panel| !panel.methods.is_empty());
+    Ok(work_precision(WORK, &panels)?)
 }
 
 /// A line per method and drive at this velocity.
@@ -238,6 +233,7 @@ impl<'a> Output<'a> {
 mod tests {
     use super::super::breaks::BreakErrors;
     use super::super::distance::distances as measured;
+    use super::super::study::DistanceRow;
     use super::*;
     use crate::model::Parameters;
     use crate::solver::Solver;
@@ -289,10 +285,8 @@ mod tests {
                 "methods.parquet",
                 "distances.parquet",
                 "accuracy.json",
-                "work-precision-break-times-V0-1e-4.svg",
-                "work-precision-break-times-V0-1e-4.png",
-                "work-precision-intervals-V0-1e-4.svg",
-                "work-precision-intervals-V0-1e-4.png"
+                "work-precision-V0-1e-4.svg",
+                "work-precision-V0-1e-4.png"
             ]
         );
         assert!(files.iter().all(|file| file.is_file()));

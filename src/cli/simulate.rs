@@ -17,11 +17,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Parameters, Symbol, Value};
 use stickslip::observe::{AttachedMap, ContactLog, Profile, SlipObserver, Together, Trace};
-use stickslip::run::limits;
-use stickslip::solver::{self, Observer, Summary};
+use stickslip::run::{limits, measured};
+use stickslip::solver::{self, Observer};
 use stickslip::store::dataset::Footer;
 use stickslip::store::tables;
-use stickslip::store::tables::{JobLabel, SlipRow};
+use stickslip::store::tables::{JobLabel, JobResult, SlipRow};
 use stickslip::sweep::{Job, Sweep, SweepError};
 
 /// Simulate one realisation and show what it does
@@ -57,6 +57,9 @@ pub struct Arguments {
     /// Least breaks of a precursor [default: Ns]
     #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
     precursor_size: Option<u64>,
+    /// Look for drops of the shear force of at least so many newtons
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "NEWTONS")]
+    drop_size: Option<String>,
     /// Method
     #[arg(long, value_enum, default_value_t = Method::EventDriven)]
     solver: Method,
@@ -192,6 +195,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let mut observer = Together { lead: &mut slips, others };
     let summary = solver::simulate(parameters, sweep.solver(), limits(sweep.recording(), &never), &mut observer)?;
     let wall = begin.elapsed().as_secs_f64();
+    let result = measured(slips, summary);
 
     let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
     let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
@@ -202,11 +206,11 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         parameters: parameters.clone(),
     };
     if let Some(path) = &arguments.slip_table {
-        let rows = slips.slips().iter().map(|slip| SlipRow { job: &label, slip });
+        let rows = result.slips.iter().map(|slip| SlipRow { job: &label, slip });
         write_table(path, tables::slips(), &footer, rows)?;
     }
     write_pictures(arguments, parameters, &trace.rows, &map.rows)?;
-    report(arguments.json, &label, &slips, &summary, wall)?;
+    report(arguments.json, &label, &result, wall)?;
     Ok(Exit::Done)
 }
 
@@ -257,6 +261,7 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
         optional("max_time", arguments.time.clone()),
         optional("max_events", arguments.max_events.map(|events| events.to_string())),
         optional("precursor_size", arguments.precursor_size.map(|size| size.to_string())),
+        optional("drop_size", arguments.drop_size.clone()),
     ]
     .concat();
     let solver = match (arguments.solver, &arguments.tolerance, &arguments.dt) {
@@ -300,8 +305,8 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summary, wall: f64) -> Result<()> {
-    let slips = observer.slips();
+fn report(json: bool, label: &JobLabel, JobResult { slips, record, .. }: &JobResult, wall: f64) -> Result<()> {
+    let summary = &record.summary;
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
     let report = Report {
@@ -310,10 +315,10 @@ fn report(json: bool, label: &JobLabel, observer: &SlipObserver, summary: &Summa
         simulated_seconds: summary.end_time,
         slips: slips.len(),
         mean_interval_seconds: mean,
-        mean_friction_newtons: observer.mean_friction(),
+        mean_friction_newtons: record.mean_friction,
         breaks: summary.breaks,
         reattachments: summary.reattachments,
-        ruptures: observer.ruptures(),
+        ruptures: record.ruptures,
         steps: summary.steps,
         leaps: summary.leaps,
         wall_seconds: wall,

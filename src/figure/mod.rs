@@ -30,7 +30,7 @@ pub use picture::Picture;
 pub use scaling::{Growth, Line, scaling};
 pub use simulation::{AttachedMap, simulation};
 pub use staircase::staircase;
-pub use work_precision::{WorkPrecision, work_precision};
+pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 use crate::store::dataset::DatasetError;
 use crate::store::storage::StorageError;

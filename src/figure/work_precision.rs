@@ -1,72 +1,136 @@
-//! Work against precision: what an error costs with each method, both logarithmic.
+//! Work against precision: what an error costs with each method, a panel for each kind of error; all logarithmic.
 
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Frame, LEGEND, LegendPlace, Mark};
-use super::picture::{Dot, INKS, Picture, Sheet, Stroke};
+use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
+use super::picture::{Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
 
-const SIZE: (f64, f64) = (840.0, 500.0);
+const PANEL: (f64, f64) = (270.0, 360.0);
+/// What chance alone gives: a stripe.
+const CHANCE: (Ink, f64) = (GREY, 0.3);
 
 /// Error and cost of a method at one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkPrecision {
     /// Error, > 0.
     pub error: f64,
-    /// Lower and upper end of the error's uncertainty, > 0, if it is known.
+    /// Lower and upper end of the error's uncertainty, if it is known.
     pub uncertainty: Option<(f64, f64)>,
     /// Cost, > 0.
     pub work: f64,
 }
 
-/// Draws a line per method through its settings, in the given order; values that are not > 0 are left out.
+/// One kind of error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorPanel {
+    /// What the error is.
+    pub label: String,
+    /// The largest error that chance alone gives, > 0, if it gives any.
+    pub by_chance: Option<f64>,
+    /// A name for each method and its settings.
+    pub methods: Vec<(String, Vec<WorkPrecision>)>,
+}
+
+/// Draws a panel beside the other for each kind of error, with a line per method through its settings in the given order;
+/// values that are not > 0 are left out.
 ///
 /// # Errors
-/// When nothing is left.
-pub fn work_precision(
-    error_label: &str,
-    work_label: &str,
-    methods: &[(String, Vec<WorkPrecision>)],
-) -> Result<Picture, FigureError> {
+/// When a panel, or the figure, has nothing left.
+pub fn work_precision(work_label: &str, panels: &[ErrorPanel]) -> Result<Picture, FigureError> {
     const NAME: &str = "work-precision";
-    let usable = |points: &[WorkPrecision]| -> Vec<WorkPrecision> {
-        points.iter().copied().filter(|point| point.error > 0.0 && point.work > 0.0).collect()
-    };
-    let methods: Vec<(&str, Vec<WorkPrecision>)> =
-        methods.iter().map(|(name, points)| (name.as_str(), usable(points))).collect();
-    let all = || methods.iter().flat_map(|(_, points)| points);
-    let ends = |point: &WorkPrecision| {
-        let (low, high) = point.uncertainty.unwrap_or((point.error, point.error));
-        [low, point.error, high]
-    };
     let empty = || FigureError::Empty { figure: NAME, what: "errors and costs" };
-    let (low, high) = logarithmic_bounds(all().flat_map(ends)).ok_or_else(empty)?;
-    let x = Axis::logarithmic(error_label, low, high);
-    let (low, high) = logarithmic_bounds(all().map(|point| point.work)).ok_or_else(empty)?;
-    let frame = Frame::filling(SIZE, LEGEND, x, Axis::logarithmic(work_label, low, high));
-    let mut sheet = Sheet::new(NAME, SIZE);
-    let mut entries = Vec::new();
-    for (index, (name, points)) in methods.iter().enumerate() {
-        let ink = INKS[index % INKS.len()];
-        let stroke = Stroke::solid(ink, 1.8);
-        frame.clipped(&mut sheet, |sheet| {
-            frame.curve(sheet, points.iter().map(|point| (point.error, point.work)), stroke);
-            for point in points {
-                if let Some((low, high)) = point.uncertainty {
-                    frame.curve(
-                        sheet,
-                        [(low.max(frame.x.low), point.work), (high, point.work)],
-                        Stroke::solid(ink, 1.2),
-                    );
-                }
-            }
-            let dot = Dot { ink, radius: 4.0, opacity: 1.0 };
-            frame.points(sheet, points.iter().map(|point| (point.error, point.work)), dot);
-        });
-        entries.push((Mark::Line(stroke), (*name).to_owned()));
+    let works = panels.iter().flat_map(usable).map(|point| point.work);
+    let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
+    let width = LEFT + PANEL.0;
+    let mut sheet = Sheet::new(NAME, (panels.len() as f64 * width + LEGEND, ABOVE + PANEL.1 + UNDER));
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in panels.iter().flat_map(|panel| &panel.methods) {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
     }
-    frame.axes(&mut sheet, true);
-    frame.x_label(&mut sheet);
-    frame.y_label(&mut sheet);
-    frame.legend(&mut sheet, LegendPlace::Beside, &entries);
+    let ink_of = |name: &str| INKS[names.iter().position(|known| *known == name).unwrap_or(0) % INKS.len()];
+    for (column, panel) in panels.iter().enumerate() {
+        // Lower ends may be 0: they run out of the panel.
+        let ends = usable(panel).flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
+        let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance)).ok_or_else(empty)?;
+        let frame = Frame {
+            left: LEFT + column as f64 * width,
+            top: ABOVE,
+            width: PANEL.0,
+            height: PANEL.1,
+            x: Axis::logarithmic(&panel.label, low, high),
+            y: Axis::logarithmic(work_label, least, most),
+        };
+        if let Some(by_chance) = panel.by_chance {
+            frame.stripe(&mut sheet, low, by_chance, CHANCE.0, CHANCE.1);
+        }
+        for (name, points) in &panel.methods {
+            draw(&mut sheet, &frame, points, ink_of(name));
+        }
+        frame.axes(&mut sheet, true);
+        frame.x_label(&mut sheet);
+        if column == 0 {
+            frame.y_label(&mut sheet);
+        }
+        if column + 1 == panels.len() {
+            let lines = names.iter().map(|name| (Mark::Line(line(ink_of(name))), (*name).to_owned()));
+            let chance = panels.iter().any(|panel| panel.by_chance.is_some());
+            let chance = chance.then(|| (Mark::Patch(CHANCE.0, CHANCE.1), "by chance, 95 %".to_owned()));
+            frame.legend(&mut sheet, LegendPlace::Beside, &lines.chain(chance).collect::<Vec<_>>());
+        }
+    }
     Ok(sheet.finish())
+}
+
+fn is_usable(point: &WorkPrecision) -> bool {
+    point.error > 0.0 && point.work > 0.0
+}
+
+fn usable(panel: &ErrorPanel) -> impl Iterator<Item = WorkPrecision> {
+    panel.methods.iter().flat_map(|(_, points)| points).copied().filter(is_usable)
+}
+
+const fn line(ink: Ink) -> Stroke {
+    Stroke::solid(ink, 1.8)
+}
+
+/// A method's settings, with what is uncertain about their errors.
+fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], ink: Ink) {
+    let points: Vec<WorkPrecision> = points.iter().copied().filter(is_usable).collect();
+    let places = || points.iter().map(|point| (point.error, point.work));
+    frame.clipped(sheet, |sheet| {
+        frame.curve(sheet, places(), line(ink));
+        for point in &points {
+            if let Some((low, high)) = point.uncertainty {
+                let ends = [low.max(frame.x.low), high].map(|end| (end, point.work));
+                frame.curve(sheet, ends, Stroke::solid(ink, 1.2));
+            }
+        }
+        frame.points(sheet, places(), Dot { ink, radius: 4.0, opacity: 1.0 });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_method_has_one_ink_in_all_panels_and_one_entry() {
+        let point = |error| WorkPrecision { error, uncertainty: Some((0.0, 2.0 * error)), work: 0.01 };
+        let method = |name: &str| (name.to_owned(), vec![point(1e-6), point(1e-5)]);
+        let panel = |by_chance, methods: &[&str]| ErrorPanel {
+            label: "error".to_owned(),
+            by_chance,
+            methods: methods.iter().map(|name| method(name)).collect(),
+        };
+        let panels = [panel(None, &["a", "b"]), panel(Some(1e-5), &["b"])];
+        let svg = work_precision("cost", &panels).unwrap().svg();
+        for (text, times) in [("error", 2), ("cost", 1), ("a", 1), ("b", 1), ("by chance, 95 %", 1)] {
+            assert_eq!(svg.matches(&format!(">{text}<")).count(), times, "{text}");
+        }
+        // Of each method in a panel a line and two whiskers, and the mark in the legend.
+        assert_eq!((svg.matches(INKS[0]).count(), svg.matches(INKS[1]).count()), (3 + 2 + 1, 2 * (3 + 2) + 1));
+        assert!(work_precision("cost", &[]).is_err());
+    }
 }

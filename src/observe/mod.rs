@@ -2,11 +2,13 @@
 //!
 //! Knows no solver's inside and no file. Each observer computes one thing; a run holds those that its sweep asks for.
 
+mod drops;
 mod phase;
 mod rupture;
 mod sample;
 mod slip;
 
+pub use drops::Drops;
 pub use phase::{OVERSHOOT, phase};
 pub use rupture::{Rupture, advance_speed};
 pub use sample::{AttachedMap, ContactLog, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
@@ -27,6 +29,8 @@ pub struct Recording {
     pub precursor_size: Option<u64>,
     /// Whether each precursor becomes a row of its own.
     pub precursors: bool,
+    /// Least drop of the shear force that is told, in N; > 0. Default: drops are not looked for.
+    pub drop_size: Option<f64>,
 }
 
 impl Default for Recording {
@@ -38,6 +42,7 @@ impl Default for Recording {
             max_events: 1_000_000_000,
             precursor_size: None,
             precursors: false,
+            drop_size: None,
         }
     }
 }

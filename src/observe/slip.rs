@@ -5,6 +5,7 @@
 //! instant at which its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::Recording;
+use super::drops::{DropDetector, Drops};
 use super::phase::phase;
 use super::rupture::{Rupture, advance_speed};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
@@ -63,6 +64,8 @@ pub struct Slip {
     pub precursors: u64,
     /// Speed of the slow front: advance of the reach through these precursors, in m/s; `None` for fewer than two.
     pub slow_front_speed: Option<f64>,
+    /// Drops of the shear force; `None` if they are not recorded.
+    pub drops: Option<Drops>,
 }
 
 /// One precursor: a rupture of at least the precursor size that does not break contacts at every block.
@@ -140,6 +143,9 @@ pub struct SlipObserver {
     first_mark: Option<(f64, f64)>,
     last_mark: Option<(f64, f64)>,
     ruptures: u64,
+    /// Drops, if they are recorded, and first and last break of every slip.
+    drops: Option<DropDetector>,
+    spans: Vec<(f64, f64)>,
 }
 
 /// A rupture in progress, with what its force tells.
@@ -192,16 +198,18 @@ impl SlipObserver {
             first_mark: None,
             last_mark: None,
             ruptures: 0,
+            drops: recording.drop_size.map(|size| DropDetector::new(parameters, size)),
+            spans: Vec::new(),
         }
     }
 
-    /// The slips past start-up.
-    pub fn slips(&self) -> &[Slip] {
-        &self.slips
-    }
-
-    /// Slips, and precursors if they are recorded; empty otherwise.
-    pub fn into_rows(self) -> (Vec<Slip>, Vec<Precursor>) {
+    /// Slips past start-up, and their precursors if they are recorded.
+    pub fn into_rows(mut self) -> (Vec<Slip>, Vec<Precursor>) {
+        if let Some(drops) = self.drops {
+            let discarded = self.spans.len() - self.slips.len();
+            let of_slips = drops.of_slips(&self.spans).into_iter().skip(discarded);
+            self.slips.iter_mut().zip(of_slips).for_each(|(slip, drops)| slip.drops = Some(drops));
+        }
         (self.slips, self.precursors)
     }
 
@@ -280,7 +288,11 @@ impl SlipObserver {
                 front_speed: rupture.front_speed(&self.parameters),
                 precursors: self.pending,
                 slow_front_speed: advance_speed(self.advances.iter().copied()),
+                drops: None,
             });
+        }
+        if self.drops.is_some() {
+            self.spans.push((rupture.first_time, rupture.last_time));
         }
         self.slips_seen += 1;
         let mark = (rupture.last_time, active.impulse_at_last_break);
@@ -344,6 +356,9 @@ impl Observer for SlipObserver {
             && let Some((_, force)) = segment.minimum_below(active.least)
         {
             active.least = force;
+        }
+        if let Some(drops) = &mut self.drops {
+            drops.advance(segment);
         }
         self.impulse += segment.impulse();
         self.now = Peak { time: segment.end(), force: segment.end_force() };

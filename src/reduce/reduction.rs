@@ -287,6 +287,7 @@ mod tests {
             front_speed: None,
             precursors: 2,
             slow_front_speed: None,
+            drops: None,
         };
         let summary = Summary { satisfied: true, ..Summary::default() };
         JobResult {

@@ -2,7 +2,7 @@
 
 use crate::model::Parameters;
 use crate::observe::{Recording, SlipObserver};
-use crate::solver::{Limits, SimulationError, Solver, simulate};
+use crate::solver::{Limits, SimulationError, Solver, Summary, simulate};
 use crate::store::tables::{JobRecord, JobResult};
 use crate::sweep::Job;
 use std::sync::atomic::AtomicBool;
@@ -22,9 +22,14 @@ pub fn kernel(
 ) -> Result<JobResult, SimulationError> {
     let mut observer = SlipObserver::new(parameters, recording);
     let summary = simulate(parameters, solver, limits(recording, interrupt), &mut observer)?;
+    Ok(measured(observer, summary))
+}
+
+/// What an observer has measured in a simulation that ended so.
+pub fn measured(observer: SlipObserver, summary: Summary) -> JobResult {
     let record = JobRecord { ruptures: observer.ruptures(), mean_friction: observer.mean_friction(), summary };
     let (slips, precursors) = observer.into_rows();
-    Ok(JobResult { slips, precursors, record })
+    JobResult { slips, precursors, record }
 }
 
 /// The bounds that a recording sets.

@@ -23,7 +23,7 @@ mod tests;
 mod upkeep;
 mod walltime;
 
-pub use kernel::{Kernel, kernel, limits};
+pub use kernel::{Kernel, kernel, limits, measured};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Failure, MOST_FAILURES, Status, status};

@@ -116,13 +116,18 @@ pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64)
         }
     };
     offer(last);
+    for_each_turn(coefficients, first, last, &mut offer);
+    best
+}
+
+/// Where the derivative changes its sign on [`first`, `last`], in order.
+pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: &mut impl FnMut(f64)) {
     let order = coefficients.len() - 1;
     let mut derivative = [0.0; MOST_COEFFICIENTS];
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
     }
-    for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, &mut offer);
-    best
+    for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, found);
 }
 
 /// The same polynomial in the variable s - `centre`.

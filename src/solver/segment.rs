@@ -114,6 +114,48 @@ impl Segment<'_> {
         Some((time, -mirrored))
     }
 
+    /// Values in N that F_S stays between; not the closest ones.
+    pub fn bounds(&self) -> (f64, f64) {
+        match self.path {
+            ForcePath::Polynomial { bend, scale, ends, .. } => {
+                let width = self.duration / scale;
+                let strays = 0.125 * bend * width * width;
+                let [start, end] = ends.map(|end| end.force);
+                (start.min(end) - strays, start.max(end) + strays)
+            }
+            ForcePath::Harmonic { start, rate, amplitude, .. } => {
+                let end = start + rate * self.duration;
+                (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
+            }
+        }
+    }
+
+    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the first
+    /// and the last maximum and minimum; those in between lie on lines between them.
+    pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
+        match self.path {
+            ForcePath::Polynomial { coefficients, first, scale, .. } => {
+                let last = first + self.duration / scale;
+                let (_, slope_varies) = polynomial::beyond_linear(coefficients);
+                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_varies) {
+                    return;
+                }
+                polynomial::for_each_turn(coefficients, first, last, &mut |s| {
+                    visit(self.start + (s - first) * scale, polynomial::value(coefficients, s));
+                });
+            }
+            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
+                let crests =
+                    |sign: f64| harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+                let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)].concat().into_iter().flatten().collect();
+                turns.sort_by(f64::total_cmp);
+                for elapsed in turns {
+                    visit(self.start + elapsed, self.force_after(elapsed));
+                }
+            }
+        }
+    }
+
     /// Integral of F_S over the segment, in N s.
     pub fn impulse(&self) -> f64 {
         match self.path {
@@ -188,4 +230,42 @@ fn harmonic_crests(rate: f64, amplitude: f64, phase: f64, angular_frequency: f64
     }
     let last = first + ((duration - first) / period).floor() * period;
     [Some(first), Some(last)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Between the turns, in order, the force goes one way; and it stays within its bounds.
+    fn assert_turns(segment: &Segment<'_>) {
+        let mut turns = vec![segment.start];
+        segment.for_each_turn(|time, _| turns.push(time));
+        turns.push(segment.end());
+        let (low, high) = segment.bounds();
+        for pair in turns.windows(2) {
+            assert!(pair[0] <= pair[1], "{turns:?}");
+            let force =
+                |step: u32| segment.force_after(pair[0] - segment.start + f64::from(step) / 50.0 * (pair[1] - pair[0]));
+            let sign = (force(50) - force(0)).signum();
+            for step in 0..50 {
+                assert!(sign * (force(step + 1) - force(step)) >= -1e-12, "{turns:?}");
+                assert!((low - 1e-12..=high + 1e-12).contains(&force(step)), "{low} {high}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_force_turns_nowhere_else(coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14)) {
+            assert_turns(&Segment::polynomial(3.0, 0.5, &coefficients));
+        }
+
+        /// With at most two maxima and minima there is no other turn in between.
+        #[test]
+        fn a_short_swing_turns_nowhere_else(rate in -1.0_f64..1.0, amplitude in -1.0_f64..1.0, phase in 0.0_f64..6.3) {
+            let path = ForcePath::Harmonic { start: 0.2, rate, amplitude, phase, angular_frequency: 9.0 };
+            assert_turns(&Segment { start: 3.0, duration: 1.3, path });
+        }
+    }
 }

@@ -152,6 +152,24 @@ pub fn slips<'a>() -> Table<SlipRow<'a>> {
             "advance of the reach through these precursors; null for fewer than two",
             OptionalReal(|row| row.slip.slow_front_speed),
         ),
+        Column::new(
+            "drops_before",
+            "",
+            "drops of the shear force since the previous slip; null unless the sweep records drops, as what follows",
+            OptionalCount(|row| Some(row.slip.drops?.before)),
+        ),
+        Column::new(
+            "largest_drop_before",
+            "N",
+            "the largest of them; null without any",
+            OptionalReal(|row| row.slip.drops?.largest_before),
+        ),
+        Column::new(
+            "drop_during",
+            "N",
+            "the largest drop under way during the slip; null if the slip is not seen as a drop",
+            OptionalReal(|row| row.slip.drops?.during),
+        ),
     ]);
     Table { name: "slips", meaning: "One row per slip past start-up", columns }
 }
@@ -321,6 +339,7 @@ pub(crate) mod tests {
             front_speed: Some(300.0),
             precursors: 2,
             slow_front_speed: None,
+            drops: None,
         }
     }
 

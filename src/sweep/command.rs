@@ -32,6 +32,9 @@ impl Sweep {
         if let Some(size) = recording.precursor_size {
             words.push(format!("--precursor-size {size}"));
         }
+        if let Some(size) = recording.drop_size {
+            words.push(format!("--drop-size {}", Value::Real(size)));
+        }
         match self.solver {
             solver if solver == Solver::default() => {}
             Solver::EventDriven { tolerance } => words.push(format!("--tolerance {}", Value::Real(tolerance))),

@@ -110,16 +110,18 @@ fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, SweepError> {
 }
 
 fn read_recording(record: &Section<'_>) -> Result<Recording, SweepError> {
-    record.only(&["slips", "discard", "max_time", "max_events", "precursor_size", "precursors"])?;
+    record.only(&["slips", "discard", "max_time", "max_events", "precursor_size", "precursors", "drop_size"])?;
     let default = Recording::default();
     let count = |key: &str, least| record.entry(key).map(|entry| entry.count(least, MOST_COUNT)).transpose();
+    let positive = |key: &str, unit| record.entry(key).map(|entry| entry.positive(unit)).transpose();
     Ok(Recording {
         slips: count("slips", 1)?.unwrap_or(default.slips),
         discard: count("discard", 0)?.unwrap_or(default.discard),
-        max_time: record.entry("max_time").map(|entry| entry.positive("s")).transpose()?.or(default.max_time),
+        max_time: positive("max_time", "s")?.or(default.max_time),
         max_events: count("max_events", 1)?.unwrap_or(default.max_events),
         precursor_size: count("precursor_size", 1)?.or(default.precursor_size),
         precursors: record.entry("precursors").map_or(Ok(default.precursors), |entry| entry.flag())?,
+        drop_size: positive("drop_size", "N")?.or(default.drop_size),
     })
 }
 

@@ -73,7 +73,7 @@ pub(super) fn settings(solver: Solver, recording: &Recording) -> Vec<(&'static s
             vec![("solver.method", "fixed-step".to_owned()), ("solver.dt", Shortest(time_step).to_string())]
         }
     };
-    let Recording { slips, discard, max_time, max_events, precursor_size, precursors } = recording;
+    let Recording { slips, discard, max_time, max_events, precursor_size, precursors, drop_size } = recording;
     settings.extend([
         ("record.slips", slips.to_string()),
         ("record.discard", discard.to_string()),
@@ -82,6 +82,8 @@ pub(super) fn settings(solver: Solver, recording: &Recording) -> Vec<(&'static s
         ("record.precursor_size", precursor_size.map_or_else(none, |size| size.to_string())),
         ("record.precursors", precursors.to_string()),
     ]);
+    // Named only where it is set, so that the ids of other jobs are those of before there was such a key.
+    settings.extend(drop_size.map(|size| ("record.drop_size", Shortest(size).to_string())));
     settings
 }
 
@@ -184,6 +186,8 @@ mod tests {
             Recording { max_events: 7, ..default },
             Recording { precursor_size: Some(20), ..default },
             Recording { precursors: true, ..default },
+            Recording { drop_size: Some(5.0), ..default },
+            Recording { drop_size: Some(5.0_f64.next_up()), ..default },
             default,
         ];
         let mut ids = HashSet::new();

@@ -48,6 +48,7 @@ fn measure(parameters: &Parameters) -> JobResult {
         front_speed: None,
         precursors: 1,
         slow_front_speed: None,
+        drops: None,
     });
     let precursors = (0..count).map(|slip| Precursor {
         slip,

@@ -37,6 +37,7 @@ fn all_sections_are_read() {
     let sweep = sweep(
         "[model]\nN = 0x14\nK = 2e8\nbreak_on = \"tension\"\nDelta = 1e-6\nT = 1\n\
          [record]\nslips = 7\ndiscard = 0\nmax_time = 2\nmax_events = 1_000\nprecursor_size = 3\nprecursors = true\n\
+         drop_size = 5\n\
          [solver]\nmethod = \"fixed-step\"\ndt = 2e-6",
     );
     let parameters = sweep.jobs().next().unwrap().parameters;
@@ -45,6 +46,7 @@ fn all_sections_are_read() {
     let recording = sweep.recording();
     assert_eq!((recording.slips, recording.discard, recording.max_time), (7, 0, Some(2.0)));
     assert_eq!((recording.max_events, recording.precursor_size, recording.precursors), (1000, Some(3), true));
+    assert_eq!(recording.drop_size, Some(5.0));
     assert_eq!(sweep.solver(), Solver::FixedStep { time_step: 2e-6 });
 }
 
