@@ -246,4 +246,42 @@ mod tests {
         assert_eq!(bins[0].share_below, Some(2.0 / 84.0));
         assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
     }
+
+    #[test]
+    fn below_locking_a_bin_tells_the_resultant_of_slips_at_random_loads() {
+        let mut backbone = Backbone::default();
+        // η = 0.628 with 30 slips and 0.785 with 10: one bin.
+        for (period, slips) in [(0.1, 30), (0.08, 10)] {
+            let (jobs, mut set) = (jobs(1e-6, period), SetSlips::default());
+            let limits = PhaseLimits::at(jobs.parameters.eta());
+            (0..slips).for_each(|slip_number| set.push(&slip(None, Some(f64::from(slip_number) * 2.4 - 3.0)), &limits));
+            backbone.push(&set.finish(jobs));
+        }
+        let bins = backbone.finish();
+        assert_eq!((bins.len(), bins[0].slips), (1, 40));
+        assert!((bins[0].expected_resultant.unwrap() - 0.5 * (0.75 * 0.628_318_5 + 0.25 * 0.785_398_2)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn variances_add_over_sets_and_single_slips_count_as_uniform_phases() {
+        let bin = |sets: &[&[f64]]| {
+            let mut backbone = Backbone::default();
+            for &phases in sets {
+                let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
+                phases.iter().for_each(|&phase| set.push(&slip(None, Some(phase)), &PhaseLimits::at(6.28)));
+                backbone.push(&set.finish(jobs));
+            }
+            backbone.finish()[0]
+        };
+        let width = |bin: BackboneBin| bin.phase_mean_high.unwrap() - bin.phase_mean_low.unwrap();
+        let alternating: Vec<f64> = (0..40).map(|number| if number % 2 == 0 { -0.7 } else { -1.1 }).collect();
+        let (one, four) = (bin(&[&alternating]), bin(&[alternating.as_slice(); 4]));
+        assert_eq!((one.effective_slips, four.effective_slips), (Some(40.0), Some(160.0)));
+        // Half as wide, and a little less with more degrees of freedom.
+        assert!((0.45..0.5).contains(&(width(four) / width(one))), "{}", width(four) / width(one));
+        // A hundred single slips at the same phase: sin(half) = 1.96 sqrt(1/200).
+        let single = bin(&[[-0.9].as_slice(); 100]);
+        assert!((width(single) - 2.0 * libm::asin(1.959_964 * 0.005_f64.sqrt())).abs() < 1e-6);
+        assert_eq!(bin(&[&[-0.9]]).phase_mean_low, None, "one slip tells nothing of its spread");
+    }
 }

@@ -276,4 +276,22 @@ pub(super) mod tests {
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
         assert!(!still.is_locked);
     }
+
+    #[test]
+    fn jobs_begin_with_their_first_slip_and_are_independent() {
+        // Each job holds its own phase and interval: as many independent values as jobs.
+        let of_job = |job: u32| {
+            let own = 0.01 * f64::from(job * 7 % 20);
+            (0..10).map(move |number| SlipSample { number, ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own)) })
+        };
+        let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
+        for effective in [row.effective_slips, row.effective_intervals] {
+            assert!((effective.unwrap() - 20.0).abs() < 2.0, "{effective:?}");
+        }
+        let (mean, interval) = (row.phase_mean.unwrap(), row.phase_interval.unwrap());
+        assert!(interval.low < mean && mean < interval.high);
+        assert!(row.tau_interval.unwrap().low < row.tau_mean.unwrap());
+        assert!(row.locking_interval.unwrap().high > row.locking_index.unwrap());
+        assert_eq!(row.jobs.friction.interval(), None);
+    }
 }
