@@ -213,6 +213,7 @@ mod tests {
     use super::super::set::SetSlips;
     use super::super::set::tests::{jobs, slip};
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn eta_of_one_begins_a_bin() {
@@ -254,12 +255,14 @@ mod tests {
         for (period, slips) in [(0.1, 30), (0.08, 10)] {
             let (jobs, mut set) = (jobs(1e-6, period), SetSlips::default());
             let limits = PhaseLimits::at(jobs.parameters.eta());
-            (0..slips).for_each(|slip_number| set.push(&slip(None, Some(f64::from(slip_number) * 2.4 - 3.0)), &limits));
+            for number in 0..slips {
+                set.push(&slip(None, Some(f64::from(number) * 2.4 - 3.0)), &limits);
+            }
             backbone.push(&set.finish(jobs));
         }
         let bins = backbone.finish();
         assert_eq!((bins.len(), bins[0].slips), (1, 40));
-        assert!((bins[0].expected_resultant.unwrap() - 0.5 * (0.75 * 0.628_318_5 + 0.25 * 0.785_398_2)).abs() < 1e-6);
+        assert!((bins[0].expected_resultant.unwrap() - 0.5 * 0.01 * TAU * (0.75 / 0.1 + 0.25 / 0.08)).abs() < 1e-12);
     }
 
     #[test]
@@ -268,7 +271,10 @@ mod tests {
             let mut backbone = Backbone::default();
             for &phases in sets {
                 let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
-                phases.iter().for_each(|&phase| set.push(&slip(None, Some(phase)), &PhaseLimits::at(6.28)));
+                let limits = PhaseLimits::at(jobs.parameters.eta());
+                for &phase in phases {
+                    set.push(&slip(None, Some(phase)), &limits);
+                }
                 backbone.push(&set.finish(jobs));
             }
             backbone.finish()[0]
