@@ -64,6 +64,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
         "tables/jobs/part-000-000000.parquet",
         "reduced/sets.parquet",
         "reduced/histograms.parquet",
+        "reduced/startup.parquet",
         "reduced/backbone.parquet",
         "reduced/points.parquet",
         "figures/phi-eta.svg",
@@ -75,7 +76,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     ] {
         assert!(there.contains(&file), "{file} is not in {there:?}");
     }
-    assert!(there.iter().filter(|file| !file.starts_with("run/")).count() == 11, "{there:?}");
+    assert!(there.iter().filter(|file| !file.starts_with("run/")).count() == 12, "{there:?}");
     assert!(!there.iter().any(|file| file.starts_with("run/staging")), "{there:?}");
     assert_eq!(before[&PathBuf::from("run/sweep-000.toml")], Some(TINY.as_bytes().to_vec()));
     assert_eq!(folder.table("results/tiny", "jobs").cells.len() as u64, TINY_JOBS);

@@ -17,7 +17,6 @@ use stickslip::model::slider::StiffnessMatrix;
 use stickslip::model::theory::exact_decay_per_block;
 use stickslip::model::{Change, ContactEvent, Parameters};
 use stickslip::observe::Recording;
-use stickslip::reduce::circular::Directions;
 use stickslip::reduce::quantile;
 use stickslip::run::kernel;
 use stickslip::solver::{Limits, Observer, Segment, Solver, simulate};
@@ -59,9 +58,10 @@ impl Intervals {
 
     /// |<exp(2πi τ/T)>|: 1 if every interval is a whole number of periods.
     fn locking_index(&self, period: f64) -> f64 {
-        let mut directions = Directions::default();
-        self.0.iter().for_each(|tau| directions.push(std::f64::consts::TAU * tau / period));
-        directions.resultant_length().unwrap()
+        let mean = |part: fn(f64) -> f64| {
+            self.0.iter().map(|tau| part(std::f64::consts::TAU * tau / period)).sum::<f64>() / self.0.len() as f64
+        };
+        mean(f64::cos).hypot(mean(f64::sin))
     }
 
     fn describe(&self) -> String {

@@ -1,7 +1,8 @@
 //! The φ-η back-bone: phases pooled in logarithmic bins of η (Fig. 3e).
 
 use super::PhaseLimits;
-use super::circular::Directions;
+use super::circular::unit;
+use super::sequence::{Estimate, Sequences};
 use super::set::FinishedSet;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::store::columns::{Column, Getter, Table};
@@ -21,12 +22,18 @@ pub struct BackboneBin {
     pub sets: u64,
     pub locked_sets: u64,
     pub slips: u64,
+    pub effective_slips: Option<f64>,
     pub phase_mean: Option<f64>,
+    pub phase_mean_low: Option<f64>,
+    pub phase_mean_high: Option<f64>,
     pub resultant_length: Option<f64>,
+    pub expected_resultant: Option<f64>,
     pub rayleigh_p: Option<f64>,
     pub load_rayleigh_p: Option<f64>,
     pub share_below: Option<f64>,
     pub locked_phase_mean: Option<f64>,
+    pub locked_phase_mean_low: Option<f64>,
+    pub locked_phase_mean_high: Option<f64>,
     pub phase_minimum: Option<f64>,
     pub asymptote: f64,
 }
@@ -40,10 +47,13 @@ pub(super) struct Backbone {
 #[derive(Clone, Debug, Default)]
 struct Bin {
     sets: u64,
-    phases: Directions,
-    loads: Directions,
+    phases: Estimate<2>,
+    loads: Estimate<2>,
     below: u64,
-    locked: Directions,
+    /// Sum of η over the slips.
+    etas: f64,
+    /// Mean phases of locked sets, as unit vectors.
+    locked: Vec<[f64; 2]>,
 }
 
 fn edge(bin: i32) -> f64 {
@@ -73,11 +83,12 @@ impl Backbone {
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        bin.phases.add(&set.phases);
-        bin.loads.add(&set.loads);
+        bin.phases.add(&pooled(&set.phases));
+        bin.loads.add(&pooled(&set.loads));
         bin.below += set.below;
+        bin.etas += set.row.eta * set.phases.count() as f64;
         if set.row.is_locked {
-            bin.locked.push(phase);
+            bin.locked.push(unit(phase));
         }
     }
 
@@ -86,25 +97,41 @@ impl Backbone {
             let (eta_low, eta_high) = (edge(index), edge(index + 1));
             let eta_centre = (eta_low * eta_high).sqrt();
             let limits = PhaseLimits::at(eta_centre);
+            let locked_sets = bin.locked.len() as u64;
+            let locked = Sequences::independent(bin.locked).estimate();
+            let (interval, locked_interval) =
+                (bin.phases.direction_interval(limits.top), locked.direction_interval(limits.top));
             BackboneBin {
                 eta_low,
                 eta_high,
                 eta_centre,
                 sets: bin.sets,
-                locked_sets: bin.locked.count(),
+                locked_sets,
                 slips: bin.phases.count(),
-                phase_mean: bin.phases.mean(limits.top),
+                effective_slips: bin.phases.effective(),
+                phase_mean: bin.phases.direction(limits.top),
+                phase_mean_low: interval.map(|interval| interval.low),
+                phase_mean_high: interval.map(|interval| interval.high),
                 resultant_length: bin.phases.resultant_length(),
+                expected_resultant: limits.minimum.is_none().then(|| 0.5 * bin.etas / bin.phases.count() as f64),
                 rayleigh_p: bin.phases.rayleigh(),
                 load_rayleigh_p: bin.loads.rayleigh(),
                 share_below: limits.minimum.map(|_| bin.below as f64 / bin.phases.count() as f64),
-                locked_phase_mean: bin.locked.mean(limits.top),
+                locked_phase_mean: locked.direction(limits.top),
+                locked_phase_mean_low: locked_interval.map(|interval| interval.low),
+                locked_phase_mean_high: locked_interval.map(|interval| interval.high),
                 phase_minimum: minimum_phase(eta_centre),
                 asymptote: minimum_phase_asymptote(eta_centre),
             }
         };
         self.bins.into_iter().map(row).collect()
     }
+}
+
+/// The phases of a set as they enter a pool. Of a single one the variance is unknown; it is taken as that of a uniform phase,
+/// 1/2 in every direction, which is the largest.
+fn pooled(phases: &Estimate<2>) -> Estimate<2> {
+    if phases.count() == 1 { phases.with_known_variance(0.5) } else { *phases }
 }
 
 /// The table of bins.
@@ -118,13 +145,37 @@ pub fn backbone() -> Table<BackboneBin> {
         Column::new("sets", "", "parameter sets", Count(|row| row.sets)),
         Column::new("locked_sets", "", "locked parameter sets", Count(|row| row.locked_sets)),
         Column::new("slips", "", "slips of all sets", Count(|row| row.slips)),
+        Column::new(
+            "effective_slips",
+            "",
+            "independent phases that tell as much as the correlated ones",
+            OptionalReal(|row| row.effective_slips),
+        ),
         Column::new("phase_mean", "rad", "circular mean of the phase of all slips", OptionalReal(|row| row.phase_mean)),
+        Column::new(
+            "phase_mean_low",
+            "rad",
+            "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded",
+            OptionalReal(|row| row.phase_mean_low),
+        ),
+        Column::new("phase_mean_high", "rad", "upper end", OptionalReal(|row| row.phase_mean_high)),
         Column::new("resultant_length", "", "|<exp(i phi)>| of all slips", OptionalReal(|row| row.resultant_length)),
-        Column::new("rayleigh_p", "", "p-value of the Rayleigh test of all slips", OptionalReal(|row| row.rayleigh_p)),
+        Column::new(
+            "expected_resultant",
+            "",
+            "the same of slips at random loads, eta/2 averaged over the slips; null for eta >= 1",
+            OptionalReal(|row| row.expected_resultant),
+        ),
+        Column::new(
+            "rayleigh_p",
+            "",
+            "p-value of the Rayleigh test of all slips, with effective_slips",
+            OptionalReal(|row| row.rayleigh_p),
+        ),
         Column::new(
             "load_rayleigh_p",
             "",
-            "the same of the load phases phi + eta cos(phi), for eta < 1",
+            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1",
             OptionalReal(|row| row.load_rayleigh_p),
         ),
         Column::new(
@@ -139,6 +190,13 @@ pub fn backbone() -> Table<BackboneBin> {
             "circular mean over locked sets of their mean phase",
             OptionalReal(|row| row.locked_phase_mean),
         ),
+        Column::new(
+            "locked_phase_mean_low",
+            "rad",
+            "lower end of its 95 % confidence interval, of sets as units",
+            OptionalReal(|row| row.locked_phase_mean_low),
+        ),
+        Column::new("locked_phase_mean_high", "rad", "upper end", OptionalReal(|row| row.locked_phase_mean_high)),
         Column::new(
             "phi_min",
             "rad",
@@ -155,6 +213,7 @@ mod tests {
     use super::super::set::SetSlips;
     use super::super::set::tests::{jobs, slip};
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn eta_of_one_begins_a_bin() {
@@ -187,5 +246,48 @@ mod tests {
         assert!(bins[0].phase_mean.unwrap() > -0.8);
         assert_eq!(bins[0].share_below, Some(2.0 / 84.0));
         assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn below_locking_a_bin_tells_the_resultant_of_slips_at_random_loads() {
+        let mut backbone = Backbone::default();
+        // η = 0.628 with 30 slips and 0.785 with 10: one bin.
+        for (period, slips) in [(0.1, 30), (0.08, 10)] {
+            let (jobs, mut set) = (jobs(1e-6, period), SetSlips::default());
+            let limits = PhaseLimits::at(jobs.parameters.eta());
+            for number in 0..slips {
+                set.push(&slip(None, Some(f64::from(number) * 2.4 - 3.0)), &limits);
+            }
+            backbone.push(&set.finish(jobs));
+        }
+        let bins = backbone.finish();
+        assert_eq!((bins.len(), bins[0].slips), (1, 40));
+        assert!((bins[0].expected_resultant.unwrap() - 0.5 * 0.01 * TAU * (0.75 / 0.1 + 0.25 / 0.08)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn variances_add_over_sets_and_single_slips_count_as_uniform_phases() {
+        let bin = |sets: &[&[f64]]| {
+            let mut backbone = Backbone::default();
+            for &phases in sets {
+                let (jobs, mut set) = (jobs(1e-6, 0.01), SetSlips::default());
+                let limits = PhaseLimits::at(jobs.parameters.eta());
+                for &phase in phases {
+                    set.push(&slip(None, Some(phase)), &limits);
+                }
+                backbone.push(&set.finish(jobs));
+            }
+            backbone.finish()[0]
+        };
+        let width = |bin: BackboneBin| bin.phase_mean_high.unwrap() - bin.phase_mean_low.unwrap();
+        let alternating: Vec<f64> = (0..40).map(|number| if number % 2 == 0 { -0.7 } else { -1.1 }).collect();
+        let (one, four) = (bin(&[&alternating]), bin(&[alternating.as_slice(); 4]));
+        assert_eq!((one.effective_slips, four.effective_slips), (Some(40.0), Some(160.0)));
+        // Half as wide, and a little less with more degrees of freedom.
+        assert!((0.45..0.5).contains(&(width(four) / width(one))), "{}", width(four) / width(one));
+        // A hundred single slips at the same phase: sin(half) = 1.96 sqrt(1/200).
+        let single = bin(&[[-0.9].as_slice(); 100]);
+        assert!((width(single) - 2.0 * libm::asin(1.959_964 * 0.005_f64.sqrt())).abs() < 1e-6);
+        assert_eq!(bin(&[&[-0.9]]).phase_mean_low, None, "one slip tells nothing of its spread");
     }
 }

@@ -1,24 +1,32 @@
 //! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone, histograms
-//! of τ, and a sample of slips for scatter figures.
+//! of τ, start-up, and a sample of slips for scatter figures.
 
 mod backbone;
 pub mod circular;
+mod confidence;
 mod histogram;
 mod moments;
 mod point;
+mod rank;
 mod read;
 mod reduction;
 mod rows;
+mod sequence;
 mod set;
+mod set_row;
+mod startup;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
+pub use confidence::{CONFIDENCE, Interval};
 pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
 pub use moments::{Moments, quantile};
 pub use point::{MOST_POINTS, Point, Way, points};
 pub use read::{SetSummary, Statistic, read_backbone, read_histograms, read_points, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
-pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow, sets};
+pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
+pub use set_row::{SetJobs, SetRow, sets};
+pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow, startup};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
@@ -30,6 +38,8 @@ pub const BELOW_MARGIN: f64 = 0.15;
 /// What a reduction takes from a row of the slips table, in the table's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct SlipSample {
+    /// Within its job, from 0.
+    number: u64,
     onset: f64,
     interval: Option<f64>,
     /// The modulation at the onset: period in s, amplitude in m.

@@ -101,6 +101,9 @@ pub fn read_backbone(storage: &dyn Storage, layout: &Layout) -> Result<Vec<Backb
         let (rayleigh_p, share_below) = (reals("rayleigh_p")?, reals("share_below")?);
         let (locked_phase_mean, phi_min) = (reals("locked_phase_mean")?, reals("phi_min")?);
         let (load_rayleigh_p, asymptote) = (reals("load_rayleigh_p")?, reals("asymptote")?);
+        let (phase_mean_low, phase_mean_high) = (reals("phase_mean_low")?, reals("phase_mean_high")?);
+        let (locked_low, locked_high) = (reals("locked_phase_mean_low")?, reals("locked_phase_mean_high")?);
+        let (effective_slips, expected) = (reals("effective_slips")?, reals("expected_resultant")?);
         let (sets, locked_sets, slips) = (batch.counts("sets")?, batch.counts("locked_sets")?, batch.counts("slips")?);
         bins.extend((0..batch.rows.num_rows()).map(|row| BackboneBin {
             eta_low: eta_low.value(row),
@@ -109,12 +112,18 @@ pub fn read_backbone(storage: &dyn Storage, layout: &Layout) -> Result<Vec<Backb
             sets: sets.value(row).cast_unsigned(),
             locked_sets: locked_sets.value(row).cast_unsigned(),
             slips: slips.value(row).cast_unsigned(),
+            effective_slips: real(effective_slips, row),
             phase_mean: real(phase_mean, row),
+            phase_mean_low: real(phase_mean_low, row),
+            phase_mean_high: real(phase_mean_high, row),
             resultant_length: real(resultant_length, row),
+            expected_resultant: real(expected, row),
             rayleigh_p: real(rayleigh_p, row),
             load_rayleigh_p: real(load_rayleigh_p, row),
             share_below: real(share_below, row),
             locked_phase_mean: real(locked_phase_mean, row),
+            locked_phase_mean_low: real(locked_low, row),
+            locked_phase_mean_high: real(locked_high, row),
             phase_minimum: real(phi_min, row),
             asymptote: asymptote.value(row),
         }));

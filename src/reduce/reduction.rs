@@ -1,15 +1,17 @@
-//! The reduction of a results directory: jobs once, slips as often as memory asks for, four files committed together.
+//! The reduction of a results directory: jobs once, slips as often as memory asks for, five files committed together.
 //!
 //! Sets are told in the order of their parameters and rows are summed in table order (file names, then rows), so the same
-//! tables give the same bytes. Memory: a few hundred bytes per set, and the intervals of [`MOST_SLIPS`] slips; where the
-//! tables hold more, the slips are read again for the next sets.
+//! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MOST_SLIPS`] slips, and as
+//! much again for those of the set at hand; where the tables hold more, the slips are read again for the next sets.
 
+use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin, backbone};
 use super::histogram::{histogram, histograms};
 use super::point::{Point, Way, points, spacing};
 use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
-use super::set::{SetSlips, sets};
-use super::{PhaseLimits, SetJobs};
+use super::set::SetSlips;
+use super::set_row::{SetJobs, sets};
+use super::startup::startup;
 use crate::model::{Symbol, Value};
 use crate::store::commit::{Commit, alone, create_folder};
 use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
@@ -22,8 +24,8 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
-/// Slips whose intervals are held at once: 256 MB of doubles.
-const MOST_SLIPS: u64 = 1 << 25;
+/// Slips that are held at once: 170 MB.
+const MOST_SLIPS: u64 = 1 << 22;
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
@@ -67,8 +69,8 @@ pub struct ReductionSummary {
     pub backbone: Vec<BackboneBin>,
 }
 
-/// Reduces the tables of a results directory to `reduced/{sets,histograms,backbone,points}.parquet`, over those of an
-/// earlier reduction.
+/// Reduces the tables of a results directory to `reduced/{sets,histograms,startup,backbone,points}.parquet`, over those
+/// of an earlier reduction.
 ///
 /// # Errors
 /// When there is no job, a table is damaged, or the reduced data cannot be written; earlier reduced files stay whole.
@@ -102,9 +104,11 @@ fn reduce_by(
     create_folder(storage, &layout.reduced())?;
     let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
-    let (sets, histograms, backbone, points) = (sets(), histograms(), backbone(), points());
+    let (sets, histograms, startup) = (sets(), histograms(), startup());
+    let (backbone, points) = (backbone(), points());
     let mut set_writer = TableWriter::create(storage, &stage(sets.name), sets, footer)?;
     let mut histogram_writer = TableWriter::create(storage, &stage(histograms.name), histograms, footer)?;
+    let mut startup_writer = TableWriter::create(storage, &stage(startup.name), startup, footer)?;
     let mut backbone_writer = TableWriter::create(storage, &stage(backbone.name), backbone, footer)?;
     let mut point_writer = TableWriter::create(storage, &stage(points.name), points, footer)?;
 
@@ -117,6 +121,9 @@ fn reduce_by(
             set_writer.push(row)?;
             for bin in histogram(row, &set.intervals) {
                 histogram_writer.push(&bin)?;
+            }
+            for slip in &set.startup {
+                startup_writer.push(slip)?;
             }
             pooled.push(&set);
             summary.slips += row.slips;
@@ -137,6 +144,7 @@ fn reduce_by(
     }
     set_writer.finish()?;
     histogram_writer.finish()?;
+    startup_writer.finish()?;
     backbone_writer.finish()?;
     point_writer.finish()?;
     commit.publish()?;
@@ -331,7 +339,9 @@ mod tests {
 
     fn reduced_bytes(root: &tempfile::TempDir) -> Vec<Vec<u8>> {
         let layout = Layout::new(root.path());
-        ["sets", "histograms", "backbone", "points"].map(|name| fs::read(reduced_file(&layout, name)).unwrap()).to_vec()
+        ["sets", "histograms", "startup", "backbone", "points"]
+            .map(|name| fs::read(reduced_file(&layout, name)).unwrap())
+            .to_vec()
     }
 
     #[test]

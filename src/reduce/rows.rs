@@ -8,8 +8,9 @@ use arrow_array::{Array, Float64Array, Int64Array, StringArray};
 use std::collections::BTreeMap;
 
 /// Columns of the slips table that a reduction needs.
-pub(super) const SLIP_COLUMNS: [&str; 13] = [
+pub(super) const SLIP_COLUMNS: [&str; 14] = [
     "set_id",
+    "slip",
     "onset",
     "interval",
     "T_onset",
@@ -34,7 +35,7 @@ pub(super) fn count(array: &Int64Array, row: usize) -> Option<u64> {
 
 /// The slips of a batch, each with the id of its set, in order.
 pub(super) fn for_each_slip(batch: &Batch, mut visit: impl FnMut(&str, &SlipSample)) -> Result<(), DatasetError> {
-    let set_id = batch.texts("set_id")?;
+    let (set_id, number) = (batch.texts("set_id")?, batch.counts("slip")?);
     let (onset, period, amplitude) = (batch.reals("onset")?, batch.reals("T_onset")?, batch.reals("Delta_onset")?);
     let (interval, periods, phase) = (batch.reals("interval")?, batch.counts("n")?, batch.reals("phase")?);
     let (peak_force, drop, duration) = (batch.reals("peak_force")?, batch.reals("drop")?, batch.reals("duration")?);
@@ -42,6 +43,7 @@ pub(super) fn for_each_slip(batch: &Batch, mut visit: impl FnMut(&str, &SlipSamp
     let (front_speed, slow_front_speed) = (batch.reals("front_speed")?, batch.reals("slow_front_speed")?);
     for row in 0..batch.rows.num_rows() {
         let slip = SlipSample {
+            number: number.value(row).cast_unsigned(),
             onset: onset.value(row),
             interval: real(interval, row),
             period: real(period, row),

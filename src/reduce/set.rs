@@ -1,10 +1,11 @@
 //! One parameter set, all seeds together: intervals, locking and phase statistics.
 
-use super::circular::Directions;
+use super::circular::unit;
 use super::moments::{Moments, quantile};
+use super::sequence::{Estimate, Sequences};
+use super::set_row::{SetJobs, SetRow};
+use super::startup::{StartupRow, startup_probability, startup_rows};
 use super::{PhaseLimits, SlipSample};
-use crate::model::{Parameters, Symbol};
-use crate::store::columns::{Column, Getter, Table};
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
@@ -16,16 +17,47 @@ pub const LOCKED_LENGTH: f64 = 0.5;
 /// Quantiles of τ that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
-/// Gathers the slips of a set.
+/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct KeptSlip {
+    interval: f64,
+    /// The interval in periods of the modulation at its end.
+    periods: f64,
+    phase: f64,
+    load_phase: f64,
+    /// Stress drop, in N.
+    pub(super) drop: f64,
+}
+
+impl KeptSlip {
+    pub(super) fn of(slip: &SlipSample, limits: &PhaseLimits) -> Self {
+        let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        Self {
+            interval: or_missing(slip.interval),
+            periods: or_missing(slip.interval.zip(slip.period).map(|(interval, period)| interval / period)),
+            phase: or_missing(slip.phase),
+            load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
+            drop: slip.drop,
+        }
+    }
+
+    /// Interval before it, in s.
+    pub(super) fn interval(&self) -> Option<f64> {
+        there(self.interval)
+    }
+}
+
+/// A value that is not missing.
+fn there(value: f64) -> Option<f64> {
+    (!value.is_nan()).then_some(value)
+}
+
+/// Gathers the slips of a set, job after job.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
-    intervals: Vec<f64>,
-    /// Each interval in periods of the modulation at its end.
-    periods: Vec<f64>,
-    slips: u64,
-    phases: Directions,
-    /// Load phases, for η < 1.
-    loads: Directions,
+    slips: Vec<KeptSlip>,
+    /// Where jobs begin.
+    starts: Vec<usize>,
     below: u64,
     drop: Moments,
     peak_force: Moments,
@@ -37,16 +69,11 @@ pub(super) struct SetSlips {
 
 impl SetSlips {
     pub(super) fn push(&mut self, slip: &SlipSample, limits: &PhaseLimits) {
-        self.slips += 1;
-        self.intervals.extend(slip.interval);
-        self.periods.extend(slip.interval.zip(slip.period).map(|(interval, period)| interval / period));
-        if let Some(phase) = slip.phase {
-            self.phases.push(phase);
-            if let Some(load) = limits.load_phase(phase) {
-                self.loads.push(load);
-            }
-            self.below += u64::from(limits.is_below(phase));
+        if slip.number == 0 || self.starts.is_empty() {
+            self.starts.push(self.slips.len());
         }
+        self.slips.push(KeptSlip::of(slip, limits));
+        self.below += u64::from(slip.phase.is_some_and(|phase| limits.is_below(phase)));
         self.drop.push(slip.drop);
         self.peak_force.push(slip.peak_force);
         self.duration.push(slip.duration);
@@ -56,37 +83,50 @@ impl SetSlips {
     }
 
     /// The statistics of the set.
-    pub(super) fn finish(mut self, jobs: SetJobs) -> FinishedSet {
+    pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
-        let (mut tau, mut periods, mut locking) = (Moments::default(), Moments::default(), Directions::default());
-        tau.extend(self.intervals.iter().copied());
-        for &count in &self.periods {
-            periods.push(count);
-            // The whole turns go first: they would cost the sine its digits.
-            locking.push(TAU * count.fract());
-        }
-        self.intervals.sort_by(f64::total_cmp);
-        let has_limit = limits.minimum.is_some() && self.phases.count() > 0;
-        let rayleigh_p = self.phases.rayleigh();
-        let resultant_length = self.phases.resultant_length();
+        let by_job = self.by_job();
+        let intervals = estimate(&by_job, |slip| slip.interval().map(|interval| [interval]));
+        let drops = estimate(&by_job, |slip| Some([slip.drop]));
+        // The whole turns go first: they would cost the sine its digits.
+        let locking = estimate(&by_job, |slip| there(slip.periods).map(|periods| unit(TAU * periods.fract())));
+        let phases = estimate(&by_job, |slip| there(slip.phase).map(unit));
+        let loads = estimate(&by_job, |slip| there(slip.load_phase).map(unit));
+
+        let mut sorted: Vec<f64> = self.slips.iter().filter_map(KeptSlip::interval).collect();
+        let (mut tau, mut periods) = (Moments::default(), Moments::default());
+        tau.extend(sorted.iter().copied());
+        periods.extend(self.slips.iter().filter_map(|slip| there(slip.periods)));
+        sorted.sort_by(f64::total_cmp);
+
+        let has_limit = limits.minimum.is_some() && phases.count() > 0;
+        let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
         let row = SetRow {
             eta,
-            slips: self.slips,
+            slips: self.slips.len() as u64,
             intervals: tau.count(),
+            effective_slips: phases.effective(),
+            effective_intervals: intervals.effective(),
+            startup_p: startup_probability(&by_job, intervals.inflation()),
             tau_mean: tau.mean(),
+            tau_interval: intervals.interval(),
             tau_deviation: tau.deviation(),
-            tau_quantiles: QUANTILES.map(|share| quantile(&self.intervals, share)),
+            tau_quantiles: QUANTILES.map(|share| quantile(&sorted, share)),
             periods_mean: periods.mean(),
             locking_index: locking.resultant_length(),
-            phase_mean: self.phases.mean(limits.top),
+            locking_interval: locking.length_interval(),
+            phase_mean: phases.direction(limits.top),
+            phase_interval: phases.direction_interval(limits.top),
             resultant_length,
+            length_interval: phases.length_interval(),
             rayleigh_p,
-            load_rayleigh_p: self.loads.rayleigh(),
-            share_below: has_limit.then(|| self.below as f64 / self.phases.count() as f64),
+            load_rayleigh_p: loads.rayleigh(),
+            share_below: has_limit.then(|| self.below as f64 / phases.count() as f64),
             is_locked: rayleigh_p.is_some_and(|p| p < LOCKED_PROBABILITY)
                 && resultant_length.is_some_and(|length| length > LOCKED_LENGTH),
             drop_mean: self.drop.mean(),
+            drop_interval: drops.interval(),
             drop_deviation: self.drop.deviation(),
             peak_force_mean: self.peak_force.mean(),
             duration_mean: self.duration.mean(),
@@ -95,8 +135,19 @@ impl SetSlips {
             slow_front_speed_mean: self.slow_front_speed.mean(),
             jobs,
         };
-        FinishedSet { row, intervals: self.intervals, phases: self.phases, loads: self.loads, below: self.below }
+        let startup = startup_rows(&row.jobs.set_id, &by_job, [intervals.inflation(), drops.inflation()]);
+        FinishedSet { row, intervals: sorted, phases, loads, below: self.below, startup }
     }
+
+    fn by_job(&self) -> Vec<&[KeptSlip]> {
+        let ends = self.starts.iter().skip(1).copied().chain([self.slips.len()]);
+        self.starts.iter().zip(ends).map(|(&start, end)| &self.slips[start..end]).collect()
+    }
+}
+
+/// The mean of a quantity that some of the slips have.
+fn estimate<const D: usize>(jobs: &[&[KeptSlip]], quantity: impl Fn(&KeptSlip) -> Option<[f64; D]>) -> Estimate<D> {
+    Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity))).estimate()
 }
 
 /// A set whose slips are all there.
@@ -106,147 +157,20 @@ pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
-    /// Its phases.
-    pub(super) phases: Directions,
+    /// Its phases, as unit vectors.
+    pub(super) phases: Estimate<2>,
     /// Its load phases, for η < 1.
-    pub(super) loads: Directions,
+    pub(super) loads: Estimate<2>,
     /// Slips under the back-bone.
     pub(super) below: u64,
-}
-
-/// What the jobs table tells about a set.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SetJobs {
-    /// Id of the set, 32 hexadecimal characters.
-    pub set_id: String,
-    /// Its parameters; the seed is that of any of its jobs.
-    pub parameters: Parameters,
-    /// Jobs that were run to an end.
-    pub finished: u64,
-    /// Jobs that failed.
-    pub failed: u64,
-    /// Slips that the jobs recorded.
-    pub slips: u64,
-    /// Time-averaged shear force of the jobs, in N.
-    pub friction: Moments,
-}
-
-/// A row of the reduced sets. Quantities are SI; `None` where there is nothing to average.
-#[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "each is described in `sets`, the table of these rows")]
-pub struct SetRow {
-    pub jobs: SetJobs,
-    pub eta: f64,
-    pub slips: u64,
-    pub intervals: u64,
-    pub tau_mean: Option<f64>,
-    pub tau_deviation: Option<f64>,
-    pub tau_quantiles: [Option<f64>; 5],
-    pub periods_mean: Option<f64>,
-    pub locking_index: Option<f64>,
-    pub phase_mean: Option<f64>,
-    pub resultant_length: Option<f64>,
-    pub rayleigh_p: Option<f64>,
-    pub load_rayleigh_p: Option<f64>,
-    pub share_below: Option<f64>,
-    pub is_locked: bool,
-    pub drop_mean: Option<f64>,
-    pub drop_deviation: Option<f64>,
-    pub peak_force_mean: Option<f64>,
-    pub duration_mean: Option<f64>,
-    pub precursors_mean: Option<f64>,
-    pub front_speed_mean: Option<f64>,
-    pub slow_front_speed_mean: Option<f64>,
-}
-
-/// The table of sets.
-#[must_use]
-pub fn sets() -> Table<SetRow> {
-    use Getter::{Count, Flag, OptionalReal, Real, Text};
-    let mut columns = vec![Column::new(
-        "set_id",
-        "",
-        "hash of all that defines a job but the seed",
-        Text(|row: &SetRow| row.jobs.set_id.clone()),
-    )];
-    let parameters = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed);
-    columns.extend(parameters.map(|symbol| Column::parameter(symbol, |row: &SetRow| &row.jobs.parameters)));
-    columns.extend([
-        Column::new("eta", "", "2 pi Delta / (T V0); 0 without modulation", Real(|row: &SetRow| row.eta)),
-        Column::new("jobs", "", "jobs run to an end, one per seed", Count(|row| row.jobs.finished)),
-        Column::new("failed_jobs", "", "jobs that failed", Count(|row| row.jobs.failed)),
-        Column::new("slips", "", "slips of all seeds", Count(|row| row.slips)),
-        Column::new("intervals", "", "intervals between slips", Count(|row| row.intervals)),
-        Column::new("tau_mean", "s", "mean interval", OptionalReal(|row| row.tau_mean)),
-        Column::new("tau_sd", "s", "standard deviation of the intervals", OptionalReal(|row| row.tau_deviation)),
-        Column::new("tau_05", "s", "5 % quantile of the intervals", OptionalReal(|row| row.tau_quantiles[0])),
-        Column::new("tau_25", "s", "25 % quantile", OptionalReal(|row| row.tau_quantiles[1])),
-        Column::new("tau_50", "s", "median", OptionalReal(|row| row.tau_quantiles[2])),
-        Column::new("tau_75", "s", "75 % quantile", OptionalReal(|row| row.tau_quantiles[3])),
-        Column::new("tau_95", "s", "95 % quantile", OptionalReal(|row| row.tau_quantiles[4])),
-        Column::new("periods_mean", "", "mean of the intervals over T at their onset", OptionalReal(|row| row.periods_mean)),
-        Column::new(
-            "locking_index",
-            "",
-            "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods",
-            OptionalReal(|row| row.locking_index),
-        ),
-        Column::new("phase_mean", "rad", "circular mean of the phase", OptionalReal(|row| row.phase_mean)),
-        Column::new(
-            "resultant_length",
-            "",
-            "|<exp(i phi)>|: 1 if every slip has the same phase",
-            OptionalReal(|row| row.resultant_length),
-        ),
-        Column::new(
-            "rayleigh_p",
-            "",
-            "p-value of the Rayleigh test against uniform phases",
-            OptionalReal(|row| row.rayleigh_p),
-        ),
-        Column::new(
-            "load_rayleigh_p",
-            "",
-            "p-value of the Rayleigh test of the load phases phi + eta cos(phi), for eta < 1: slips at random loads are uniform in it",
-            OptionalReal(|row| row.load_rayleigh_p),
-        ),
-        Column::new(
-            "share_below",
-            "",
-            "share of slips with a phase under phi_min(eta) - 0.15 rad; null for eta < 1",
-            OptionalReal(|row| row.share_below),
-        ),
-        Column::new("locked", "", "rayleigh_p < 0.001 and resultant_length > 0.5", Flag(|row| row.is_locked)),
-        Column::new("drop_mean", "N", "mean stress drop", OptionalReal(|row| row.drop_mean)),
-        Column::new("drop_sd", "N", "standard deviation of the stress drop", OptionalReal(|row| row.drop_deviation)),
-        Column::new(
-            "peak_force_mean",
-            "N",
-            "mean shear force at the onset of slips",
-            OptionalReal(|row| row.peak_force_mean),
-        ),
-        Column::new(
-            "mean_friction",
-            "N",
-            "time-averaged shear force, mean over jobs",
-            OptionalReal(|row| row.jobs.friction.mean()),
-        ),
-        Column::new("duration_mean", "s", "mean duration of slips", OptionalReal(|row| row.duration_mean)),
-        Column::new("precursors_mean", "", "mean precursors per slip", OptionalReal(|row| row.precursors_mean)),
-        Column::new("front_speed_mean", "m/s", "mean front speed of slips", OptionalReal(|row| row.front_speed_mean)),
-        Column::new(
-            "slow_front_speed_mean",
-            "m/s",
-            "mean speed of slow fronts, where there were any",
-            OptionalReal(|row| row.slow_front_speed_mean),
-        ),
-    ]);
-    Table { name: "sets", meaning: "One row per parameter set, all seeds together", columns }
+    /// Its first slips against the later ones.
+    pub(super) startup: Vec<StartupRow>,
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::model::Parameters;
 
     pub(in crate::reduce) fn jobs(amplitude: f64, period: f64) -> SetJobs {
         let parameters =
@@ -265,6 +189,7 @@ pub(super) mod tests {
 
     pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> SlipSample {
         SlipSample {
+            number: 1,
             onset: 1.0,
             interval,
             period: None,
@@ -309,7 +234,8 @@ pub(super) mod tests {
         assert!((0.3..0.9).contains(&eta), "{eta}");
         // φ + η cos φ at even spacing, by bisection.
         let phases = (0..400).map(|step| {
-            let load = TAU * (f64::from(step) / 400.0 - 0.5);
+            // One after the other by most of a turn, so that no slip tells the next.
+            let load = TAU * (f64::from(step * 163 % 400) / 400.0 - 0.5);
             let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
@@ -349,5 +275,23 @@ pub(super) mod tests {
         assert_eq!((still.share_below, still.phase_mean, still.locking_index), (None, None, None));
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
         assert!(!still.is_locked);
+    }
+
+    #[test]
+    fn jobs_begin_with_their_first_slip_and_are_independent() {
+        // Each job holds its own phase and interval: as many independent values as jobs.
+        let of_job = |job: u32| {
+            let own = 0.01 * f64::from(job * 7 % 20);
+            (0..10).map(move |number| SlipSample { number, ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own)) })
+        };
+        let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
+        for effective in [row.effective_slips, row.effective_intervals] {
+            assert!((effective.unwrap() - 20.0).abs() < 2.0, "{effective:?}");
+        }
+        let (mean, interval) = (row.phase_mean.unwrap(), row.phase_interval.unwrap());
+        assert!(interval.low < mean && mean < interval.high);
+        assert!(row.tau_interval.unwrap().low < row.tau_mean.unwrap());
+        assert!(row.locking_interval.unwrap().high > row.locking_index.unwrap());
+        assert_eq!(row.jobs.friction.interval(), None);
     }
 }

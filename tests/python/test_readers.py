@@ -1,8 +1,6 @@
 """pandas, polars and DuckDB read the tables of a sweep without any option, and find the same as the program's reduction."""
 
-import importlib.util
 import shutil
-from pathlib import Path
 
 import duckdb
 import numpy as np
@@ -11,7 +9,8 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from conftest import script
+
 JOBS, SLIPS = 2 * 5, 2 * 5 * 6
 
 # The same sums in another order: some hundred roundings of 1e-16.
@@ -20,11 +19,7 @@ TOLERANCE = 1e-12
 
 def reader(name):
     """The module scripts/read_NAME.py."""
-    path = ROOT / "scripts" / f"read_{name}.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script(f"read_{name}")
 
 
 def as_pandas(table):

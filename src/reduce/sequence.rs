@@ -1,0 +1,292 @@
+//! Values of a quantity slip by slip, job by job, and how sure their mean is.
+//!
+//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of independent ones
+//! times 1 + 2 Σ_k ρ_k N_k/n = n/n_eff, with the autocorrelation ρ_k and the N_k pairs at lag k within jobs. The estimate is
+//! the Γ-method of U. Wolff, Comput. Phys. Commun. 156, 143 (2004): autocovariances pooled over the jobs about the mean of
+//! all, summed up to a lag at which what is left out and the noise of what is taken in balance (his automatic window,
+//! S = 1.5), and corrected for the mean being that of the same values. Counting pairs makes it exact for short jobs too: a job
+//! of one slip has none.
+
+/// Wolff's S: the correlation decays about so many times slower than the integrated time tells.
+const DECAY: f64 = 1.5;
+
+/// Values of a quantity with D components, in the order of slips, and where jobs begin.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sequences<const D: usize> {
+    values: Vec<[f64; D]>,
+    starts: Vec<usize>,
+}
+
+impl<const D: usize> Sequences<D> {
+    /// From the values of each job.
+    pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(jobs: impl IntoIterator<Item = Job>) -> Self {
+        let (mut values, mut starts) = (Vec::new(), Vec::new());
+        for job in jobs {
+            starts.push(values.len());
+            values.extend(job);
+        }
+        Self { values, starts }
+    }
+
+    /// Jobs of one value each: independent values.
+    pub(super) fn independent(values: Vec<[f64; D]>) -> Self {
+        Self { starts: (0..values.len()).collect(), values }
+    }
+
+    fn jobs(&self) -> impl Iterator<Item = &[[f64; D]]> {
+        let ends = self.starts.iter().skip(1).copied().chain([self.values.len()]);
+        self.starts.iter().zip(ends).map(|(&start, end)| &self.values[start..end])
+    }
+
+    /// Their mean and its covariance.
+    pub(super) fn estimate(mut self) -> Estimate<D> {
+        let count = self.values.len();
+        let n = count as f64;
+        let mut total = [0.0; D];
+        for value in &self.values {
+            add(&mut total, value);
+        }
+        let mean = total.map(|sum| sum / n);
+        for value in &mut self.values {
+            for (component, mean) in value.iter_mut().zip(mean) {
+                *component -= mean;
+            }
+        }
+        let zeroth = self.products(0);
+        if count < 2 || zeroth.trace() == 0.0 {
+            return Estimate { count: count as u64, total, ..Estimate::default() };
+        }
+        let (mut correlated, mut weight, mut time) = (zeroth, 1.0, 0.5);
+        for lag in 1.. {
+            let pairs: usize = self.jobs().map(|job| job.len().saturating_sub(lag)).sum();
+            let weight_then = weight + 2.0 * pairs as f64 / n;
+            // From half the data on, the mean takes away more than it leaves.
+            if pairs == 0 || weight_then > 0.5 * n {
+                break;
+            }
+            weight = weight_then;
+            let lagged = self.products(lag);
+            correlated.add(&lagged, 2.0);
+            time += lagged.trace() / zeroth.trace();
+            if is_wide(lag as f64, time, n) {
+                break;
+            }
+        }
+        // Deviations from the mean of the same values: n <δδ> falls short of the variance by that of the mean, at each lag.
+        let ratio = correlated.trace() / zeroth.trace();
+        let inflation = (ratio / (1.0 - weight / n + ratio / n)).max(1.0);
+        let independent = zeroth.times(n / (n - inflation));
+        // Right for independent values, n - 1, as for whole jobs as units, their number - 1.
+        let freedom = n / weight - 1.0;
+        Estimate {
+            count: count as u64,
+            total,
+            independent,
+            correlated: correlated.times(n / (n - weight)),
+            spread: independent.trace() * independent.trace() / freedom,
+        }
+    }
+
+    /// Sum of the symmetrised products of values a lag apart within jobs.
+    fn products(&self, lag: usize) -> Matrix<D> {
+        let mut sum = Matrix::default();
+        for job in self.jobs() {
+            for (early, late) in job.iter().zip(job.iter().skip(lag)) {
+                for (row, line) in sum.0.iter_mut().enumerate() {
+                    for (column, cell) in line.iter_mut().enumerate() {
+                        *cell += 0.5 * (early[row] * late[column] + late[row] * early[column]);
+                    }
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Whether a window is wide enough: Wolff's g (his Eq. 52) is negative. `time` is the integrated autocorrelation time within
+/// the window, 1/2 for independent values.
+fn is_wide(lag: f64, time: f64, n: f64) -> bool {
+    if time <= 0.5 {
+        return true;
+    }
+    let decay = DECAY / libm::log((2.0 * time + 1.0) / (2.0 * time - 1.0));
+    libm::exp(-lag / decay) < decay / (lag * n).sqrt()
+}
+
+fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
+    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
+}
+
+/// A symmetric matrix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Matrix<const D: usize>([[f64; D]; D]);
+
+impl<const D: usize> Default for Matrix<D> {
+    fn default() -> Self {
+        Self([[0.0; D]; D])
+    }
+}
+
+impl<const D: usize> Matrix<D> {
+    fn trace(&self) -> f64 {
+        (0..D).map(|index| self.0[index][index]).sum()
+    }
+
+    fn add(&mut self, other: &Self, factor: f64) {
+        for (line, others) in self.0.iter_mut().zip(&other.0) {
+            line.iter_mut().zip(others).for_each(|(cell, other)| *cell += factor * other);
+        }
+    }
+
+    fn times(&self, factor: f64) -> Self {
+        Self(self.0.map(|line| line.map(|cell| factor * cell)))
+    }
+
+    fn along(&self, direction: &[f64; D]) -> f64 {
+        let product = |line: &[f64; D]| line.iter().zip(direction).map(|(cell, part)| cell * part).sum::<f64>();
+        self.0.iter().zip(direction).map(|(line, part)| part * product(line)).sum()
+    }
+}
+
+/// The mean of a quantity with D components. Its sums and their covariances add up over sets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Estimate<const D: usize> {
+    count: u64,
+    /// Sum of the values.
+    total: [f64; D],
+    /// Covariance of the sum if the values were independent.
+    independent: Matrix<D>,
+    /// Covariance of the sum with autocorrelation.
+    correlated: Matrix<D>,
+    /// Square of the trace of `independent` per degree of freedom.
+    spread: f64,
+}
+
+impl<const D: usize> Default for Estimate<D> {
+    fn default() -> Self {
+        Self { count: 0, total: [0.0; D], independent: Matrix::default(), correlated: Matrix::default(), spread: 0.0 }
+    }
+}
+
+impl<const D: usize> Estimate<D> {
+    /// Adds the values of another, independent set.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        add(&mut self.total, &other.total);
+        self.independent.add(&other.independent, 1.0);
+        self.correlated.add(&other.correlated, 1.0);
+        self.spread += other.spread;
+    }
+
+    /// The same with a covariance of the sum that is known: `variance` in every direction.
+    pub(super) fn with_known_variance(mut self, variance: f64) -> Self {
+        (0..D).for_each(|index| self.independent.0[index][index] = variance);
+        self.correlated = self.independent;
+        self
+    }
+
+    /// Number of values.
+    pub(super) const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Their mean; `None` without values.
+    pub(super) fn mean(&self) -> Option<[f64; D]> {
+        (self.count > 0).then(|| self.total.map(|sum| sum / self.count as f64))
+    }
+
+    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which is
+    /// mostly noise where values are few, makes no interval narrower.
+    pub(super) fn variance(&self, direction: &[f64; D]) -> f64 {
+        let squared = self.count as f64 * self.count as f64;
+        self.independent.along(direction).max(self.correlated.along(direction)) / squared
+    }
+
+    /// Variance of the mean over that of independent values, n/n_eff >= 1.
+    pub(super) fn inflation(&self) -> f64 {
+        let independent = self.independent.trace();
+        if independent > 0.0 { (self.correlated.trace() / independent).max(1.0) } else { 1.0 }
+    }
+
+    /// Effective number n_eff <= n of independent values; `None` without values.
+    pub(super) fn effective(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.count as f64 / self.inflation())
+    }
+
+    /// Degrees of freedom of the variance, after Satterthwaite, Biometrics Bull. 2, 110 (1946); `None` for fewer than two
+    /// values. Infinite where the variance is known or nil.
+    pub(super) fn freedom(&self) -> Option<f64> {
+        let trace = self.independent.trace();
+        let freedom = if self.spread > 0.0 { trace * trace / self.spread } else { f64::INFINITY };
+        (self.count > 1).then_some(freedom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::confidence::tests::Draws;
+    use super::*;
+
+    /// n/n_eff, averaged over repetitions, of sequences in which a value is `memory` times the previous plus noise.
+    fn average_inflation(memory: f64, jobs: usize, length: usize) -> f64 {
+        const REPETITIONS: u64 = 200;
+        let of = |repetition| {
+            let mut draws = Draws::new(repetition);
+            let values =
+                Sequences::of((0..jobs).map(|_| draws.autoregressive(memory, length).into_iter().map(|x| [x])));
+            values.estimate().inflation()
+        };
+        (0..REPETITIONS).map(of).sum::<f64>() / REPETITIONS as f64
+    }
+
+    #[test]
+    fn the_effective_number_is_that_of_an_autoregressive_sequence() {
+        // Exactly: 1 + 2 Σ (1 - k/L) ρ^k for jobs of L values.
+        for (memory, jobs, length) in [(0.5, 16, 240), (0.8, 16, 240), (0.8, 100, 15), (0.5, 10, 20)] {
+            let exact = 1.0
+                + 2.0
+                    * (1..length)
+                        .map(|lag| (1.0 - lag as f64 / length as f64) * libm::pow(memory, lag as f64))
+                        .sum::<f64>();
+            let found = average_inflation(memory, jobs, length);
+            // The window leaves out a tail of some percent.
+            assert!((found / exact - 1.0).abs() < 0.12, "{memory}, {jobs} x {length}: {found} for {exact}");
+        }
+    }
+
+    #[test]
+    fn independent_values_keep_their_number_and_anticorrelated_ones_gain_none() {
+        // What is above 1 is noise cut off below.
+        assert!(average_inflation(0.0, 16, 240) < 1.05);
+        assert!(average_inflation(0.0, 2, 15) < 1.25);
+        assert_eq!(Sequences::of([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(|x| [x])]).estimate().effective(), Some(6.0));
+    }
+
+    #[test]
+    fn jobs_that_hold_still_count_as_one_value_each() {
+        let mut draws = Draws::new(3);
+        let levels: Vec<f64> = (0..50).map(|_| draws.normal()).collect();
+        let still = Sequences::of(levels.iter().map(|&level| [[level]; 10])).estimate();
+        let once = Sequences::independent(levels.iter().map(|&level| [level]).collect()).estimate();
+        assert!((still.effective().unwrap() - 50.0).abs() < 2.0, "{:?}", still.effective());
+        assert!((still.variance(&[1.0]) / once.variance(&[1.0]) - 1.0).abs() < 0.05);
+        assert!((still.freedom().unwrap() - 49.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_pair_crosses_from_one_job_to_the_next() {
+        // Each job alternates, and the next begins where it ended: across jobs equal values would follow each other.
+        let jobs = Sequences::of((0..40).map(|job| if job % 2 == 0 { [[1.0], [-1.0]] } else { [[-1.0], [1.0]] }));
+        assert_eq!(jobs.products(1).trace(), -40.0);
+        assert_eq!(jobs.products(2).trace(), 0.0);
+    }
+
+    #[test]
+    fn one_value_has_no_variance_and_equal_values_none_to_speak_of() {
+        let one = Sequences::of([[[0.3]]]).estimate();
+        assert_eq!((one.mean(), one.effective(), one.freedom()), (Some([0.3]), Some(1.0), None));
+        let equal = Sequences::of([[[0.5]; 3]]).estimate();
+        assert_eq!((equal.variance(&[1.0]), equal.effective()), (0.0, Some(3.0)));
+        assert_eq!(Sequences::<2>::default().estimate().mean(), None);
+    }
+}
