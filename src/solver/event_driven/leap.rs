@@ -54,6 +54,9 @@ const GLIDE_SHARE: f64 = 1e-3;
 /// of 1e38 1/s².
 const MINORS_PER_SCALE: usize = 4;
 
+/// Part of its diagonal entry that a pivot must exceed: less is rounding, and S' not surely positive definite.
+const LEAST_PIVOT: f64 = 1e-12;
+
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
@@ -291,6 +294,7 @@ impl Leap {
     /// Pivots of S/m and minors of S'/m from both ends; false if S' is not positive definite. A minor follows from the two before
     /// it, u_j = d_j u_{j+1} - c² u_{j+2}, so that few blocks wait for a division.
     #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
     fn eliminate(&mut self, chain: &Chain) -> bool {
         let blocks = chain.layout.blocks;
         let shift = self.shift(chain);
@@ -301,7 +305,6 @@ impl Leap {
         let [behind, behind_beyond] = self.behind.each_mut().map(|minors| &mut minors[..blocks]);
         // The last minor and the one before it: of S, of S' ahead and of S' behind.
         let mut minors = [[1.0, 0.0]; 3];
-        let mut is_definite = true;
         for count in 0..blocks {
             let (far, near) = (blocks - 1 - count, count);
             let entries = [diagonal[far], diagonal[far] - shift, diagonal[near] - shift];
@@ -318,9 +321,11 @@ impl Leap {
             inverse[far] = last / minors[0][0];
             (ahead[far], ahead_beyond[far]) = (minors[1][0], last_ahead);
             (behind[near], behind_beyond[near]) = (minors[2][0], last_behind);
-            is_definite &= minors[1][0] > 0.0 && minors[2][0] > 0.0;
         }
-        is_definite
+        (0..blocks).fold(true, |is_definite, j| {
+            let least = LEAST_PIVOT * (diagonal[j] - shift).abs();
+            is_definite & (ahead[j] > least * ahead_beyond[j]) & (behind[j] > least * behind_beyond[j])
+        })
     }
 
     /// p0, p1 and q of the driven solution.
