@@ -19,11 +19,12 @@ pub struct Drops {
     pub during: Option<f64>,
 }
 
-/// A value of the shear force, in N, and its time, in s.
+/// The shear force, in N, and the displacement of the driven end, in m, at a time in s.
 #[derive(Clone, Copy, Debug)]
 struct Instant {
     time: f64,
     force: f64,
+    driven: f64,
 }
 
 /// A drop, from `start` to `end` in s, of a size in N.
@@ -48,7 +49,7 @@ pub(super) struct DropDetector {
 impl DropDetector {
     /// Finds drops of at least `least` newtons.
     pub(super) fn new(parameters: &Parameters, least: f64) -> Self {
-        let top = Instant { time: 0.0, force: 0.0 };
+        let top = Instant { time: 0.0, force: 0.0, driven: 0.0 };
         Self { drive: Drive::new(parameters), least, top, bottom: None, drops: Vec::new() }
     }
 
@@ -61,12 +62,14 @@ impl DropDetector {
         if tells_nothing {
             return;
         }
-        segment.for_each_turn(|time, force| self.follow(Instant { time, force }));
-        self.follow(Instant { time: segment.end(), force: segment.end_force() });
+        segment.for_each_turn(|time, force| self.follow(time, force));
+        self.follow(segment.end(), segment.end_force());
     }
 
     /// Goes on along a force that does not turn in between.
-    fn follow(&mut self, now: Instant) {
+    fn follow(&mut self, time: f64, force: f64) {
+        self.drive.advance_to(time);
+        let now = Instant { time, force, driven: self.drive.motion(time).0 };
         match &mut self.bottom {
             None if now.force >= self.top.force => self.top = now,
             None if now.force <= self.top.force - self.least => self.bottom = Some(now),
@@ -82,8 +85,7 @@ impl DropDetector {
 
     /// The drop from the top to a least force, if the fall is one.
     fn drop_to(&self, bottom: Instant) -> Option<Drop> {
-        let driven = [self.top, bottom].map(|instant| self.drive.motion(instant.time).0);
-        let by_drive = self.drive.stiffness * (driven[0] - driven[1]).max(0.0);
+        let by_drive = self.drive.stiffness * (self.top.driven - bottom.driven).max(0.0);
         let size = self.top.force - bottom.force - by_drive;
         (size >= self.least).then_some(Drop { start: self.top.time, end: bottom.time, size })
     }
