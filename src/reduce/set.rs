@@ -282,7 +282,11 @@ pub(super) mod tests {
         // Each job holds its own phase and interval: as many independent values as jobs.
         let of_job = |job: u32| {
             let own = 0.01 * f64::from(job * 7 % 20);
-            (0..10).map(move |number| SlipSample { number, ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own)) })
+            (0..10).map(move |number| SlipSample {
+                number,
+                period: Some(0.01),
+                ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own))
+            })
         };
         let row = reduced(jobs(1e-6, 0.01), (0..20).flat_map(of_job));
         for effective in [row.effective_slips, row.effective_intervals] {
