@@ -35,8 +35,11 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
         pictures.push(drag(&points)?);
     }
     let sets = read_sets(storage, layout, MOST_SETS)?;
-    for figure in [locking_map, staircase, dependence, friction] {
-        pictures.extend(figure(&sets));
+    // Under a ramp a set has no one period.
+    if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
+        for figure in [locking_map, staircase, dependence, friction] {
+            pictures.extend(figure(&sets));
+        }
     }
     // Each panel may hold a second set, of identical contacts.
     let are_few = (1..=2 * MOST_PANELS).contains(&sets.len());
