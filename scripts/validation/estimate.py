@@ -8,6 +8,8 @@ import numpy
 import pandas
 from scipy import stats
 
+from .. import compare_sets
+
 LEVEL = 0.95
 ROUNDS = 400
 
@@ -66,11 +68,10 @@ def bootstrap(frame: pandas.DataFrame, of: Callable[[pandas.DataFrame], float], 
     return Estimate(of(frame), low, high)
 
 
-def paired(left: pandas.DataFrame, right: pandas.DataFrame, of: Callable[[pandas.DataFrame], float]) -> Estimate:
-    """The difference left - right of a statistic of single seeds, with Student's t over the seeds that both have."""
-    both = sorted(set(left["seed"]) & set(right["seed"]))
-    differences = [of(left[left["seed"] == seed]) - of(right[right["seed"] == seed]) for seed in both]
-    return mean(pandas.Series(differences))
+def paired(left: pandas.DataFrame, right: pandas.DataFrame, column: str) -> Estimate:
+    """The difference left - right of the mean of a column, seed by seed."""
+    found = compare_sets.paired(left, right, column, LEVEL)
+    return Estimate(found.difference, found.low, found.high)
 
 
 def locking_index(periods: pandas.Series) -> float:

@@ -37,16 +37,6 @@ def test_jackknife_intervals_cover_the_truth_as_often_as_they_say():
     assert abs(covered / rounds - 0.95) < 3 * math.sqrt(0.95 * 0.05 / rounds)
 
 
-def test_paired_differences_leave_out_what_the_seeds_share():
-    generator = numpy.random.default_rng(2)
-    shared = generator.normal(scale=10, size=12)
-    left = pandas.DataFrame({"seed": range(12), "x": shared + 1 + generator.normal(scale=0.1, size=12)})
-    right = pandas.DataFrame({"seed": range(12), "x": shared + generator.normal(scale=0.1, size=12)})
-    found = estimate.paired(left, right, lambda rows: rows["x"].mean())
-    assert found.low < 1 < found.high
-    assert found.high - found.low < 0.5
-
-
 def test_two_peaks_are_found_where_there_are_two_and_one_where_there_is_one():
     generator = numpy.random.default_rng(3)
     one = pandas.Series(generator.normal(0.107, 0.006, 4000))
