@@ -16,7 +16,8 @@ FREQUENCIES = (29, 58, 116)
 
 def questions(results: Results) -> list[Section]:
     return [
-        drag(results),
+        drag(results, "drag", "1 µm", "drag"),
+        drag(results, "drag-strong", "3 µm", "drag-strong"),
         locking_map(results),
         staircase(results),
         against(results, "size", "N", "the number of blocks N", lambda value: f"{value:.0f}"),
@@ -37,13 +38,12 @@ def by_set(slips, column, statistic):
     return slips.groupby("set_id")[column].apply(statistic)
 
 
-def drag(results: Results) -> Section:
-    section = Section("Drag: the period changed slowly within one run", "`sweeps/drag.toml`", "drag")
-    slips = results.slips("drag")
-    slips = slips[slips["interval"].notna()]
-    ratio = slips["interval"] / slips["T_onset"]
-    slips = slips.assign(periods=ratio, there=slips["onset"] < slips["ramp_time"])
-    slips = slips[slips["onset"] < 2 * slips["ramp_time"]]
+def drag(results: Results, sweep: str, amplitude: str, picture: str) -> Section:
+    title = f"Drag: the period changed slowly within one run, Δ = {amplitude}"
+    section = Section(title, f"`sweeps/{sweep}.toml`", picture)
+    slips = results.slips(sweep)
+    slips = slips[slips["interval"].notna() & (slips["onset"] < 2 * slips["ramp_time"])]
+    slips = slips.assign(periods=slips["interval"] / slips["T_onset"], there=slips["onset"] < slips["ramp_time"])
     near = share(near_whole(slips["periods"]), slips["seed"])
     section.check(
         "T changed during a run drags τ with it (page 3)",
@@ -51,12 +51,12 @@ def drag(results: Results) -> Section:
         near.text(),
         near.low > 0.5,
     )
-    edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 9)
+    edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 13)
     rows, differences = [], []
     for low, high in zip(edges, edges[1:]):
         bin = slips[(slips["T_onset"] >= low) & (slips["T_onset"] <= high)]
         there, back = bin[bin["there"]], bin[~bin["there"]]
-        difference = paired(there, back, "n")
+        difference = paired(back, there, "n")
         differences.append(difference)
         rows.append(
             [
@@ -67,12 +67,15 @@ def drag(results: Results) -> Section:
             ]
         )
     section.table = (
-        ["T (ms)", "median τ (ms), there", "back", "mean n, there", "back", "difference, paired by seed"],
+        ["T (ms)", "median τ (ms), there", "back", "mean n, there", "back", "back − there, paired by seed"],
         rows,
     )
     distinct = sum(difference.low > 0 or difference.high < 0 for difference in differences)
+    all_bins = paired(slips[~slips["there"]], slips[slips["there"]], "n")
     section.remarks.append(
-        f"Hysteresis: n differs between the way there and the way back, beyond its 95 % interval, in {distinct} of {len(differences)} bins of T."
+        f"Hysteresis: n differs between the way back and the way there, beyond its 95 % interval, in {distinct} of {len(differences)} bins of T (by chance about {0.05 * len(differences):.1f}); "
+        f"over all of them by {all_bins.text(3)}. "
+        + ("τ remembers where T came from." if distinct > 3 else "No memory of where T came from is seen: n is drawn anew at each slip.")
     )
     return section
 
