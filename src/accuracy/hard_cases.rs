@@ -290,6 +290,8 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(extreme, &[(V0, Real(1e-300))], 1.0));
     cases.push(case(extreme, &[(TauR, Real(1e-300))], 0.2));
     cases.push(case(extreme, &[(Fs, Real(1e300))], 1.0));
+    cases.push(case(extreme, &[(Fs, Real(1e308)), (Dfs, Real(1e308))], 1.0).stops("not finite"));
+    cases.push(case(extreme, &[(M, Real(1e308)), (K, Real(1e308))], 1.0).stops("too short"));
 
     let bad = "values that make no sense";
     let reals = [M, K, Kd, SmallK, Fs, Dfs, TauR, Gamma, V0, Delta, T, FN, L];

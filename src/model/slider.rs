@@ -53,10 +53,14 @@ impl StiffnessMatrix {
         below
     }
 
-    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m.
+    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite if an
+    /// entry has overflowed.
     #[must_use]
     pub fn eigenvalue(&self, index: usize) -> f64 {
         let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
+        if !widest.is_finite() {
+            return f64::INFINITY;
+        }
         let (mut low, mut high) = (-f64::EPSILON * widest, widest * (1.0 + f64::EPSILON));
         loop {
             let middle = 0.5 * (low + high);

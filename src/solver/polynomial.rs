@@ -120,12 +120,17 @@ pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64)
     best
 }
 
-/// Where the derivative changes its sign on [`first`, `last`], in order.
+/// Where the derivative changes its sign on [`first`, `last`], in order. Nowhere, if a coefficient is not finite: halving
+/// would not end before its last depth.
 pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: &mut impl FnMut(f64)) {
     let order = coefficients.len() - 1;
     let mut derivative = [0.0; MOST_COEFFICIENTS];
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
+    }
+    // A sum that overflows is not finite either.
+    if !derivative.iter().map(|coefficient| coefficient.abs()).sum::<f64>().is_finite() {
+        return;
     }
     for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, found);
 }
@@ -238,6 +243,14 @@ pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, functi
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn turns_of_what_is_not_finite_end_at_once() {
+        for bad in [f64::NAN, f64::INFINITY, f64::MAX] {
+            let coefficients = [1.0, bad, -bad, bad, 0.5 * bad];
+            for_each_turn(&coefficients, 0.0, 1.0, &mut |_| panic!("there is no turn to find"));
+        }
+    }
 
     #[test]
     fn a_maximum_between_ends_that_both_fall_is_found() {
