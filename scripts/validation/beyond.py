@@ -11,6 +11,8 @@ from .results import Results, of
 
 #: Locking index from which a set is called strongly locked here.
 STRONG = 0.8
+#: Periods in s up to which the locking index tells locking: near T = τ it is large for any narrow distribution of τ.
+SHORT = 0.04
 FREQUENCIES = (29, 58, 116)
 
 
@@ -71,11 +73,17 @@ def drag(results: Results, sweep: str, amplitude: str, picture: str) -> Section:
         rows,
     )
     distinct = sum(difference.low > 0 or difference.high < 0 for difference in differences)
-    all_bins = paired(slips[~slips["there"]], slips[slips["there"]], "n")
+    binned = slips.assign(bin=numpy.digitize(slips["T_onset"], edges[1:-1])).groupby(["seed", "bin", "there"])["n"].mean().unstack()
+    whole = mean((binned[False] - binned[True]).groupby("seed").mean())
+    remembers = whole.low > 0 or whole.high < 0
     section.remarks.append(
-        f"Hysteresis: n differs between the way back and the way there, beyond its 95 % interval, in {distinct} of {len(differences)} bins of T (by chance about {0.05 * len(differences):.1f}); "
-        f"over all of them by {all_bins.text(3)}. "
-        + ("τ remembers where T came from." if distinct > 3 else "No memory of where T came from is seen: n is drawn anew at each slip.")
+        f"Hysteresis: n on the way back differs from n on the way there, beyond its 95 % interval, in {distinct} of {len(differences)} bins of T (by chance about {0.05 * len(differences):.1f}); "
+        f"averaged over the bins by {whole.text(3)}. "
+        + (
+            "So where T came from leaves a trace, of a small part of a period."
+            if remembers
+            else "No memory of where T came from is seen: n is drawn anew at each slip, and follows T alike on both ways."
+        )
     )
     return section
 
@@ -86,14 +94,27 @@ def locking_map(results: Results) -> Section:
     slips = slips[slips["interval"].notna()]
     single = slips.groupby("set_id").agg(eta=("eta", "first"), Delta=("Delta", "first"), T=("T", "first"))
     single["index"] = by_set(slips, "periods", locking_index)
+    single["locked"] = results.reduced("locking-map", "sets").set_index("set_id")["locked"]
     edges = [0, 0.5, 1, 1.5, 2, 3, 5, 10, 20]
     rows = []
     for low, high in zip(edges, edges[1:]):
         sets = single[(single["eta"] >= low) & (single["eta"] < high)]
         if len(sets) < 2:
             continue
-        rows.append([f"{low:g} to {high:g}", len(sets), mean(sets["index"]).text(), f"{(sets['index'] > STRONG).mean():.2f}"])
-    section.table = (["η", "sets", "mean locking index", f"share of sets above {STRONG}"], rows)
+        short = sets[sets["T"] < SHORT]
+        rows.append(
+            [
+                f"{low:g} to {high:g}",
+                len(sets),
+                mean(sets["locked"].astype(float)).text(2),
+                mean(short["index"]).text() if len(short) > 1 else "",
+                f"{(short['index'] > STRONG).mean():.2f}" if len(short) else "",
+            ]
+        )
+    section.table = (
+        ["η", "sets", "share with locked phases", f"mean locking index, T < {1e3 * SHORT:.0f} ms", f"share of these above {STRONG}"],
+        rows,
+    )
     free = numpy.sqrt(math.pi / 4 / (slips.groupby("set_id").size().mean()))
     section.remarks.append(
         f"{len(single)} parameter sets, {len(slips)} intervals. A set without any locking has an index of {free:.2f} on average, as it has {slips.groupby('set_id').size().mean():.0f} intervals."
@@ -104,8 +125,9 @@ def locking_map(results: Results) -> Section:
     beyond = (natural / strong["T"]) % 1
     ends = [0, 0.25, 0.5, 0.75, 1]
     means = [mean(strong["index"][(beyond >= low) & (beyond < high)]) for low, high in zip(ends, ends[1:])]
+    matters = max(one.low for one in means) > min(one.high for one in means)
     section.remarks.append(
-        f"For η from 1 to 3 the index depends on where the interval without modulation, τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn it is "
+        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the interval without modulation, τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn the mean locking index is "
         + ", ".join(one.text(2) for one in means)
         + "."
     )
@@ -116,17 +138,28 @@ def staircase(results: Results) -> Section:
     section = Section("Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase")
     slips = results.slips("staircase")
     slips = slips[slips["interval"].notna()]
-    rows = []
+    rows, shares, jumps = [], {}, {}
     for amplitude in sorted(set(slips["Delta"])):
         mine = of(slips, Delta=amplitude)
         steps = mine.groupby("T")["periods"].median()
         on_step = (steps - steps.round()).abs() < 0.05
         whole = {n: steps.index[on_step & (steps.round() == n)] for n in range(1, 7)}
         widths = [f"{1e3 * found.min():.0f} to {1e3 * found.max():.0f}" if len(found) else "none" for found in whole.values()]
-        rows.append([f"{1e6 * amplitude:.1f}", jackknife(mine, near_step).text(2), *widths])
+        shares[amplitude] = jackknife(mine, near_step)
+        whole_steps = steps[on_step].round()
+        jumps[amplitude] = int((whole_steps.diff().dropna() > 0).sum())
+        rows.append([f"{1e6 * amplitude:.1f}", shares[amplitude].text(2), *widths])
     section.table = (
         ["Δ (µm)", "share of the periods T whose median τ is within 0.05 T of nT", *(f"n = {n}: T (ms)" for n in range(1, 7))],
         rows,
+    )
+    weakest, strongest = min(shares), max(shares)
+    widens = shares[strongest].low > shares[weakest].high
+    section.remarks.append(
+        f"By chance the share would be 0.1. The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude: {shares[weakest].text(2)} of the periods lie on one at {1e6 * weakest:.1f} µm, "
+        f"{shares[strongest].text(2)} at {1e6 * strongest:.1f} µm. As T grows n should fall from step to step; it rises again "
+        + ", ".join(f"{count} times at {1e6 * amplitude:.1f} µm" for amplitude, count in jumps.items())
+        + f", over {slips['T'].nunique()} periods: steps of neighbouring n overlap, since each slip draws its n. Only steps of whole n are looked for; a median half-way between two says that slips take both in turn or at random."
     )
     return section
 
@@ -156,9 +189,9 @@ def against(results: Results, sweep: str, key: str, what: str, shown) -> Section
     locked = [value for value, length in weakest.items() if length.low > 0.5]
     section.remarks.append(
         "The phases are locked at all three frequencies (resultant length above 0.5 beyond its 95 % interval) at "
-        + (", ".join(shown(value) for value in locked) if locked else "none of these values")
-        + "; elsewhere "
-        + (", ".join(f"{shown(value)} has {length.text(2)} at its weakest" for value, length in weakest.items() if value not in locked) or "nowhere not")
+        + (("all of these values" if len(locked) == len(weakest) else ", ".join(map(shown, locked))) if locked else "none of these values")
+        + ". At its weakest the resultant length is "
+        + ", ".join(f"{length.text(2)} at {shown(value)}" for value, length in weakest.items())
         + "."
     )
     return section
@@ -189,7 +222,7 @@ def stiff_drive(results: Results) -> Section:
 
 
 def choices(results: Results) -> Section:
-    section = Section("What the model's choices change", "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`")
+    section = Section("What the model's choices change", "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`", "choices")
     slips, jobs = results.slips("choices"), results.table("choices", "jobs")
     for name, values in (
         ("no modulation", {"Delta": 0.0}),
