@@ -352,7 +352,7 @@ def friction(results: Results) -> Section:
     waits = of(slips, Delta=6e-7, frequency=29)["interval"].mean()
     section.remarks.append(
         f"Weak modulation raises friction: locked slips wait for a maximum of the load, the next multiple of T, and the force grows on meanwhile. At 29 Hz and ΔF/F_m = {4e7 * 6e-7 / peak:.2f} the mean interval is "
-        f"{1e3 * waits:.0f} ms instead of {1e3 * of(slips, Delta=0.0)['interval'].mean():.0f} ms. Strong modulation lowers it, gradually and from about 0.1 on, sooner at 58 Hz than at 29 and 200 Hz; no sharp threshold is seen."
+        f"{1e3 * waits:.0f} ms instead of {1e3 * of(slips, Delta=0.0)['interval'].mean():.0f} ms. Strong modulation lowers it, by 10 % from {min(thresholds[10].values()):.2f} on at {min(thresholds[10], key=thresholds[10].get)} Hz and from {max(thresholds[10].values()):.2f} on at {max(thresholds[10], key=thresholds[10].get)} Hz."
     )
     section.remarks.append(f"F_m = {peak:.1f} N is the mean peak force, {reference:.1f} N the mean friction at Δ = 0. Differences are taken seed by seed.")
     return section
