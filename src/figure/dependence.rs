@@ -29,7 +29,7 @@ const PANELS: [(&str, Getter); 4] = [
     }),
 ];
 
-/// Draws sets in which, besides the modulation, one parameter has [`LEAST`] values or more, for each of up to six
+/// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
 /// modulations; `None` for others.
 pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     let all: Vec<&SetSummary> = sets.iter().collect();

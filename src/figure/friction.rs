@@ -14,8 +14,8 @@ const MOST_PERIODS: usize = 3;
 const REDUCTION: (f64, f64) = (0.2, 0.3);
 const FREE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
 
-/// Draws sets that differ in the modulation alone, with [`LEAST_AMPLITUDES`] amplitudes or more and at most
-/// [`MOST_PERIODS`] periods; `None` for others. Forces are told over those at Δ = 0, or in N if there is no such set.
+/// Draws sets that differ in the modulation alone, with 5 amplitudes or more and at most
+/// 3 periods; `None` for others. Forces are told over those at Δ = 0, or in N if there is no such set.
 pub fn friction(sets: &[SetSummary]) -> Option<Picture> {
     let amplitudes = distinct(sets, |parameters| Some(parameters.modulation_amplitude));
     let periods = distinct(sets, |parameters| parameters.modulation_period);

@@ -22,7 +22,7 @@ const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 const WHITE: Ink = "#ffffff";
 
-/// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of [`LEAST`] amplitudes and
+/// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others.
 pub fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
     let modulated: Vec<&SetSummary> = sets.iter().filter(|set| set.parameters.modulation_period.is_some()).collect();

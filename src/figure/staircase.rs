@@ -24,8 +24,8 @@ const WHOLE: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 const FREE: Stroke = Stroke::dashed(GREY, 1.6, (6.0, 4.0));
 const BAND: f64 = 0.3;
 
-/// Draws the staircase of sets that differ in the modulation alone, with [`LEAST_PERIODS`] periods or more and at most
-/// [`MOST_AMPLITUDES`] amplitudes; `None` for others. Periods are told over τ₀ if there is a set without modulation.
+/// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most
+/// 3 amplitudes; `None` for others. Periods are told over τ₀ if there is a set without modulation.
 pub fn staircase(sets: &[SetSummary]) -> Option<Picture> {
     let modulated: Vec<&SetSummary> = sets.iter().filter(|set| set.parameters.modulation_period.is_some()).collect();
     let amplitudes = distinct(modulated.iter().copied(), |parameters| Some(parameters.modulation_amplitude));
