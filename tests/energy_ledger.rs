@@ -31,8 +31,8 @@ fn drives() -> [Parameters; 3] {
 #[test]
 fn the_event_driven_ledger_balances_within_its_tolerance() {
     for parameters in drives() {
-        // Far better than the tolerance of one displacement: seen 1e-8, 3e-10, 2e-13, 1e-13.
-        for (tolerance, allowed) in [(1e-4, 1e-6), (1e-6, 1e-8), (1e-8, 1e-11), (1e-10, 1e-11)] {
+        // Far better than the tolerance of one displacement: seen 1e-7, 1e-8, 3e-10, 2e-13, 1e-13.
+        for (tolerance, allowed) in [(1e-3, 1e-5), (1e-4, 1e-6), (1e-6, 1e-8), (1e-8, 1e-11), (1e-10, 1e-11)] {
             let residual = residual(&parameters, Solver::EventDriven { tolerance });
             assert!(residual < allowed, "{tolerance:e}: {residual:e}");
         }

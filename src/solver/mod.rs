@@ -36,7 +36,7 @@ pub enum Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Self::EventDriven { tolerance: 1e-4 }
+        Self::EventDriven { tolerance: 1e-3 }
     }
 }
 

@@ -127,7 +127,7 @@ fn differences_are_told_but_for_axes_and_conditions() {
             "model.K: 1e8 -> 2e8",
             "model.Delta: 0 -> 1",
             "model.T: none -> 2",
-            "solver.tolerance: 1e-4 -> 1e-7",
+            "solver.tolerance: 0.001 -> 1e-7",
             "record.max_time: none -> 1",
         ]
     );
