@@ -18,7 +18,7 @@
 //! | rupture | a run of breaks without a gap longer than the wave crossing time |
 //! | slip, precursor | a rupture of all blocks; any other of at least one block's worth of breaks ([`observe::Slip`]) |
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
-//! | job | one point of a sweep: canonical parameters and what is recorded, known by a hash of both |
+//! | job | one point of a sweep: canonical parameters, solver and what is recorded, known by a hash of all three |
 //! | part | consecutive jobs of the plan, committed together |
 //! | shard | a share of the parts, run by one process beside others; a claim keeps it from being run twice at once |
 //! | set | all jobs that differ in the seed alone |

@@ -60,7 +60,7 @@ fn the_contact_log_tells_every_life_of_every_contact() {
             if events[row] == "attach" {
                 assert_eq!(forces[row], 0.0, "{contact:?} attaches unstressed");
             } else {
-                // Within the solver's tolerance, 1e-3 of the mean reach.
+                // At the break position, but for rounding where the block was found.
                 assert!((forces[row].abs() / thresholds[row] - 1.0).abs() < 1e-5, "{contact:?}: {} N", forces[row]);
             }
             // k_i = k sqrt(f_i/f_s).

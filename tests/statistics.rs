@@ -186,10 +186,5 @@ fn displacement_before_the_first_break_decays_as_eq_1() {
     assert!(rates.len() >= 30, "{} first breaks away from the edge", rates.len());
     let rate = rates.iter().sum::<f64>() / rates.len() as f64;
     let theory = exact_decay_per_block(&Parameters::default());
-    println!(
-        "{rate} {theory} {} {:?}",
-        rates.len(),
-        profiles.iter().map(|p| (p.1 / p.2 - 1.0).abs()).fold(0.0, f64::max)
-    );
     assert!((rate / theory - 1.0).abs() < 0.02, "{rate} against {theory} a block");
 }

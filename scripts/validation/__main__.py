@@ -12,7 +12,7 @@ from .results import Missing, Results
 
 HEAD = """# Validation
 
-Written by `scripts/reproduce` from measured results; no number here is typed by hand. Brackets hold 95 % intervals: jackknife over seeds with Student's t, or bootstrap over parameter sets or seeds where a statistic is
+Written by `scripts/reproduce` from measured results; no measured number here is typed by hand. Brackets hold 95 % intervals: jackknife over seeds with Student's t, or bootstrap over parameter sets or seeds where a statistic is
 not smooth ([`scripts/validation`](../scripts/validation)). Slips of one job are correlated, jobs are not; so seeds and sets are what is left out or drawn again. Differences between parameter sets are taken seed by seed,
 as equal seeds have the same contacts. Where the paper gives no number, the criterion is a choice, and stands beside the result."""
 

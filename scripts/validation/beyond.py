@@ -134,6 +134,14 @@ def locking_map(results: Results) -> Section:
     return section
 
 
+def stretches(holds: pandas.Series) -> str:
+    """The periods, in ms, at which something holds: each run of neighbours by its ends."""
+    runs = (holds != holds.shift()).cumsum()
+    found = [run.index for _, run in holds.groupby(runs) if run.iloc[0]]
+    ends = [[f"{1e3 * end:.0f}" for end in (run[0], run[-1])] for run in found]
+    return "; ".join(first if first == last else f"{first} to {last}" for first, last in ends) or "none"
+
+
 def staircase(results: Results) -> Section:
     section = Section("Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase")
     slips = results.slips("staircase")
@@ -143,8 +151,7 @@ def staircase(results: Results) -> Section:
         mine = of(slips, Delta=amplitude)
         steps = mine.groupby("T")["periods"].median()
         on_step = (steps - steps.round()).abs() < 0.05
-        whole = {n: steps.index[on_step & (steps.round() == n)] for n in range(1, 7)}
-        widths = [f"{1e3 * found.min():.0f} to {1e3 * found.max():.0f}" if len(found) else "none" for found in whole.values()]
+        widths = [stretches(on_step & (steps.round() == n)) for n in range(1, 7)]
         shares[amplitude] = jackknife(mine, near_step)
         whole_steps = steps[on_step].round()
         jumps[amplitude] = int((whole_steps.diff().dropna() > 0).sum())

@@ -33,8 +33,8 @@ Examples:
   stickslip simulate --set dfs=0 --slips 1 --contacts contacts.parquet
   stickslip simulate sweeps/fig1d.toml --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
 
-Every key of the model can be set: N Ns M K Kd k fs dfs tau_r gamma V0 Delta T FN L break_on seed, in SI
-units; and eta or frequency (Hz) in place of T.")]
+Every key of the model can be set: N Ns M K Kd k fs dfs tau_r gamma V0 Delta T T_to Delta_to ramp_time FN L
+break_on seed, in SI units; and eta or frequency (Hz) in place of T.")]
 pub struct Arguments {
     /// Sweep file with exactly one job, in the place of the flags that name one
     #[arg(value_name = "SWEEP.toml", conflicts_with_all = JOB_FLAGS)]
@@ -63,10 +63,10 @@ pub struct Arguments {
     /// Method
     #[arg(long, value_enum, default_value_t = Method::EventDriven)]
     solver: Method,
-    /// Tolerance of the event-driven solver, relative to fs/k
+    /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
-    /// Step of the fixed-step solver, in s
+    /// Step of the fixed-step solver, in s [default: 1e-6]
     #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
     /// Write shear force, displacement and attached fraction over time, as Parquet
@@ -112,8 +112,8 @@ impl Arguments {
 }
 
 /// Flags of the job; a sweep file tells them all.
-const JOB_FLAGS: [&str; 9] =
-    ["settings", "slips", "time", "discard", "max_events", "precursor_size", "solver", "tolerance", "dt"];
+const JOB_FLAGS: [&str; 10] =
+    ["settings", "slips", "time", "discard", "max_events", "precursor_size", "drop_size", "solver", "tolerance", "dt"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Panel {

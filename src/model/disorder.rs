@@ -118,10 +118,10 @@ impl Disorder {
     }
 }
 
-/// A uniform deviate in (0, 1) from 64 random bits, never 0 and never 1.
+/// A uniform deviate in (0, 1) from 64 random bits, never 0 and never 1: the last one would be rounded up to 1.
 #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
 fn uniform(word: u64) -> f64 {
-    ((word >> 11) as f64 + 0.5) * UNIFORM_STEP
+    (((word >> 11) as f64 + 0.5) * UNIFORM_STEP).min(1.0 - UNIFORM_STEP)
 }
 
 /// Quantile of the standard normal distribution, to about 1e-16 (AS 241, PPND16).
@@ -220,6 +220,38 @@ mod tests {
             let difference: f64 = standard_normal_quantile(probability) - quantile;
             assert!(difference.abs() <= 4e-15 * (1.0 + quantile.abs()), "{probability}: off by {difference}");
         }
+    }
+
+    #[test]
+    fn uniform_deviates_reach_neither_end() {
+        for word in [0, 1, u64::MAX - 1, u64::MAX] {
+            let deviate = uniform(word);
+            assert!(
+                deviate > 0.0 && deviate < 1.0 && standard_normal_quantile(deviate).is_finite(),
+                "{word}: {deviate}"
+            );
+        }
+    }
+
+    #[test]
+    fn draws_are_pinned_to_the_last_bit() {
+        // A change here gives every job other contacts: raise RNG_SCHEME.
+        let narrow = Parameters::default();
+        let redrawn = Parameters { threshold_deviation: 1.37, seed: 3, ..Parameters::default() };
+        // The last is redrawn.
+        let keys = [(&narrow, 0, 0), (&narrow, 1399, 15), (&narrow, 1399, 16), (&narrow, 7, 17), (&redrawn, 6, 1)];
+        let bits = keys.map(|(parameters, contact, generation)| {
+            let contact = Disorder::new(parameters).draw(contact, generation);
+            [contact.threshold, contact.stiffness, contact.reach, contact.delay].map(f64::to_bits)
+        });
+        let pinned = [
+            [0x3ff5_fb15_6d47_2e54, 0x4153_1994_40f2_868e, 0x3e92_69ce_b9f0_eba8, 0x3f6f_485e_9bb4_2685],
+            [0x3ff5_db51_5717_5ca4, 0x4153_0bc2_1e8a_9536, 0x3e92_5c7b_c811_4861, 0x3f72_2c59_16c5_f810],
+            [0x3ff5_e885_9bd7_f168, 0x4153_1182_08b2_0361, 0x3e92_6206_c892_ad8d, 0x3f79_b099_f85f_d3b5],
+            [0x3ff5_efb6_689f_7db6, 0x4153_14a2_de73_82fa, 0x3e92_650a_d473_cc76, 0x3f7f_04b1_9168_090a],
+            [0x400e_db10_6478_2565, 0x4160_0067_0233_0740, 0x3e9e_da49_c2ff_9f19, 0x3f6e_9107_75d1_543c],
+        ];
+        assert_eq!(bits, pinned);
     }
 
     #[test]

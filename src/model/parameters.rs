@@ -167,7 +167,7 @@ const RAMP_TIME: &str = "a finite number >= 0, at most 1e9 T and 1e9 T_to, above
 
 /// Largest number of blocks, and of contacts per block.
 const MOST_PER_AXIS: usize = 100_000;
-/// Largest number of contacts; a job holds about 100 bytes for each.
+/// Largest number of contacts; a job holds about 350 bytes for each.
 const MOST_CONTACTS: usize = 10_000_000;
 /// Longest ramp, in periods: each is one cycle to be stepped over.
 const MOST_RAMPED_PERIODS: f64 = 1e9;

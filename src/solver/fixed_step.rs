@@ -141,6 +141,9 @@ pub(super) fn run(
             }
         }
     }
+    if !motion.displacement.iter().sum::<f64>().is_finite() {
+        return Err(SimulationError::NotFinite { time: summary.end_time });
+    }
     if let Some(audit) = audit {
         motion.settle(audit, &interface, &drive, summary.end_time, coupling, mass);
     }

@@ -24,7 +24,7 @@ use std::sync::atomic::AtomicBool;
 pub enum Solver {
     /// From contact event to contact event, exact within the tolerance.
     EventDriven {
-        /// Largest error of displacement, relative to the contact reach f_s/k. 1e-12 to 1e-2.
+        /// Error of displacement that is aimed at, relative to the contact reach f_s/k. 1e-12 to 1e-2.
         tolerance: f64,
     },
     /// Explicit velocity-Verlet with damping, contacts tested after each step.

@@ -4,7 +4,7 @@
 //! else, another model, solver or recording, other versions. A sweep that differs in its axes or conditions alone is added
 //! as a further *epoch*; results of values that it no longer has are kept.
 
-use crate::model::{MODEL_VERSION, RNG_SCHEME};
+use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::store::commit::{Commit, clear, create_folder};
 use crate::store::compaction::Compaction;
 use crate::store::dataset::{DatasetError, PROGRAM};
@@ -20,8 +20,8 @@ use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Version of the manifest and of the layout around it. 2: files have seals, the manifest holds the texts of the sweeps.
-const FORMAT: u32 = 2;
+/// Version of the manifest and of the layout around it. 3: the manifest tells by `identity` which defaults its jobs were run with.
+const FORMAT: u32 = 3;
 /// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
 const WRITER: &str = "manifest";
 /// How long to wait for others that write the manifest: shards that begin together do so one after the other.
@@ -38,6 +38,9 @@ pub(super) struct Manifest {
     model_version: u32,
     rng_scheme: String,
     plan_version: u32,
+    /// The id of a job with the model's defaults under this solver and recording: another once a default has changed that a
+    /// sweep file may leave out.
+    identity: String,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,
     /// Texts of the sweep files, one for each epoch.
@@ -69,13 +72,14 @@ impl Manifest {
             model_version: MODEL_VERSION,
             rng_scheme: RNG_SCHEME.to_owned(),
             plan_version: PLAN_VERSION,
+            identity: sweep.job_id(&Parameters::default()).to_string(),
             tables: recorded.into_iter().map(|(name, columns)| (name.to_owned(), columns)).collect(),
             sweeps: vec![sweep.text().to_owned()],
             current: 0,
         }
     }
 
-    /// In what a manifest of this program would differ, sweeps aside.
+    /// In what it differs from `ours`, that of this program for one of its sweeps.
     pub(super) fn difference(&self, ours: &Self) -> Vec<String> {
         let versions = |manifest: &Self| {
             [
@@ -90,6 +94,13 @@ impl Manifest {
             .filter(|(before, after)| before != after)
             .map(|((key, before), (_, after))| format!("{key}: {before} -> {after}"))
             .collect();
+        // Versions enter it.
+        if differences.is_empty() && self.identity != ours.identity {
+            differences.push(format!(
+                "defaults: those of {} -> others of this program; what its sweep file leaves out would mean something else",
+                self.program
+            ));
+        }
         for (name, after) in &ours.tables {
             let Some(before) = self.tables.get(name) else { continue };
             let missing = |of: &[String], from: &[String]| -> Vec<String> {
@@ -281,16 +292,15 @@ impl Directory {
     }
 
     fn compare(storage: &dyn Storage, layout: &Layout, sweep: &Sweep) -> Result<Opened, DirectoryError> {
-        let ours = Manifest::new(sweep);
         let Some((mut manifest, mut sweeps)) = read_manifest(storage, layout)? else {
             return if is_fresh(storage, layout)? {
-                Ok(Opened::ToWrite(ours, vec![sweep.clone()]))
+                Ok(Opened::ToWrite(Manifest::new(sweep), vec![sweep.clone()]))
             } else {
                 Err(DirectoryError::NotOurs(layout.root().to_owned()))
             };
         };
         let last = &sweeps[manifest.current];
-        let mut differences = manifest.difference(&ours);
+        let mut differences = manifest.difference(&Manifest::new(last));
         differences.extend(last.difference(sweep).iter().map(ToString::to_string));
         if !differences.is_empty() {
             return Err(DirectoryError::Changed { path: layout.root().to_owned(), differences });
@@ -456,9 +466,13 @@ mod tests {
         });
         fs::write(&path, seal::to_json(&other).unwrap()).unwrap();
         refused("[model]\nK = 1e8\n[record]\nslips = 3", &["random numbers: dice -> ", "without [\"start\"]"]);
-        fs::write(&path, text.replace("\"format\": 2", "\"format\": 3, \"new\": 0")).unwrap();
+        let mut other: Manifest = seal::from_json(&text).unwrap();
+        other.identity = "0".repeat(32);
+        fs::write(&path, seal::to_json(&other).unwrap()).unwrap();
+        refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
+        fs::write(&path, text.replace("\"format\": 3", "\"format\": 4, \"new\": 0")).unwrap();
         let error = Directory::read(&Disk, root.path()).unwrap_err().to_string();
-        assert!(error.contains("has format 3"), "{error}");
+        assert!(error.contains("has format 4"), "{error}");
     }
 
     #[test]

@@ -50,6 +50,9 @@ const LOOK_AHEAD: f64 = 10.0;
 /// Part of the displacement that may be left out that the terms of a glide may leave out each.
 const GLIDE_SHARE: f64 = 1e-3;
 
+/// Longest glide in units of the shortest time scale of the slider: some 20 MB.
+const MOST_GLIDE_ANGLE: f64 = 1e6;
+
 /// Minors of S/m that are taken before they are scaled again. Products of two series of them stay finite up to squared frequencies
 /// of 1e38 1/s².
 const MINORS_PER_SCALE: usize = 4;
@@ -173,12 +176,14 @@ impl Leap {
             return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
         };
         let decay_rate = self.decay_rate;
-        let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(horizon) };
+        let longest_wait = horizon;
+        let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(longest_wait) };
         let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
         let is_short = decay >= horizon;
         if is_short && decay_rate < 0.5 * chain.damping_rate {
             return Attempt::Wait { seconds: horizon };
         }
+        let horizon = if is_short { horizon.min(self.longest_glide(chain)) } else { horizon };
         let moving = decay.min(horizon);
         let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
         if decay > 0.0 && !self.stays_clear(chain, drive, moving, left) {
@@ -243,6 +248,12 @@ impl Leap {
         };
         let ahead = (moving + further).min(until_turn);
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
+    }
+
+    /// How long a glide may last, in s, so that its work and memory are bounded. The motion goes on in the next one.
+    fn longest_glide(&self, chain: &Chain) -> f64 {
+        let widest = self.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
+        MOST_GLIDE_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
     }
 
     /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where `left`
@@ -507,4 +518,47 @@ pub(super) fn split(chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<
 #[inline(always)]
 fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Parameters;
+
+    #[test]
+    fn a_glide_follows_an_undamped_oscillation_for_a_bounded_time() {
+        let parameters = Parameters { blocks: 1, damping_rate: 0.0, ..Parameters::default() };
+        let layout = Layout::new(1);
+        // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
+        let mut chain = Chain::new(&parameters, layout);
+        let kernels = Kernels::available(layout.rows).pop().unwrap();
+        let squared = parameters.drive_stiffness / chain.mass;
+        chain.diagonal[0][0] = squared;
+        let drive = DriveNow {
+            stiffness: parameters.drive_stiffness,
+            mass: chain.mass,
+            ramp: 0.0,
+            velocity: 1e-12,
+            amplitude: 0.0,
+            phase: 0.0,
+            angular_frequency: 0.0,
+        };
+        let mut state = State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) };
+        let amplitude = 1e-6;
+        state.displacement[0][0] = amplitude;
+        let horizon = 1e9;
+        let bounds = Bounds { horizon, until_turn: f64::INFINITY, error: 1e-12, passed: f64::INFINITY };
+        let attempt = Leap::new(layout).attempt(&chain, kernels, &drive, bounds, &mut state, |_| {}, None);
+        let Attempt::Leapt { elapsed, reached: None, glided: true } = attempt else { panic!("{attempt:?}") };
+        let angle = squared.sqrt() * elapsed;
+        assert!(angle > 1e5 && angle <= MOST_GLIDE_ANGLE, "{angle}");
+        // A ramp that the block follows, and what is left of its start.
+        let ramp = drive.velocity * elapsed - drive.velocity / squared.sqrt() * libm::sin(angle);
+        let expected = ramp + amplitude * libm::cos(angle);
+        assert!(
+            (state.displacement[0][0] - expected).abs() < 1e-8 * amplitude,
+            "{}",
+            state.displacement[0][0] - expected
+        );
+    }
 }
