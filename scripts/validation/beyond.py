@@ -3,6 +3,7 @@
 import math
 
 import numpy
+import pandas
 
 from .document import Section
 from .estimate import jackknife, locking_index, mean, near_whole, paired, share

@@ -12,7 +12,7 @@ from conftest import ROOT
 
 sys.path.insert(0, str(ROOT))
 
-from scripts.validation import estimate, paper  # noqa: E402
+from scripts.validation import beyond, estimate, paper  # noqa: E402
 
 
 @pytest.mark.parametrize(
@@ -60,6 +60,14 @@ def test_the_envelope_of_phases_above_phi_min_has_its_exponent():
 
 def test_curves_are_below_a_level_from_their_last_crossing_on():
     assert paper.first_below([(0, 5), (1, -20), (2, 0), (3, -20)], -10) == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize(
+    ("holds", "told"), [("0110101", "2 to 4; 8; 12"), ("1100000", "0 to 2"), ("0000000", "none"), ("1111111", "0 to 12")]
+)
+def test_stretches_of_periods_leave_out_the_gaps(holds, told):
+    periods = numpy.arange(len(holds)) * 2e-3
+    assert beyond.stretches(pandas.Series([held == "1" for held in holds], index=periods)) == told
 
 
 def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
