@@ -285,6 +285,9 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(extreme, &[(M, Real(1e-30))], 1.0).stops("too short"));
     cases.push(case(extreme, &modulated(1e300, 1.0), 1.0).stops("not finite"));
     cases.push(case(extreme, &modulated(1e-6, 1e-300), 1.0).stops("not finite"));
+    // Over before the first look at the state on the way.
+    let coarse = Solver::FixedStep { time_step: 4e-6 };
+    cases.push(case(extreme, &modulated(1e308, 1e-3), 0.01).solver(coarse).stops("not finite"));
     cases.push(case(extreme, &[(M, Real(1e10))], 1.0));
     cases.push(case(extreme, &[(V0, Real(1e-300))], 1.0));
     cases.push(case(extreme, &[(TauR, Real(1e-300))], 0.2));

@@ -135,8 +135,20 @@ pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: 
     for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, found);
 }
 
+/// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
+pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MOST_COEFFICIENTS] {
+    let half = 0.5 * (high - low);
+    let mut about = shifted(coefficients, 0.5 * (low + high));
+    let mut power = 1.0;
+    for coefficient in &mut about[..coefficients.len()] {
+        *coefficient *= power;
+        power *= half;
+    }
+    about
+}
+
 /// The same polynomial in the variable s - `centre`.
-pub(crate) fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
+fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
     let mut about = [0.0; MOST_COEFFICIENTS];
     about[..coefficients.len()].copy_from_slice(coefficients);
     for p in 0..coefficients.len() {
@@ -148,15 +160,8 @@ pub(crate) fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIE
 }
 
 fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &mut impl FnMut(f64)) {
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    // In the variable r from -1 to 1.
-    let mut about = shifted(coefficients, middle);
-    let about = &mut about[..coefficients.len()];
-    let mut power = 1.0;
-    for coefficient in about.iter_mut() {
-        *coefficient *= power;
-        power *= half;
-    }
+    let middle = 0.5 * (low + high);
+    let about = &rescaled(coefficients, low, high)[..coefficients.len()];
     let (strays, slope_varies) = beyond_linear(about);
     let slope = about.get(1).map_or(0.0, |c| c.abs());
     if about[0].abs() > slope + strays {

@@ -3,7 +3,7 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
-use crate::solver::polynomial::{beyond_linear, expanded, safeguarded_halley, safeguarded_newton, shifted, value};
+use crate::solver::polynomial::{beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
@@ -47,14 +47,7 @@ fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> 
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    // In the variable r from -1 to 1.
-    let mut about = shifted(coefficients, middle);
-    let about = &mut about[..coefficients.len()];
-    let mut power = 1.0;
-    for coefficient in about.iter_mut() {
-        *coefficient *= power;
-        power *= half;
-    }
+    let about = &rescaled(coefficients, low, high)[..coefficients.len()];
     let (strays, slope_varies) = beyond_linear(about);
     let slope = about[1];
     if about[0] + slope.abs() + strays < 0.0 {

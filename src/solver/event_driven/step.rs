@@ -23,8 +23,6 @@ use crate::solver::{Observer, SimulationError};
 
 /// Halvings at which a series that does not converge ends the run.
 const HOPELESS_HALVINGS: usize = 60;
-/// A step aims at so many times the time that recent steps covered before an event ended them.
-const STEP_AHEAD: f64 = 1.0;
 /// A step must span so many units in the last place of the time, so that events are located to a millionth of it.
 const LEAST_RESOLUTION: f64 = 1_048_576.0;
 /// Order up to which an event changes the series.
@@ -213,7 +211,7 @@ impl Run<'_> {
 
     /// Expands the state into a series that reaches at least `horizon` or as far as events let it; returns its length.
     pub(super) fn expand(&mut self, horizon: f64) -> Result<f64, SimulationError> {
-        let wanted = (STEP_AHEAD * self.typical_advance).min(horizon).min(self.longest_step);
+        let wanted = self.typical_advance.min(horizon).min(self.longest_step);
         let mut halvings = 0;
         let mut length = self.longest_step;
         while halvings < MOST_HALVINGS && 0.5 * length >= wanted {
