@@ -9,6 +9,7 @@
 use super::Parameters;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::array;
 
 /// Name and version of the mapping from (seed, contact, generation) to a contact; written into every result.
 pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
@@ -16,7 +17,7 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 /// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
 const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
-const DRAWS_PER_REFILL: u32 = 16;
+const DRAWS_PER_REFILL: usize = 16;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
 /// Uniform deviates lie in (0, 1): 53 random bits, shifted by half a step.
@@ -43,9 +44,16 @@ pub struct Disorder {
     threshold_deviation: f64,
     mean_stiffness: f64,
     reattachment_time: f64,
-    /// The words of [`DRAWS_PER_REFILL`] generations for each contact, and the first of these generations.
-    buffered: Vec<[u64; 2 * DRAWS_PER_REFILL as usize]>,
+    /// [`DRAWS_PER_REFILL`] generations of each contact, drawn side by side, and the first of them.
+    buffered: Vec<[Draw; DRAWS_PER_REFILL]>,
     buffered_from: Vec<u32>,
+}
+
+/// Threshold in N and delay in s of one life.
+#[derive(Clone, Copy, Debug, Default)]
+struct Draw {
+    threshold: f64,
+    delay: f64,
 }
 
 impl Disorder {
@@ -59,57 +67,43 @@ impl Disorder {
             threshold_deviation: parameters.threshold_deviation,
             mean_stiffness: parameters.contact_stiffness,
             reattachment_time: parameters.reattachment_time,
-            buffered: vec![[0; 2 * DRAWS_PER_REFILL as usize]; contacts],
+            buffered: vec![[Draw::default(); DRAWS_PER_REFILL]; contacts],
             buffered_from: vec![u32::MAX; contacts],
         }
     }
 
     /// The given life of a contact; `contact` counts through all blocks, `block · N_s + i`.
     pub fn draw(&mut self, contact: usize, generation: u32) -> Contact {
-        let [for_threshold, for_delay] = self.words(contact, generation);
-        let threshold = self.threshold(contact, generation, for_threshold);
+        let ahead = generation % DRAWS_PER_REFILL as u32;
+        if self.buffered_from[contact] != generation - ahead {
+            self.refill(contact, generation - ahead);
+        }
+        let Draw { threshold, delay } = self.buffered[contact][ahead as usize];
         Contact {
             threshold,
             stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
             reach: (threshold * self.mean_threshold).sqrt() / self.mean_stiffness,
-            delay: self.delay_from(for_delay),
+            delay,
         }
     }
 
-    fn words(&mut self, contact: usize, generation: u32) -> [u64; 2] {
-        let first = generation - generation % DRAWS_PER_REFILL;
-        if self.buffered_from[contact] != first {
-            self.seek(contact, first, 0);
-            for word in &mut self.buffered[contact] {
-                *word = self.generator.next_u64();
+    fn refill(&mut self, contact: usize, first: u32) {
+        self.seek(contact, first, 0);
+        let words: [[u64; 2]; DRAWS_PER_REFILL] = array::from_fn(|_| array::from_fn(|_| self.generator.next_u64()));
+        let quantiles = standard_normal_quantiles(words.map(|[for_threshold, _]| uniform(for_threshold)));
+        for (ahead, (quantile, [_, for_delay])) in quantiles.into_iter().zip(words).enumerate() {
+            let mut threshold = self.mean_threshold + self.threshold_deviation * quantile;
+            let mut redraw = 0;
+            while threshold <= 0.0 {
+                redraw += 1;
+                self.seek(contact, first + ahead as u32, redraw);
+                let [quantile] = standard_normal_quantiles([uniform(self.generator.next_u64())]);
+                threshold = self.mean_threshold + self.threshold_deviation * quantile;
             }
-            self.buffered_from[contact] = first;
+            let delay = -self.reattachment_time * libm::log(uniform(for_delay));
+            self.buffered[contact][ahead] = Draw { threshold, delay };
         }
-        let slot = 2 * (generation - first) as usize;
-        [self.buffered[contact][slot], self.buffered[contact][slot + 1]]
-    }
-
-    fn delay_from(&self, word: u64) -> f64 {
-        -self.reattachment_time * libm::log(uniform(word))
-    }
-
-    fn threshold(&mut self, contact: usize, generation: u32, word: u64) -> f64 {
-        if self.threshold_deviation == 0.0 {
-            return self.mean_threshold;
-        }
-        let mut threshold = self.threshold_from(word);
-        let mut redraw = 0;
-        while threshold <= 0.0 {
-            redraw += 1;
-            self.seek(contact, generation, redraw);
-            let word = self.generator.next_u64();
-            threshold = self.threshold_from(word);
-        }
-        threshold
-    }
-
-    fn threshold_from(&self, word: u64) -> f64 {
-        self.mean_threshold + self.threshold_deviation * standard_normal_quantile(uniform(word))
+        self.buffered_from[contact] = first;
     }
 
     fn seek(&mut self, contact: usize, generation: u32, redraw: u128) {
@@ -124,9 +118,10 @@ fn uniform(word: u64) -> f64 {
     (((word >> 11) as f64 + 0.5) * UNIFORM_STEP).min(1.0 - UNIFORM_STEP)
 }
 
-/// Quantile of the standard normal distribution, to about 1e-16 (AS 241, PPND16).
+/// Quantiles of the standard normal distribution, to about 1e-16 (AS 241, PPND16). Most lie in the central part, where all are
+/// taken first, side by side.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
-fn standard_normal_quantile(probability: f64) -> f64 {
+fn standard_normal_quantiles<const COUNT: usize>(probabilities: [f64; COUNT]) -> [f64; COUNT] {
     const CENTRAL_NUMERATOR: [f64; 8] = [
         3.387_132_872_796_366_608_0,
         1.331_416_678_917_843_774_5e2,
@@ -147,6 +142,22 @@ fn standard_normal_quantile(probability: f64) -> f64 {
         2.872_908_573_572_194_267_4e4,
         5.226_495_278_852_854_561_0e3,
     ];
+    let offsets = probabilities.map(|probability| probability - 0.5);
+    let central = offsets.map(|offset| 0.180_625 - offset * offset);
+    let numerators = polynomials(&CENTRAL_NUMERATOR, central);
+    let denominators = polynomials(&CENTRAL_DENOMINATOR, central);
+    array::from_fn(|i| {
+        if offsets[i].abs() <= 0.425 {
+            offsets[i] * (numerators[i] / denominators[i])
+        } else {
+            outer_quantile(probabilities[i]).copysign(offsets[i])
+        }
+    })
+}
+
+/// Magnitude of a quantile that lies outside the central part.
+#[expect(clippy::excessive_precision, reason = "coefficients as published")]
+fn outer_quantile(probability: f64) -> f64 {
     const MIDDLE_NUMERATOR: [f64; 8] = [
         1.423_437_110_749_683_577_34,
         4.630_337_846_156_545_295_90,
@@ -187,21 +198,21 @@ fn standard_normal_quantile(probability: f64) -> f64 {
         1.421_511_758_316_445_888_70e-7,
         2.044_263_103_389_939_785_64e-15,
     ];
-    let horner = |coefficients: &[f64; 8], x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
-    let ratio = |numerator: &[f64; 8], denominator: &[f64; 8], x: f64| horner(numerator, x) / horner(denominator, x);
-
-    let offset = probability - 0.5;
-    if offset.abs() <= 0.425 {
-        return offset * ratio(&CENTRAL_NUMERATOR, &CENTRAL_DENOMINATOR, 0.180_625 - offset * offset);
-    }
-    let tail = if offset < 0.0 { probability } else { 1.0 - probability };
-    let depth = (-libm::log(tail)).sqrt();
-    let magnitude = if depth <= 5.0 {
+    let ratio = |numerator: &[f64; 8], denominator: &[f64; 8], x: f64| {
+        let ([numerator], [denominator]) = (polynomials(numerator, [x]), polynomials(denominator, [x]));
+        numerator / denominator
+    };
+    let depth = (-libm::log(probability.min(1.0 - probability))).sqrt();
+    if depth <= 5.0 {
         ratio(&MIDDLE_NUMERATOR, &MIDDLE_DENOMINATOR, depth - 1.6)
     } else {
         ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth - 5.0)
-    };
-    magnitude.copysign(offset)
+    }
+}
+
+/// A polynomial at several arguments side by side.
+fn polynomials<const COUNT: usize>(coefficients: &[f64; 8], at: [f64; COUNT]) -> [f64; COUNT] {
+    coefficients.iter().rev().fold([0.0; COUNT], |sums, c| array::from_fn(|i| sums[i] * at[i] + c))
 }
 
 #[cfg(test)]
@@ -217,7 +228,7 @@ mod tests {
             (1e-20, -9.262_340_089_798_408),
             (0.975, 1.959_963_984_540_054),
         ] {
-            let difference: f64 = standard_normal_quantile(probability) - quantile;
+            let difference: f64 = standard_normal_quantiles([probability])[0] - quantile;
             assert!(difference.abs() <= 4e-15 * (1.0 + quantile.abs()), "{probability}: off by {difference}");
         }
     }
@@ -227,7 +238,7 @@ mod tests {
         for word in [0, 1, u64::MAX - 1, u64::MAX] {
             let deviate = uniform(word);
             assert!(
-                deviate > 0.0 && deviate < 1.0 && standard_normal_quantile(deviate).is_finite(),
+                deviate > 0.0 && deviate < 1.0 && standard_normal_quantiles([deviate])[0].is_finite(),
                 "{word}: {deviate}"
             );
         }

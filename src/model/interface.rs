@@ -6,7 +6,8 @@
 
 use super::disorder::Contact;
 use super::{BreakOn, Disorder, Parameters};
-use std::cmp::Ordering;
+use std::{array, slice};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// What happened to a contact.
@@ -41,24 +42,26 @@ pub struct ContactEvent {
     pub stiffness: f64,
 }
 
-/// A reattachment that is due. Ordered so that the heap yields the earliest, ties by contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Due {
-    time: f64,
-    contact: usize,
-}
+/// A reattachment that is due, as one number that orders by time, then block, then contact: the bits of a time in s, which is
+/// not negative, block and contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Due(u128);
 
-impl Eq for Due {}
-
-impl Ord for Due {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.time.total_cmp(&self.time).then(other.contact.cmp(&self.contact))
+impl Due {
+    fn new(time: f64, block: usize, contact: usize) -> Self {
+        Self(u128::from(time.to_bits()) << 64 | (block as u128) << 32 | contact as u128)
     }
-}
 
-impl PartialOrd for Due {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+    fn time(self) -> f64 {
+        f64::from_bits((self.0 >> 64) as u64)
+    }
+
+    fn block(self) -> usize {
+        (self.0 >> 32) as u32 as usize
+    }
+
+    fn contact(self) -> usize {
+        self.0 as u32 as usize
     }
 }
 
@@ -83,7 +86,7 @@ pub struct Interface {
     /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
     upper: Vec<f64>,
     lower: Vec<f64>,
-    reattachments: BinaryHeap<Due>,
+    reattachments: BinaryHeap<Reverse<Due>>,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
     /// Per block: Σ k_i a_i of the attached contacts, in N.
@@ -139,13 +142,13 @@ impl Interface {
     /// Time of the next reattachment, in s; infinite when no contact is detached.
     #[must_use]
     pub fn next_reattachment(&self) -> f64 {
-        self.reattachments.peek().map_or(f64::INFINITY, |due| due.time)
+        self.reattachments.peek().map_or(f64::INFINITY, |due| due.0.time())
     }
 
     /// Block of the next reattachment, if any contact is detached.
     #[must_use]
     pub fn next_reattachment_block(&self) -> Option<usize> {
-        self.reattachments.peek().map(|due| due.contact / self.contacts_per_block)
+        self.reattachments.peek().map(|due| due.0.block())
     }
 
     /// Attaches the contact that is due next, unstressed where its block is at that moment.
@@ -153,21 +156,30 @@ impl Interface {
     /// # Panics
     /// When nothing is due: a mistake of the solver.
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
-        let due = self.reattachments.pop().expect("a reattachment is due");
-        let (block, contact) = (due.contact / self.contacts_per_block, due.contact % self.contacts_per_block);
+        let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
+        let (block, contact) = (due.block(), due.contact());
         self.attach(block * self.stride + contact, displacement);
         self.gather(block);
-        self.event(block, contact, due.time, displacement, Change::Attach)
+        self.event(block, contact, due.time(), displacement, Change::Attach)
     }
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// tells each to `log`.
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
-        let slots = block * self.stride..block * self.stride + self.contacts_per_block;
-        for (contact, slot) in slots.enumerate() {
-            if self.upper[slot] <= displacement || self.lower[slot] >= displacement {
-                log(self.event(block, contact, time, displacement, Change::Break));
-                self.detach(block, contact, time);
+        let first = block * self.stride;
+        for start in (0..self.stride).step_by(LANES) {
+            let positions = first + start..first + start + LANES;
+            let (upper, lower) = (&self.upper[positions.clone()], &self.lower[positions]);
+            let reached: [bool; LANES] =
+                array::from_fn(|lane| (upper[lane] <= displacement) | (lower[lane] >= displacement));
+            if reached == [false; LANES] {
+                continue;
+            }
+            for contact in (start..self.contacts_per_block).take(LANES) {
+                if reached[contact - start] {
+                    log(self.event(block, contact, time, displacement, Change::Break));
+                    self.detach(block, contact, time);
+                }
             }
         }
         self.gather(block);
@@ -187,11 +199,11 @@ impl Interface {
 
     /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
     pub fn shift_time(&mut self, shift: f64) {
-        let mut due = std::mem::take(&mut self.reattachments).into_vec();
-        for due in &mut due {
-            due.time -= shift;
-        }
-        self.reattachments = due.into();
+        let due = std::mem::take(&mut self.reattachments);
+        self.reattachments = due
+            .into_iter()
+            .map(|Reverse(due)| Reverse(Due::new((due.time() - shift).max(0.0), due.block(), due.contact())))
+            .collect();
     }
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.
@@ -241,25 +253,24 @@ impl Interface {
         self.lower[slot] = f64::NEG_INFINITY;
         self.generation[slot] += 1;
         self.life[slot] = self.disorder.draw(index, self.generation[slot]);
-        self.reattachments.push(Due { time: time + self.life[slot].delay, contact: index });
+        self.reattachments.push(Reverse(Due::new(time + self.life[slot].delay, block, contact)));
     }
 
     /// Takes the sums and nearest break positions of a block anew, in fixed lanes.
     fn gather(&mut self, block: usize) {
-        let slots = block * self.stride..(block + 1) * self.stride;
-        let rows = self.attached_stiffness[slots.clone()]
-            .as_chunks::<LANES>()
-            .0
-            .iter()
-            .zip(self.anchor[slots.clone()].as_chunks::<LANES>().0)
-            .zip(self.upper[slots.clone()].as_chunks::<LANES>().0)
-            .zip(self.lower[slots].as_chunks::<LANES>().0);
+        let first = block * self.stride;
+        let slots = first..first + self.stride;
         let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
-        let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-        for (((attached, anchor), above), below) in rows {
+        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots.clone()])) {
             for lane in 0..LANES {
                 stiffness[lane] += attached[lane];
                 pull[lane] += attached[lane] * anchor[lane];
+            }
+        }
+        // Apart from the sums, so that both fit into the registers of any processor.
+        let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        for (above, below) in lanes(&self.upper[slots.clone()]).zip(lanes(&self.lower[slots])) {
+            for lane in 0..LANES {
                 upper[lane] = if above[lane] < upper[lane] { above[lane] } else { upper[lane] };
                 lower[lane] = if below[lane] > lower[lane] { below[lane] } else { lower[lane] };
             }
@@ -269,6 +280,11 @@ impl Interface {
         self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
         self.block_lower[block] = across(lower, |a, b| if a > b { a } else { b });
     }
+}
+
+/// Rows of a block's contacts.
+fn lanes(contacts: &[f64]) -> slice::Iter<'_, [f64; LANES]> {
+    contacts.as_chunks().0.iter()
 }
 
 /// Puts lanes together in pairs.

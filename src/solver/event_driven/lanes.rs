@@ -41,16 +41,23 @@ impl DerefMut for Row {
 pub(super) struct Layout {
     pub blocks: usize,
     pub rows: usize,
+    /// 2^52/rows, rounded up: a block times this is its lane times 2^52 and a rest.
+    lane_per_block: u64,
 }
+
+const LANE_SHIFT: u32 = 52;
 
 impl Layout {
     pub fn new(blocks: usize) -> Self {
-        Self { blocks, rows: blocks.div_ceil(LANES) }
+        let rows = blocks.div_ceil(LANES);
+        Self { blocks, rows, lane_per_block: (1 << LANE_SHIFT) / rows as u64 + 1 }
     }
 
     /// Row and lane of a block.
+    #[inline]
     pub fn slot(self, block: usize) -> (usize, usize) {
-        (block % self.rows, block / self.rows)
+        let lane = (block as u64 * self.lane_per_block >> LANE_SHIFT) as usize;
+        (block - lane * self.rows, lane)
     }
 
     /// Block in a slot; beyond the last one for padding.

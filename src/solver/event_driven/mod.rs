@@ -172,7 +172,8 @@ impl<'a> Run<'a> {
         run
     }
 
-    fn finished(mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+    #[inline(never)]
+    fn finished(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         for event in self.interface.initial_attachments() {
             observer.contact(&event);
         }
@@ -214,7 +215,8 @@ impl<'a> Run<'a> {
         self.ended(true, observer)
     }
 
-    fn ended(mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+    #[inline(never)]
+    fn ended(&mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         self.summary.end_time = self.epoch + self.time;
         let blocks = 0..self.chain.layout.blocks;
         let displacement: Vec<f64> =
@@ -246,6 +248,7 @@ impl<'a> Run<'a> {
 
     /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false if it is
     /// not yet allowed.
+    #[inline(never)]
     fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
         let drive = DriveNow {
             stiffness: self.drive.stiffness,
@@ -347,6 +350,7 @@ impl<'a> Run<'a> {
     }
 
     /// Moves the frame to where the slider and the clock are.
+    #[inline(never)]
     fn move_frame(&mut self) {
         let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
         let displacement = (self.state.displacement[0][0] / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
