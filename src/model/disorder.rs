@@ -18,6 +18,8 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
 const DRAWS_PER_REFILL: usize = 16;
+/// Draws that wait for each other's arithmetic.
+const SIDE_BY_SIDE: usize = 4;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
 /// Uniform deviates lie in (0, 1): 53 random bits, shifted by half a step.
@@ -87,23 +89,37 @@ impl Disorder {
         }
     }
 
+    #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
         let words: [[u64; 2]; DRAWS_PER_REFILL] = array::from_fn(|_| array::from_fn(|_| self.generator.next_u64()));
-        let quantiles = standard_normal_quantiles(words.map(|[for_threshold, _]| uniform(for_threshold)));
-        for (ahead, (quantile, [_, for_delay])) in quantiles.into_iter().zip(words).enumerate() {
-            let mut threshold = self.mean_threshold + self.threshold_deviation * quantile;
-            let mut redraw = 0;
-            while threshold <= 0.0 {
-                redraw += 1;
-                self.seek(contact, first + ahead as u32, redraw);
-                let [quantile] = standard_normal_quantiles([uniform(self.generator.next_u64())]);
-                threshold = self.mean_threshold + self.threshold_deviation * quantile;
+        let mut generation = first;
+        let mut draws = [Draw::default(); DRAWS_PER_REFILL];
+        for (draws, words) in
+            draws.as_chunks_mut::<SIDE_BY_SIDE>().0.iter_mut().zip(words.as_chunks::<SIDE_BY_SIDE>().0)
+        {
+            let quantiles = standard_normal_quantiles(words.map(|[for_threshold, _]| uniform(for_threshold)));
+            for ((draw, quantile), [_, for_delay]) in draws.iter_mut().zip(quantiles).zip(words) {
+                let threshold = self.threshold(contact, generation, quantile);
+                *draw = Draw { threshold, delay: -self.reattachment_time * libm::log(uniform(*for_delay)) };
+                generation += 1;
             }
-            let delay = -self.reattachment_time * libm::log(uniform(for_delay));
-            self.buffered[contact][ahead] = Draw { threshold, delay };
         }
+        self.buffered[contact] = draws;
         self.buffered_from[contact] = first;
+    }
+
+    /// The threshold for a quantile of its distribution, or for one that is drawn again.
+    fn threshold(&mut self, contact: usize, generation: u32, mut quantile: f64) -> f64 {
+        for redraw in 1.. {
+            let threshold = self.mean_threshold + self.threshold_deviation * quantile;
+            if threshold > 0.0 {
+                return threshold;
+            }
+            self.seek(contact, generation, redraw);
+            [quantile] = standard_normal_quantiles([uniform(self.generator.next_u64())]);
+        }
+        unreachable!("a mean threshold is positive")
     }
 
     fn seek(&mut self, contact: usize, generation: u32, redraw: u128) {

@@ -6,9 +6,9 @@
 
 use super::disorder::Contact;
 use super::{BreakOn, Disorder, Parameters};
-use std::{array, slice};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::{array, slice};
 
 /// What happened to a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -261,7 +261,8 @@ impl Interface {
         let first = block * self.stride;
         let slots = first..first + self.stride;
         let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
-        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots.clone()])) {
+        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots.clone()]))
+        {
             for lane in 0..LANES {
                 stiffness[lane] += attached[lane];
                 pull[lane] += attached[lane] * anchor[lane];

@@ -24,6 +24,17 @@ pub(crate) const INVERSE: [f64; MOST_COEFFICIENTS] = {
     inverse
 };
 
+/// p (p-1).
+const TWICE_DERIVED: [f64; MOST_COEFFICIENTS] = {
+    let mut factors = [0.0; MOST_COEFFICIENTS];
+    let mut p = 2;
+    while p < MOST_COEFFICIENTS {
+        factors[p] = (p * (p - 1)) as f64;
+        p += 1;
+    }
+    factors
+};
+
 /// `Σ c_p s^p`. Even and odd orders are summed side by side, since each sum waits for its last term.
 pub(crate) fn value(coefficients: &[f64], s: f64) -> f64 {
     let square = s * s;
@@ -50,11 +61,15 @@ pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
 
 /// `Σ p (p-1) |c_p|`: a bound on the second derivative on [0, 1]. Two sums side by side.
 pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
-    let mut sums = [0.0, 0.0];
-    for (p, c) in coefficients.iter().enumerate().skip(2) {
-        sums[p % 2] += (p * (p - 1)) as f64 * c.abs();
+    let (pairs, rest) = coefficients.as_chunks::<2>();
+    let mut sums = [0.0; 2];
+    for (pair, factors) in pairs.iter().zip(TWICE_DERIVED.as_chunks::<2>().0) {
+        for i in 0..2 {
+            sums[i] += factors[i] * pair[i].abs();
+        }
     }
-    sums[0] + sums[1]
+    let last = rest.first().map_or(0.0, |c| TWICE_DERIVED[coefficients.len() - 1] * c.abs());
+    (sums[0] + last) + sums[1]
 }
 
 /// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in [`value`],

@@ -94,11 +94,7 @@ pub(super) struct Leap {
     behind: [Vec<f64>; 2],
     /// Inverse complex pivots of (S - mω² + imγω)/m.
     inverse_complex: Vec<[f64; 2]>,
-    /// The chain and its state: as they are at the start, the state in the end as it is after the leap.
-    diagonal: Vec<f64>,
-    pull: Vec<f64>,
-    upper: Vec<f64>,
-    lower: Vec<f64>,
+    /// The state at the start, in the end that after the leap.
     displacement: Vec<f64>,
     velocity: Vec<f64>,
     start: Vec<f64>,
@@ -134,10 +130,6 @@ impl Leap {
             ahead: [zeros.clone(), zeros.clone()],
             behind: [zeros.clone(), zeros.clone()],
             inverse_complex: vec![[0.0; 2]; blocks],
-            diagonal: zeros.clone(),
-            pull: zeros.clone(),
-            upper: zeros.clone(),
-            lower: zeros.clone(),
             displacement: zeros.clone(),
             velocity: zeros.clone(),
             start: zeros.clone(),
@@ -165,10 +157,6 @@ impl Leap {
         audit: Option<&mut Audit>,
     ) -> Attempt {
         let layout = chain.layout;
-        layout.unfold(&chain.diagonal, &mut self.diagonal);
-        layout.unfold(&chain.pull, &mut self.pull);
-        layout.unfold(&chain.upper, &mut self.upper);
-        layout.unfold(&chain.lower, &mut self.lower);
         layout.unfold(&state.displacement, &mut self.displacement);
         layout.unfold(&state.velocity, &mut self.velocity);
         // Worth another try after so many e-foldings of the free motion, or after the next event.
@@ -252,7 +240,7 @@ impl Leap {
 
     /// How long a glide may last, in s, so that its work and memory are bounded. The motion goes on in the next one.
     fn longest_glide(&self, chain: &Chain) -> f64 {
-        let widest = self.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
+        let widest = chain.in_line.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
         MOST_GLIDE_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
     }
 
@@ -310,7 +298,7 @@ impl Leap {
         let blocks = chain.layout.blocks;
         let shift = self.shift(chain);
         let squared = chain.coupling[0][0] * chain.coupling[0][0];
-        let diagonal = &self.diagonal[..blocks];
+        let diagonal = &chain.in_line.diagonal[..blocks];
         let inverse = &mut self.inverse_pivot[..blocks];
         let [ahead, ahead_beyond] = self.ahead.each_mut().map(|minors| &mut minors[..blocks]);
         let [behind, behind_beyond] = self.behind.each_mut().map(|minors| &mut minors[..blocks]);
@@ -353,7 +341,7 @@ impl Leap {
         }
         // Forward from the leading edge, the right-hand side over the pivot kept in `start`, then back.
         let mut carried = 0.0;
-        let sources = self.pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
+        let sources = chain.in_line.pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
         for ((start, inverse), own) in self.start.iter_mut().zip(&self.inverse_pivot).zip(sources).rev() {
             carried = (coupling * inverse).mul_add(carried, own * inverse);
             *start = carried;
@@ -382,7 +370,7 @@ impl Leap {
         let mut ahead = [0.0, 0.0];
         for j in (0..blocks).rev() {
             let squared = coupling * coupling;
-            let pivot = [self.diagonal[j] - shift - squared * ahead[0], loss - squared * ahead[1]];
+            let pivot = [chain.in_line.diagonal[j] - shift - squared * ahead[0], loss - squared * ahead[1]];
             let scale = 1.0 / (pivot[0] * pivot[0] + pivot[1] * pivot[1]);
             ahead = [pivot[0] * scale, -pivot[1] * scale];
             self.inverse_complex[j] = ahead;
@@ -402,7 +390,7 @@ impl Leap {
         let twice_coupling = 2.0 * chain.coupling[0][0];
         let shift = self.shift(chain);
         let (mut energy, mut before) = (0.0, 0.0);
-        for ((y, turned), diagonal) in self.free.iter().zip(&self.turned).zip(&self.diagonal) {
+        for ((y, turned), diagonal) in self.free.iter().zip(&self.turned).zip(&chain.in_line.diagonal) {
             energy += turned * turned + y * ((diagonal - shift) * y - twice_coupling * before);
             before = *y;
         }
@@ -416,7 +404,7 @@ impl Leap {
         let shift = self.shift(chain);
         let [ahead, ahead_beyond] = self.ahead.each_ref().map(|minors| &minors[..blocks]);
         let [behind, behind_beyond] = self.behind.each_ref().map(|minors| &minors[..blocks]);
-        let (diagonal, residue) = (&self.diagonal[..blocks], &mut self.residue[..blocks]);
+        let (diagonal, residue) = (&chain.in_line.diagonal[..blocks], &mut self.residue[..blocks]);
         for j in 0..blocks {
             // 1/(ahead/beyond + behind/beyond - diagonal), with one division.
             let beyond = ahead_beyond[j] * behind_beyond[j];
@@ -436,7 +424,7 @@ impl Leap {
             let late = self.start[j] + self.rate[j] * seconds + left * self.residue[j];
             let highest = late.max(self.start[j] + self.residue[j]) + swing;
             let lowest = self.start[j] - self.residue[j] - swing;
-            highest < self.upper[j] && lowest > self.lower[j]
+            highest < chain.in_line.upper[j] && lowest > chain.in_line.lower[j]
         })
     }
 
@@ -445,7 +433,7 @@ impl Leap {
         let mut first = (horizon, None);
         for j in 0..chain.layout.blocks {
             let [real, imaginary] = self.wave[j];
-            let (upper, lower) = (self.upper[j], self.lower[j]);
+            let (upper, lower) = (chain.in_line.upper[j], chain.in_line.lower[j]);
             if drive.amplitude == 0.0 {
                 // The rate is positive, so the ramp alone only rises.
                 let elapsed = ((upper - self.start[j]) / self.rate[j]).max(decay);

@@ -25,6 +25,18 @@ const INVERSE_FACTORIAL: [f64; MOST_COEFFICIENTS] = {
     inverse
 };
 
+/// What the contacts make of each block, one entry a block.
+#[derive(Clone, Debug)]
+pub(super) struct InLine {
+    /// Diagonal of S/m, in 1/s².
+    pub diagonal: Vec<f64>,
+    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
+    pub pull: Vec<f64>,
+    /// Nearest break positions, in m.
+    pub upper: Vec<f64>,
+    pub lower: Vec<f64>,
+}
+
 /// The chain's coefficients in lanes, all divided by the block mass.
 #[derive(Clone, Debug)]
 pub(super) struct Chain {
@@ -42,6 +54,8 @@ pub(super) struct Chain {
     /// Nearest break positions, in m.
     pub upper: Vec<Row>,
     pub lower: Vec<Row>,
+    /// The same four for the eliminations of a leap, which go from block to block.
+    pub in_line: InLine,
     /// Damping rate γ, in 1/s.
     pub damping_rate: f64,
 }
@@ -58,6 +72,12 @@ impl Chain {
             pull: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
             lower: layout.filled(f64::NEG_INFINITY),
+            in_line: InLine {
+                diagonal: vec![0.0; layout.blocks],
+                pull: vec![0.0; layout.blocks],
+                upper: vec![0.0; layout.blocks],
+                lower: vec![0.0; layout.blocks],
+            },
             damping_rate: parameters.damping_rate,
         };
         let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
@@ -72,10 +92,13 @@ impl Chain {
     /// Takes over what the contacts of a block have become.
     pub fn update(&mut self, block: usize, interface: &Interface) {
         let (row, lane) = self.layout.slot(block);
-        self.diagonal[row][lane] = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
-        self.pull[row][lane] = interface.block_pull[block] / self.mass;
-        self.upper[row][lane] = interface.block_upper[block];
-        self.lower[row][lane] = interface.block_lower[block];
+        let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
+        let pull = interface.block_pull[block] / self.mass;
+        let (upper, lower) = (interface.block_upper[block], interface.block_lower[block]);
+        (self.diagonal[row][lane], self.in_line.diagonal[block]) = (diagonal, diagonal);
+        (self.pull[row][lane], self.in_line.pull[block]) = (pull, pull);
+        (self.upper[row][lane], self.in_line.upper[block]) = (upper, upper);
+        (self.lower[row][lane], self.in_line.lower[block]) = (lower, lower);
     }
 
     /// The entry of a block.
@@ -186,12 +209,14 @@ impl Series {
 
     /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
     pub fn shear_force(&self, mut drive: DriveTerms, stiffness: f64, coefficients: &mut Vec<f64>) {
-        coefficients.resize(self.order + 1, 0.0);
-        let mut at = 0;
-        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
-            *coefficient = stiffness * inverse * (drive.take() - self.terms[at][0]);
-            at += self.rows;
-        }
+        let ends = self.terms.chunks_exact(self.rows).map(|order| order[0][0]);
+        coefficients.clear();
+        coefficients.extend(
+            INVERSE_FACTORIAL[..=self.order]
+                .iter()
+                .zip(ends)
+                .map(|(inverse, end)| stiffness * inverse * (drive.take() - end)),
+        );
     }
 }
 
@@ -338,7 +363,13 @@ fn expand_held<V: Vector, const R: usize>(
 }
 
 #[inline(always)]
-fn held_sweep<V: Vector, const R: usize>(coupling: &[Row; R], diagonal: &[V; R], damping: V, y: &mut [V; R], rate: &[V; R]) {
+fn held_sweep<V: Vector, const R: usize>(
+    coupling: &[Row; R],
+    diagonal: &[V; R],
+    damping: V,
+    y: &mut [V; R],
+    rate: &[V; R],
+) {
     let mut before = y[R - 1].to_next_lane();
     let last_after = y[0].to_lane_before();
     for r in 0..R {
@@ -497,15 +528,20 @@ fn reachable_rows<V: Vector, const G: usize>(
             *excursion = V::load(term).magnitude().fused(weight, *excursion);
         }
     }
-    for (g, excursion) in excursion.iter().enumerate() {
-        let r = first + g;
-        excursion.store(&mut series.excursion[r]);
-        let x = V::load(&series.terms[r]);
-        let above = x.plus(*excursion).reaches(V::load(&chain.upper[r]));
-        let below = V::load(&chain.lower[r]).reaches(x.minus(*excursion));
-        let mut reached = above | below;
+    let own = first..first + G;
+    let (strays, starts) = (&mut series.excursion[own.clone()], &series.terms[own.clone()]);
+    let (upper, lower) = (&chain.upper[own.clone()], &chain.lower[own]);
+    let mut reached = [0; G];
+    for g in 0..G {
+        excursion[g].store(&mut strays[g]);
+        let x = V::load(&starts[g]);
+        let above = x.plus(excursion[g]).reaches(V::load(&upper[g]));
+        let below = V::load(&lower[g]).reaches(x.minus(excursion[g]));
+        reached[g] = above | below;
+    }
+    for (g, mut reached) in reached.into_iter().enumerate() {
         while reached != 0 {
-            blocks.push((r, reached.trailing_zeros() as usize));
+            blocks.push((first + g, reached.trailing_zeros() as usize));
             reached &= reached - 1;
         }
     }
