@@ -17,8 +17,9 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 /// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
 const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
-const DRAWS_PER_REFILL: usize = 16;
-/// Draws that wait for each other's arithmetic.
+const DRAWS_PER_REFILL: u32 = 16;
+type Draws = [Draw; DRAWS_PER_REFILL as usize];
+/// Draws whose arithmetic goes side by side.
 const SIDE_BY_SIDE: usize = 4;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
@@ -47,7 +48,7 @@ pub struct Disorder {
     mean_stiffness: f64,
     reattachment_time: f64,
     /// [`DRAWS_PER_REFILL`] generations of each contact, drawn side by side, and the first of them.
-    buffered: Vec<[Draw; DRAWS_PER_REFILL]>,
+    buffered: Vec<Draws>,
     buffered_from: Vec<u32>,
 }
 
@@ -69,14 +70,14 @@ impl Disorder {
             threshold_deviation: parameters.threshold_deviation,
             mean_stiffness: parameters.contact_stiffness,
             reattachment_time: parameters.reattachment_time,
-            buffered: vec![[Draw::default(); DRAWS_PER_REFILL]; contacts],
+            buffered: vec![Draws::default(); contacts],
             buffered_from: vec![u32::MAX; contacts],
         }
     }
 
     /// The given life of a contact; `contact` counts through all blocks, `block · N_s + i`.
     pub fn draw(&mut self, contact: usize, generation: u32) -> Contact {
-        let ahead = generation % DRAWS_PER_REFILL as u32;
+        let ahead = generation % DRAWS_PER_REFILL;
         if self.buffered_from[contact] != generation - ahead {
             self.refill(contact, generation - ahead);
         }
@@ -92,9 +93,10 @@ impl Disorder {
     #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
-        let words: [[u64; 2]; DRAWS_PER_REFILL] = array::from_fn(|_| array::from_fn(|_| self.generator.next_u64()));
+        let words: [[u64; 2]; DRAWS_PER_REFILL as usize] =
+            array::from_fn(|_| array::from_fn(|_| self.generator.next_u64()));
         let mut generation = first;
-        let mut draws = [Draw::default(); DRAWS_PER_REFILL];
+        let mut draws = Draws::default();
         for (draws, words) in
             draws.as_chunks_mut::<SIDE_BY_SIDE>().0.iter_mut().zip(words.as_chunks::<SIDE_BY_SIDE>().0)
         {

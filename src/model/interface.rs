@@ -42,26 +42,27 @@ pub struct ContactEvent {
     pub stiffness: f64,
 }
 
-/// A reattachment that is due, as one number that orders by time, then block, then contact: the bits of a time in s, which is
-/// not negative, block and contact.
+/// A reattachment that is due, in order of time, then block, then contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Due(u128);
+struct Due {
+    /// Bits of the time in s, which order as it does, since it is not negative.
+    time: u64,
+    block: u32,
+    contact: u32,
+}
 
 impl Due {
+    #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
     fn new(time: f64, block: usize, contact: usize) -> Self {
-        Self(u128::from(time.to_bits()) << 64 | (block as u128) << 32 | contact as u128)
+        Self { time: time.to_bits(), block: block as u32, contact: contact as u32 }
     }
 
     fn time(self) -> f64 {
-        f64::from_bits((self.0 >> 64) as u64)
+        f64::from_bits(self.time)
     }
 
     fn block(self) -> usize {
-        (self.0 >> 32) as u32 as usize
-    }
-
-    fn contact(self) -> usize {
-        self.0 as u32 as usize
+        self.block as usize
     }
 }
 
@@ -157,7 +158,7 @@ impl Interface {
     /// When nothing is due: a mistake of the solver.
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
-        let (block, contact) = (due.block(), due.contact());
+        let (block, contact) = (due.block(), due.contact as usize);
         self.attach(block * self.stride + contact, displacement);
         self.gather(block);
         self.event(block, contact, due.time(), displacement, Change::Attach)
@@ -165,6 +166,7 @@ impl Interface {
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// tells each to `log`.
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is looked at in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
         let first = block * self.stride;
         for start in (0..self.stride).step_by(LANES) {
@@ -202,7 +204,7 @@ impl Interface {
         let due = std::mem::take(&mut self.reattachments);
         self.reattachments = due
             .into_iter()
-            .map(|Reverse(due)| Reverse(Due::new((due.time() - shift).max(0.0), due.block(), due.contact())))
+            .map(|Reverse(due)| Reverse(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due }))
             .collect();
     }
 

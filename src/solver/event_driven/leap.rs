@@ -171,7 +171,7 @@ impl Leap {
         if is_short && decay_rate < 0.5 * chain.damping_rate {
             return Attempt::Wait { seconds: horizon };
         }
-        let horizon = if is_short { horizon.min(self.longest_glide(chain)) } else { horizon };
+        let horizon = if is_short { horizon.min(Self::longest_glide(chain)) } else { horizon };
         let moving = decay.min(horizon);
         let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
         if decay > 0.0 && !self.stays_clear(chain, drive, moving, left) {
@@ -239,7 +239,7 @@ impl Leap {
     }
 
     /// How long a glide may last, in s, so that its work and memory are bounded. The motion goes on in the next one.
-    fn longest_glide(&self, chain: &Chain) -> f64 {
+    fn longest_glide(chain: &Chain) -> f64 {
         let widest = chain.in_line.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
         MOST_GLIDE_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
     }
@@ -518,10 +518,9 @@ mod tests {
         let parameters = Parameters { blocks: 1, damping_rate: 0.0, ..Parameters::default() };
         let layout = Layout::new(1);
         // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
-        let mut chain = Chain::new(&parameters, layout);
+        let chain = Chain::new(&parameters, layout);
         let kernels = Kernels::available(layout.rows).pop().unwrap();
         let squared = parameters.drive_stiffness / chain.mass;
-        chain.diagonal[0][0] = squared;
         let drive = DriveNow {
             stiffness: parameters.drive_stiffness,
             mass: chain.mass,

@@ -75,8 +75,8 @@ impl Chain {
             in_line: InLine {
                 diagonal: vec![0.0; layout.blocks],
                 pull: vec![0.0; layout.blocks],
-                upper: vec![0.0; layout.blocks],
-                lower: vec![0.0; layout.blocks],
+                upper: vec![f64::INFINITY; layout.blocks],
+                lower: vec![f64::NEG_INFINITY; layout.blocks],
             },
             damping_rate: parameters.damping_rate,
         };
@@ -85,6 +85,7 @@ impl Chain {
             let (row, lane) = layout.slot(block);
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
+            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal / chain.mass, diagonal / chain.mass);
         }
         chain
     }
@@ -209,14 +210,12 @@ impl Series {
 
     /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
     pub fn shear_force(&self, mut drive: DriveTerms, stiffness: f64, coefficients: &mut Vec<f64>) {
-        let ends = self.terms.chunks_exact(self.rows).map(|order| order[0][0]);
-        coefficients.clear();
-        coefficients.extend(
-            INVERSE_FACTORIAL[..=self.order]
-                .iter()
-                .zip(ends)
-                .map(|(inverse, end)| stiffness * inverse * (drive.take() - end)),
-        );
+        coefficients.resize(self.order + 1, 0.0);
+        let mut at = 0;
+        for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
+            *coefficient = stiffness * inverse * (drive.take() - self.terms[at][0]);
+            at += self.rows;
+        }
     }
 }
 
@@ -238,9 +237,6 @@ pub(super) fn expand<V: Vector, const R: usize>(
     input: &StepInput,
     series: &mut Series,
 ) -> bool {
-    if V::HAS_MANY_REGISTERS && R > 0 {
-        return expand_held::<V, R>(chain, state, input, series);
-    }
     let rows = series.rows_in::<R>();
     let Series { terms, coupling, diagonal, .. } = series;
     let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
@@ -286,100 +282,6 @@ pub(super) fn expand<V: Vector, const R: usize>(
         }
     }
     false
-}
-
-/// [`expand`] with two orders and the diagonal held in registers.
-#[inline(always)]
-fn expand_held<V: Vector, const R: usize>(
-    chain: &Chain,
-    state: &State,
-    input: &StepInput,
-    series: &mut Series,
-) -> bool {
-    let Series { terms, coupling, .. } = series;
-    let coupling: &mut [Row; R] = (&mut coupling[..R]).try_into().unwrap();
-    let square = V::splat(input.length * input.length);
-    let minus_square = V::splat(-(input.length * input.length));
-    let mut diagonal = [V::splat(0.0); R];
-    let (mut even, mut odd) = (diagonal, diagonal);
-    let length = V::splat(input.length);
-    let (orders, _) = terms.as_chunks_mut::<R>();
-    let (chain_coupling, chain_diagonal) = (&chain.coupling[..R], &chain.diagonal[..R]);
-    let (displacement, velocity) = (&state.displacement[..R], &state.velocity[..R]);
-    for r in 0..R {
-        V::load(&chain_coupling[r]).times(square).store(&mut coupling[r]);
-        diagonal[r] = V::load(&chain_diagonal[r]).times(minus_square);
-        even[r] = V::load(&displacement[r]);
-        even[r].store(&mut orders[0][r]);
-        odd[r] = V::load(&velocity[r]).times(length);
-        odd[r].store(&mut orders[1][r]);
-    }
-    let coupling = &*coupling;
-    let damping = V::splat(-chain.damping_rate * input.length);
-    let pulling = input.length * input.length * input.pulling;
-    let mut drive = input.drive;
-    let pull = &chain.pull[..R];
-    held_sweep(coupling, &diagonal, damping, &mut even, &odd);
-    for r in 0..R {
-        even[r] = V::load(&pull[r]).fused(square, even[r]);
-    }
-    let mut order = 2;
-    loop {
-        let push = pulling * drive.take();
-        if push != 0.0 {
-            even[0] = V::load(&FIRST_LANE).fused(V::splat(push), even[0]);
-        }
-        for r in 0..R {
-            even[r].store(&mut orders[order][r]);
-        }
-        held_sweep(coupling, &diagonal, damping, &mut odd, &even);
-        let push = pulling * drive.take();
-        if push != 0.0 {
-            odd[0] = V::load(&FIRST_LANE).fused(V::splat(push), odd[0]);
-        }
-        order += 1;
-        for r in 0..R {
-            odd[r].store(&mut orders[order][r]);
-        }
-        if order >= input.least_order {
-            let weights = [order - 1, order].map(|p| order as f64 * INVERSE_FACTORIAL[p]);
-            let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
-            for r in 0..R {
-                in_lower = even[r].magnitude().larger(in_lower);
-                in_higher = odd[r].magnitude().larger(in_higher);
-            }
-            let largest = in_lower.times(V::splat(weights[0])).larger(in_higher.times(V::splat(weights[1])));
-            if largest.within(V::splat(input.error)) {
-                series.order = order;
-                return true;
-            }
-        }
-        if order + 2 > MOST_ORDER {
-            return false;
-        }
-        held_sweep(coupling, &diagonal, damping, &mut even, &odd);
-        order += 1;
-    }
-}
-
-#[inline(always)]
-fn held_sweep<V: Vector, const R: usize>(
-    coupling: &[Row; R],
-    diagonal: &[V; R],
-    damping: V,
-    y: &mut [V; R],
-    rate: &[V; R],
-) {
-    let mut before = y[R - 1].to_next_lane();
-    let last_after = y[0].to_lane_before();
-    for r in 0..R {
-        let here = y[r];
-        let after = if r + 1 < R { y[r + 1] } else { last_after };
-        let coupled = before.plus(after).times(V::load(&coupling[r]));
-        let forced = here.fused(diagonal[r], coupled);
-        y[r] = rate[r].fused(damping, forced);
-        before = here;
-    }
 }
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
