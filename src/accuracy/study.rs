@@ -111,8 +111,10 @@ pub struct MethodRow {
     pub parameters: Parameters,
     /// Method and setting.
     pub solver: Solver,
-    /// What it costs.
+    /// What it costs, by its cheapest realisation per step: other work on the machine can only add to that.
     pub cost: Cost,
+    /// CPU time per step of the dearest realisation over that of the cheapest: how quiet the machine was.
+    pub cost_spread: f64,
     /// Errors of the first break times; `None` if they would take too long.
     pub break_times: Option<BreakErrors>,
     /// Relative residual of the energy ledger over the first slips; `None` likewise.
@@ -211,21 +213,34 @@ struct Ensemble {
     slips: Vec<Slip>,
     slips_seen: u64,
     summary: Summary,
-    cpu_seconds: f64,
+    /// CPU time per step of each realisation, in s.
+    per_step: Vec<f64>,
 }
 
 impl Ensemble {
     fn add(&mut self, cpu_seconds: f64, summary: &Summary, slips: Vec<Slip>) {
-        self.cpu_seconds += cpu_seconds;
+        self.per_step.push(cpu_seconds / summary.steps as f64);
         self.summary.end_time += summary.end_time;
         self.summary.steps += summary.steps;
         self.slips_seen += if slips.is_empty() { 0 } else { DISCARD + slips.len() as u64 };
         self.slips.extend(slips);
     }
 
-    /// Costs; where there are no slips, those per slip follow from the mean interval in s.
+    /// CPU time per step of the cheapest realisation, in s.
+    fn least_per_step(&self) -> f64 {
+        self.per_step.iter().fold(f64::INFINITY, |least, &cost| least.min(cost))
+    }
+
+    /// That of the dearest over that of the cheapest.
+    fn spread(&self) -> f64 {
+        self.per_step.iter().fold(0.0_f64, |most, &cost| most.max(cost)) / self.least_per_step()
+    }
+
+    /// Costs, at those of a step in the cheapest realisation; where there are no slips, those per slip follow from the mean
+    /// interval in s.
     fn cost(&self, mean_interval: f64) -> Cost {
-        let cost = Cost::of(self.cpu_seconds, &self.summary, self.slips_seen);
+        let cpu_seconds = self.least_per_step() * self.summary.steps as f64;
+        let cost = Cost::of(cpu_seconds, &self.summary, self.slips_seen);
         if self.slips_seen > 0 {
             cost
         } else {
@@ -274,6 +289,7 @@ impl Study {
                     parameters: parameters.clone(),
                     solver,
                     cost: ensemble.cost(mean_interval),
+                    cost_spread: ensemble.spread(),
                     break_times,
                     ledger_residual,
                 });
@@ -459,5 +475,9 @@ mod tests {
         let cost = ensemble.cost(10.0);
         assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
         assert!((cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12);
+        // Another realisation that other work has slowed down changes nothing but the spread.
+        ensemble.add(0.3, &summary, Vec::new());
+        assert!((ensemble.cost(10.0).per_slip - 2.0).abs() < 1e-12);
+        assert!((ensemble.spread() - 3.0).abs() < 1e-12);
     }
 }

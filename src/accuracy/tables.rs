@@ -110,10 +110,16 @@ pub fn methods() -> Table<MethodRow> {
     }
     let errors = [
         Column::new(
+            "cpu_spread",
+            "",
+            "CPU time per step of the dearest realisation over that of the cheapest, which the costs are",
+            Getter::Real(|row: &Row| row.cost_spread),
+        ),
+        Column::new(
             "compared_breaks",
             "",
             "number K of first breaks whose times are compared with those at the tightest tolerance",
-            Getter::OptionalCount(|row: &Row| row.break_times.map(|errors| errors.breaks)),
+            Getter::OptionalCount(|row| row.break_times.map(|errors| errors.breaks)),
         ),
         Column::new(
             "missing_breaks",

@@ -258,8 +258,14 @@ mod tests {
             per_step: 2e-7,
             timed_slips: 0,
         };
-        let method =
-            MethodRow { parameters: parameters.clone(), solver, cost, break_times, ledger_residual: Some(-1e-3) };
+        let method = MethodRow {
+            parameters: parameters.clone(),
+            solver,
+            cost,
+            cost_spread: 1.0,
+            break_times,
+            ledger_residual: Some(-1e-3),
+        };
         let untested = MethodRow { break_times: None, ledger_residual: None, ..method.clone() };
         let distance = DistanceRow {
             parameters,

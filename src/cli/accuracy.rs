@@ -16,7 +16,8 @@ use stickslip::store::storage::Disk;
 #[command(after_help = "\
 Before chaos: errors of the first break times against the tightest tolerance. After chaos: distances of the
 distributions of slips from a reference ensemble, and biases, with bootstrap intervals. And the residual of the
-energy ledger. Cost is CPU time of one thread; keep the machine free of other work.
+energy ledger. Cost is CPU time of one thread, that of the cheapest realisation; keep the machine free of other
+work: the spread over realisations tells how free it was.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
@@ -137,8 +138,14 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
     let at = |velocity: f64| move |row: &&&MethodRow| row.parameters.drive_velocity == velocity;
     let costs = cells(study.velocities.iter().map(|velocity| format!("{velocity:e} m/s")));
     let mut lines = vec![
-        format!("\nCPU time per slip in ms; the rest at {}", drive_in_words(&first.parameters)),
-        format!("{:30}{costs} {:>8} {:>18} {:>24} {:>9}", "solver", "ns/step", "break times (s)", "together", "ledger"),
+        format!(
+            "\nCPU time per slip in ms; the rest, with the spread of CPU times over realisations, at {}",
+            drive_in_words(&first.parameters)
+        ),
+        format!(
+            "{:30}{costs} {:>8} {:>6} {:>18} {:>24} {:>9}",
+            "solver", "ns/step", "spread", "break times (s)", "together", "ledger"
+        ),
     ];
     for row in rows.iter().filter(at(first.parameters.drive_velocity)) {
         let same = |velocity: &f64| rows.iter().filter(at(*velocity)).find(|other| other.solver == row.solver);
@@ -154,9 +161,10 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
             format!("{mark}{} breaks, {:.3} s", errors.together, errors.together_seconds)
         });
         lines.push(format!(
-            "{:30}{costs} {:>8.0} {:>18} {:>24} {:>9}",
+            "{:30}{costs} {:>8.0} {:>6.2} {:>18} {:>24} {:>9}",
             described(row.solver),
             1e9 * row.cost.per_step,
+            row.cost_spread,
             times.unwrap_or_else(|| "-".to_owned()),
             together.unwrap_or_else(|| "-".to_owned()),
             or_dash(row.ledger_residual.map(f64::abs)),
