@@ -90,6 +90,7 @@ impl Disorder {
         }
     }
 
+    /// Draws the generations of a contact from `first` on; apart from [`Self::draw`], which is called far more often.
     #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
@@ -113,15 +114,16 @@ impl Disorder {
 
     /// The threshold for a quantile of its distribution, or for one that is drawn again.
     fn threshold(&mut self, contact: usize, generation: u32, mut quantile: f64) -> f64 {
-        for redraw in 1.. {
+        let mut redraw = 0;
+        loop {
             let threshold = self.mean_threshold + self.threshold_deviation * quantile;
             if threshold > 0.0 {
                 return threshold;
             }
+            redraw += 1;
             self.seek(contact, generation, redraw);
             [quantile] = standard_normal_quantiles([uniform(self.generator.next_u64())]);
         }
-        unreachable!("a mean threshold is positive")
     }
 
     fn seek(&mut self, contact: usize, generation: u32, redraw: u128) {

@@ -204,6 +204,7 @@ impl Interface {
         let due = std::mem::take(&mut self.reattachments);
         self.reattachments = due
             .into_iter()
+            // Not negative, whatever rounding does: see `Due`.
             .map(|Reverse(due)| Reverse(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due }))
             .collect();
     }

@@ -172,8 +172,8 @@ impl<'a> Run<'a> {
         run
     }
 
-    /// Apart from where the run is owned, and what is rare apart from here: the loop is short and drops nothing if an observer
-    /// panics, a twentieth less time.
+    /// Apart from where the run is owned, and what is rare apart from here: the loop is short, and has nothing to drop if
+    /// an observer panics.
     #[inline(never)]
     fn finished(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         for event in self.interface.initial_attachments() {

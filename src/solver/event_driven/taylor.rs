@@ -85,7 +85,8 @@ impl Chain {
             let (row, lane) = layout.slot(block);
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
-            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal / chain.mass, diagonal / chain.mass);
+            let diagonal = diagonal / chain.mass;
+            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal, diagonal);
         }
         chain
     }
