@@ -41,24 +41,17 @@ impl DerefMut for Row {
 pub(super) struct Layout {
     pub blocks: usize,
     pub rows: usize,
-    /// 2^52/rows, rounded up: times a block below 2^24, its lane times 2^52 and a rest.
-    lane_per_block: u64,
 }
-
-/// A division by the number of rows is a product and a shift by so many bits.
-const LANE_SHIFT: u32 = 52;
 
 impl Layout {
     pub fn new(blocks: usize) -> Self {
-        let rows = blocks.div_ceil(LANES);
-        Self { blocks, rows, lane_per_block: (1 << LANE_SHIFT) / rows as u64 + 1 }
+        Self { blocks, rows: blocks.div_ceil(LANES) }
     }
 
     /// Row and lane of a block.
     #[inline]
     pub fn slot(self, block: usize) -> (usize, usize) {
-        let lane = ((block as u64 * self.lane_per_block) >> LANE_SHIFT) as usize;
-        (block - lane * self.rows, lane)
+        (block % self.rows, block / self.rows)
     }
 
     /// Block in a slot; beyond the last one for padding.
@@ -85,25 +78,6 @@ impl Layout {
         for (lane, run) in blocks.chunks(self.rows).enumerate() {
             for (entry, row) in run.iter().zip(&mut *rows) {
                 row[lane] = *entry;
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn a_slot_is_the_remainder_and_the_quotient_by_the_rows(blocks in 1_usize..10_000_000, of in 0.0_f64..1.0) {
-            let layout = Layout::new(blocks);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of blocks")]
-            for block in [0, blocks - 1, (of * blocks as f64) as usize] {
-                let (row, lane) = layout.slot(block);
-                prop_assert_eq!((row, lane), (block % layout.rows, block / layout.rows));
-                prop_assert_eq!(layout.block(row, lane), block);
             }
         }
     }
