@@ -70,6 +70,9 @@ impl Due {
 /// processor.
 const LANES: usize = 8;
 
+/// As a factor, moves the lowest bits of eight bytes, each 0 or 1, into the highest byte, in order.
+const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
+
 /// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::shift`].
 #[derive(Clone, Debug)]
 pub struct Interface {
@@ -159,8 +162,11 @@ impl Interface {
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.block(), due.contact as usize);
-        self.attach(block * self.stride + contact, displacement);
-        self.gather(block);
+        let slot = block * self.stride + contact;
+        self.attach(slot, displacement);
+        self.sum(block);
+        self.block_upper[block] = self.block_upper[block].min(self.upper[slot]);
+        self.block_lower[block] = self.block_lower[block].max(self.lower[slot]);
         self.event(block, contact, due.time(), displacement, Change::Attach)
     }
 
@@ -169,19 +175,20 @@ impl Interface {
     #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is looked at in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
         let first = block * self.stride;
-        for start in (0..self.stride).step_by(LANES) {
-            let positions = first + start..first + start + LANES;
-            let (upper, lower) = (&self.upper[positions.clone()], &self.lower[positions]);
-            let reached: [bool; LANES] =
-                array::from_fn(|lane| (upper[lane] <= displacement) | (lower[lane] >= displacement));
-            if reached == [false; LANES] {
-                continue;
+        for start in (0..self.stride).step_by(LANES * LANES) {
+            let slots = first + start..first + self.stride.min(start + LANES * LANES);
+            // A bit for each contact.
+            let mut reached = 0_u64;
+            for (row, (upper, lower)) in lanes(&self.upper[slots.clone()]).zip(lanes(&self.lower[slots])).enumerate() {
+                let in_row: [u8; LANES] =
+                    array::from_fn(|lane| u8::from((upper[lane] <= displacement) | (lower[lane] >= displacement)));
+                reached |= (u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56) << (LANES * row);
             }
-            for contact in (start..self.contacts_per_block).take(LANES) {
-                if reached[contact - start] {
-                    log(self.event(block, contact, time, displacement, Change::Break));
-                    self.detach(block, contact, time);
-                }
+            while reached != 0 {
+                let contact = start + reached.trailing_zeros() as usize;
+                log(self.event(block, contact, time, displacement, Change::Break));
+                self.detach(block, contact, time);
+                reached &= reached - 1;
             }
         }
         self.gather(block);
@@ -259,19 +266,11 @@ impl Interface {
         self.reattachments.push(Reverse(Due::new(time + self.life[slot].delay, block, contact)));
     }
 
-    /// Takes the sums and nearest break positions of a block anew, in fixed lanes.
+    /// Takes the sums and nearest break positions of a block anew.
     fn gather(&mut self, block: usize) {
+        self.sum(block);
         let first = block * self.stride;
         let slots = first..first + self.stride;
-        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
-        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots.clone()]))
-        {
-            for lane in 0..LANES {
-                stiffness[lane] += attached[lane];
-                pull[lane] += attached[lane] * anchor[lane];
-            }
-        }
-        // Apart from the sums, so that both fit into the registers of any processor.
         let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         for (above, below) in lanes(&self.upper[slots.clone()]).zip(lanes(&self.lower[slots])) {
             for lane in 0..LANES {
@@ -279,10 +278,23 @@ impl Interface {
                 lower[lane] = if below[lane] > lower[lane] { below[lane] } else { lower[lane] };
             }
         }
-        self.block_stiffness[block] = across(stiffness, |a, b| a + b);
-        self.block_pull[block] = across(pull, |a, b| a + b);
         self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
         self.block_lower[block] = across(lower, |a, b| if a > b { a } else { b });
+    }
+
+    /// Takes the sums of a block anew, in fixed lanes.
+    fn sum(&mut self, block: usize) {
+        let first = block * self.stride;
+        let slots = first..first + self.stride;
+        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
+        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots])) {
+            for lane in 0..LANES {
+                stiffness[lane] += attached[lane];
+                pull[lane] += attached[lane] * anchor[lane];
+            }
+        }
+        self.block_stiffness[block] = across(stiffness, |a, b| a + b);
+        self.block_pull[block] = across(pull, |a, b| a + b);
     }
 }
 

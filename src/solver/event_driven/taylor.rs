@@ -5,7 +5,7 @@
 //! terms, times their order, fall under the wanted error. The sum of the terms' magnitudes bounds how far each block
 //! strays within the step.
 
-use super::lanes::{Layout, Row};
+use super::lanes::{LANES, Layout, Row};
 use super::vector::Vector;
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
@@ -185,6 +185,7 @@ impl Series {
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = row;
+        let lane = lane % LANES;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
             *coefficient = inverse * self.terms[at][lane];
             at += self.rows;
@@ -250,7 +251,9 @@ pub(super) fn expand<V: Vector, const R: usize>(
         V::load(diagonal).times(minus_square).store(scaled);
     }
     let (first, second) = terms[..2 * rows].split_at_mut(rows);
-    first.copy_from_slice(&state.displacement[..rows]);
+    for (start, displacement) in first.iter_mut().zip(&state.displacement[..rows]) {
+        V::load(displacement).store(start);
+    }
     let length = V::splat(input.length);
     for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
         V::load(velocity).times(length).store(rate);
