@@ -258,34 +258,144 @@ pub(super) fn expand<V: Vector, const R: usize>(
     for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
         V::load(velocity).times(length).store(rate);
     }
-    let damping = V::splat(-chain.damping_rate * input.length);
-    let pulling = input.length * input.length * input.pulling;
-    let mut drive = input.drive;
-    for p in 0..MOST_ORDER - 1 {
-        let terms = &mut terms[p * rows..(p + 3) * rows];
-        sweep::<V>(coupling, diagonal, damping, terms, rows);
-        let added = &mut terms[2 * rows..];
+    let forcing = Forcing {
+        coupling,
+        diagonal,
+        pull: &chain.pull[..rows],
+        square,
+        damping: V::splat(-chain.damping_rate * input.length),
+        pulling: input.length * input.length * input.pulling,
+        drive: input.drive,
+    };
+    let order = if R > 0 && V::HAS_MANY_REGISTERS {
+        converge_in_registers::<V, R>(forcing, input, terms)
+    } else {
+        converge_in_memory(forcing, input, terms, rows)
+    };
+    series.order = order.unwrap_or(MOST_ORDER);
+    order.is_some()
+}
+
+/// What makes the next order of the last two.
+struct Forcing<'a, V> {
+    /// h² times the coupling and minus the diagonal.
+    coupling: &'a [Row],
+    diagonal: &'a [Row],
+    /// The contact force at displacement zero, by mass, and h².
+    pull: &'a [Row],
+    square: V,
+    damping: V,
+    /// h² `K_d/m`, and what the drive's displacement has left.
+    pulling: f64,
+    drive: DriveTerms,
+}
+
+impl<V: Vector> Forcing<'_, V> {
+    /// Adds pull and drive to Y_{p+2}; order after order.
+    #[inline(always)]
+    fn add(&mut self, p: usize, next: &mut [Row]) {
         if p == 0 {
-            for (row, pull) in added.iter_mut().zip(&chain.pull[..rows]) {
-                V::load(pull).fused(square, V::load(row)).store(row);
+            for (row, pull) in next.iter_mut().zip(self.pull) {
+                V::load(pull).fused(self.square, V::load(row)).store(row);
             }
         }
-        let push = pulling * drive.take();
+        let push = self.pulling * self.drive.take();
         if push != 0.0 {
-            V::load(&FIRST_LANE).fused(V::splat(push), V::load(&added[0])).store(&mut added[0]);
+            V::load(&FIRST_LANE).fused(V::splat(push), V::load(&next[0])).store(&mut next[0]);
         }
+    }
+
+    /// Y_{p+2} of Y_p and Y_{p+1}, also written to `rows`.
+    #[inline(always)]
+    fn next_order<const R: usize>(&mut self, p: usize, y: [V; R], rate: [V; R], rows: &mut [Row; R]) -> [V; R] {
+        let (coupling, diagonal) = (&self.coupling[..R], &self.diagonal[..R]);
+        let mut next = y;
+        for r in 0..R {
+            let before = if r > 0 { y[r - 1] } else { y[R - 1].to_next_lane() };
+            let after = if r + 1 < R { y[r + 1] } else { y[0].to_lane_before() };
+            let coupled = before.plus(after).times(V::load(&coupling[r]));
+            let forced = y[r].fused(V::load(&diagonal[r]), coupled);
+            next[r] = rate[r].fused(self.damping, forced);
+        }
+        if p == 0 {
+            let pull = &self.pull[..R];
+            for r in 0..R {
+                next[r] = V::load(&pull[r]).fused(self.square, next[r]);
+            }
+        }
+        let push = self.pulling * self.drive.take();
+        if push != 0.0 {
+            next[0] = V::load(&FIRST_LANE).fused(V::splat(push), next[0]);
+        }
+        for r in 0..R {
+            next[r].store(&mut rows[r]);
+        }
+        next
+    }
+
+    /// Whether the last two orders, of which these are the largest magnitudes in each lane, are within the wanted error when
+    /// taken times the last.
+    #[inline(always)]
+    fn is_small(&self, order: usize, lower: V, higher: V, error: f64) -> bool {
+        let [for_lower, for_higher] = [order - 1, order].map(|p| V::splat(order as f64 * INVERSE_FACTORIAL[p]));
+        lower.times(for_lower).larger(higher.times(for_higher)).within(V::splat(error))
+    }
+}
+
+/// Adds orders to Y_0 and Y_1 until the series converges; the last one, if it does.
+#[inline(always)]
+fn converge_in_memory<V: Vector>(
+    mut forcing: Forcing<'_, V>,
+    input: &StepInput,
+    terms: &mut [Row],
+    rows: usize,
+) -> Option<usize> {
+    for p in 0..MOST_ORDER - 1 {
+        let terms = &mut terms[p * rows..(p + 3) * rows];
+        sweep::<V>(forcing.coupling, forcing.diagonal, forcing.damping, terms, rows);
+        forcing.add(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
         if p % 2 == 1 && order >= input.least_order {
             let (lower, higher) = terms[rows..].split_at(rows);
             let weights = [order - 1, order].map(|p| order as f64 * INVERSE_FACTORIAL[p]);
             if largest::<V>(lower, higher, weights).within(V::splat(input.error)) {
-                series.order = order;
-                return true;
+                return Some(order);
             }
         }
     }
-    false
+    None
+}
+
+/// The same with the last two orders in registers, where no sum waits for the memory.
+#[inline(always)]
+fn converge_in_registers<V: Vector, const R: usize>(
+    mut forcing: Forcing<'_, V>,
+    input: &StepInput,
+    terms: &mut [Row],
+) -> Option<usize> {
+    let (mut even, mut odd) = ([V::splat(0.0); R], [V::splat(0.0); R]);
+    for r in 0..R {
+        (even[r], odd[r]) = (V::load(&terms[r]), V::load(&terms[R + r]));
+    }
+    for (pair, rows) in terms[2 * R..].chunks_exact_mut(2 * R).enumerate() {
+        let p = 2 * pair;
+        let (lower, higher) = rows.split_at_mut(R);
+        even = forcing.next_order(p, even, odd, lower.first_chunk_mut()?);
+        odd = forcing.next_order(p + 1, odd, even, higher.first_chunk_mut()?);
+        let order = p + 3;
+        if order >= input.least_order {
+            let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
+            for r in 0..R {
+                in_lower = even[r].magnitude().larger(in_lower);
+                in_higher = odd[r].magnitude().larger(in_higher);
+            }
+            if forcing.is_small(order, in_lower, in_higher, input.error) {
+                return Some(order);
+            }
+        }
+    }
+    None
 }
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
