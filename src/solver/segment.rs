@@ -184,15 +184,10 @@ impl Segment<'_> {
                 if extreme + 0.125 * bend * width * width <= floor {
                     return None;
                 }
-                let is_monotone = (at_last - at_first).abs() >= bend * width * width
-                    || {
-                        let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                        coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_varies
-                    }
-                    || {
-                        let (_, slope) = polynomial::value_and_slope(coefficients, 0.5 * (first + last));
-                        slope.abs() >= 0.5 * bend * width
-                    };
+                let is_monotone = (at_last - at_first).abs() >= bend * width * width || {
+                    let (_, slope_varies) = polynomial::beyond_linear(coefficients);
+                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_varies
+                };
                 let (s, extreme) = if is_monotone {
                     (s, extreme)
                 } else {

@@ -17,21 +17,21 @@ pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], fro
     let mut first = None;
     if start + slope.max(0.0) + strays >= upper {
         coefficients[0] = start - upper;
-        first = first_reach(coefficients, [strays, slope_varies], from, end);
+        first = first_reach(coefficients, slope_varies, from, end);
     }
     if start + slope.min(0.0) - strays <= lower {
         coefficients[0] = start - lower;
         for coefficient in &mut *coefficients {
             *coefficient = -*coefficient;
         }
-        first = first_reach(coefficients, [strays, slope_varies], from, first.unwrap_or(end)).or(first);
+        first = first_reach(coefficients, slope_varies, from, first.unwrap_or(end)).or(first);
     }
     first
 }
 
-/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the value by
-/// at most `strays` and the slope by at most `slope_varies`.
-fn first_reach(coefficients: &[f64], [strays, slope_varies]: [f64; 2], from: f64, end: f64) -> Option<f64> {
+/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the slope by
+/// at most `slope_varies`.
+fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> Option<f64> {
     let [here, slope, bend] =
         if from > 0.0 { expanded(coefficients, from) } else { [coefficients[0], coefficients[1], coefficients[2]] };
     if here >= 0.0 {
@@ -41,13 +41,6 @@ fn first_reach(coefficients: &[f64], [strays, slope_varies]: [f64; 2], from: f64
         // First where the parabola crosses.
         let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * bend).max(0.0).sqrt());
         return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
-    }
-    // Where the parabola is largest, and what is beyond it.
-    let parabola = |s: f64| coefficients[0] + s * (coefficients[1] + s * coefficients[2]);
-    let vertex = (-0.5 * coefficients[1] / coefficients[2]).clamp(from, end);
-    let highest = parabola(from).max(parabola(end)).max(parabola(vertex));
-    if highest + end * end * end * (strays - coefficients[2].abs()) < 0.0 {
-        return None;
     }
     first_in(coefficients, from, end, DEEPEST)
 }

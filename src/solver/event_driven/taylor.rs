@@ -5,7 +5,7 @@
 //! terms, times their order, fall under the wanted error. The sum of the terms' magnitudes bounds how far each block
 //! strays within the step.
 
-use super::lanes::{LANES, Layout, Row};
+use super::lanes::{Layout, Row};
 use super::vector::Vector;
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
@@ -185,7 +185,6 @@ impl Series {
     pub fn block(&self, row: usize, lane: usize, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = row;
-        let lane = lane % LANES;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
             *coefficient = inverse * self.terms[at][lane];
             at += self.rows;
@@ -332,14 +331,6 @@ impl<V: Vector> Forcing<'_, V> {
         }
         next
     }
-
-    /// Whether the last two orders, of which these are the largest magnitudes in each lane, are within the wanted error when
-    /// taken times the last.
-    #[inline(always)]
-    fn is_small(&self, order: usize, lower: V, higher: V, error: f64) -> bool {
-        let [for_lower, for_higher] = [order - 1, order].map(|p| V::splat(order as f64 * INVERSE_FACTORIAL[p]));
-        lower.times(for_lower).larger(higher.times(for_higher)).within(V::splat(error))
-    }
 }
 
 /// Adds orders to Y_0 and Y_1 until the series converges; the last one, if it does.
@@ -356,12 +347,8 @@ fn converge_in_memory<V: Vector>(
         forcing.add(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
-        if p % 2 == 1 && order >= input.least_order {
-            let (lower, higher) = terms[rows..].split_at(rows);
-            let weights = [order - 1, order].map(|p| order as f64 * INVERSE_FACTORIAL[p]);
-            if largest::<V>(lower, higher, weights).within(V::splat(input.error)) {
-                return Some(order);
-            }
+        if p % 2 == 1 && order >= input.least_order && are_small::<V>(&terms[rows..], rows, order, input.error) {
+            return Some(order);
         }
     }
     None
@@ -384,15 +371,8 @@ fn converge_in_registers<V: Vector, const R: usize>(
         even = forcing.next_order(p, even, odd, lower.first_chunk_mut()?);
         odd = forcing.next_order(p + 1, odd, even, higher.first_chunk_mut()?);
         let order = p + 3;
-        if order >= input.least_order {
-            let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
-            for r in 0..R {
-                in_lower = even[r].magnitude().larger(in_lower);
-                in_higher = odd[r].magnitude().larger(in_higher);
-            }
-            if forcing.is_small(order, in_lower, in_higher, input.error) {
-                return Some(order);
-            }
+        if order >= input.least_order && are_small::<V>(rows, R, order, input.error) {
+            return Some(order);
         }
     }
     None
@@ -429,15 +409,16 @@ const FIRST_LANE: Row = {
     row
 };
 
-/// In each lane, the largest weighted magnitude in the rows of two orders.
+/// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the wanted error.
 #[inline(always)]
-fn largest<V: Vector>(lower: &[Row], higher: &[Row], weights: [f64; 2]) -> V {
+fn are_small<V: Vector>(terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
     let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
-    for (lower, higher) in lower.iter().zip(higher) {
+    for (lower, higher) in terms[..rows].iter().zip(&terms[rows..]) {
         in_lower = V::load(lower).magnitude().larger(in_lower);
         in_higher = V::load(higher).magnitude().larger(in_higher);
     }
-    in_lower.times(V::splat(weights[0])).larger(in_higher.times(V::splat(weights[1])))
+    let [for_lower, for_higher] = [order - 1, order].map(|p| V::splat(order as f64 * INVERSE_FACTORIAL[p]));
+    in_lower.times(for_lower).larger(in_higher.times(for_higher)).within(V::splat(error))
 }
 
 /// Rows that are taken through all orders together, since their sums need not wait for each other: many with many registers.
