@@ -309,3 +309,30 @@ fn across(l: [f64; LANES], together: impl Fn(f64, f64) -> f64) -> f64 {
     let halves: [f64; LANES / 2] = std::array::from_fn(|i| together(l[i], l[i + LANES / 2]));
     together(together(halves[0], halves[2]), together(halves[1], halves[3]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_breaks_what_is_reached_in_the_order_of_contacts() {
+        // More contacts than bits that are looked at together.
+        let parameters =
+            Parameters { blocks: 2, contacts_per_block: 150, threshold_deviation: 0.4, ..Parameters::default() };
+        let whole = Interface::new(&parameters);
+        let reaches: Vec<f64> = (0..150).map(|contact| whole.disorder.clone().draw(150 + contact, 0).reach).collect();
+        for displacement in [parameters.contact_reach(), -parameters.contact_reach()] {
+            let expected: Vec<usize> = (0..150).filter(|&contact| reaches[contact] <= displacement.abs()).collect();
+            assert!(expected.len() > 50 && expected.len() < 100, "{} of 150 reached", expected.len());
+            let (mut interface, mut broken) = (whole.clone(), Vec::new());
+            interface.break_reached(1, 0.0, displacement, |event| broken.push((event.block, event.contact)));
+            assert_eq!(broken, expected.iter().map(|&contact| (1, contact)).collect::<Vec<_>>());
+            while interface.next_reattachment_block().is_some() {
+                let event = interface.reattach_next(0.3 * displacement);
+                let known = [interface.block_upper[event.block], interface.block_lower[event.block]];
+                interface.gather(event.block);
+                assert_eq!(known, [interface.block_upper[event.block], interface.block_lower[event.block]]);
+            }
+        }
+    }
+}
