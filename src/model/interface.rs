@@ -6,9 +6,9 @@
 
 use super::disorder::Contact;
 use super::{BreakOn, Disorder, Parameters};
+use std::array;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::{array, slice};
 
 /// What happened to a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,23 +73,30 @@ const LANES: usize = 8;
 /// As a factor, moves the lowest bits of eight bytes, each 0 or 1, into the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
+/// Eight contacts of a block, side by side in memory as they are looked at. Those beyond the last stay detached for ever.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Row {
+    /// Stiffness while attached, else 0.
+    attached_stiffness: [f64; LANES],
+    anchor: [f64; LANES],
+    /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
+    upper: [f64; LANES],
+    lower: [f64; LANES],
+    /// The present life, or, while detached, the next.
+    life: [Contact; LANES],
+    generation: [u32; LANES],
+}
+
 /// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::shift`].
 #[derive(Clone, Debug)]
 pub struct Interface {
     contacts_per_block: usize,
-    /// Contacts per block in memory: `contacts_per_block` rounded up to whole lanes; the rest stay detached for ever.
-    stride: usize,
+    rows_per_block: usize,
     break_on: BreakOn,
     disorder: Disorder,
-    /// The life of each contact, or, while it is detached, the next.
-    life: Vec<Contact>,
-    anchor: Vec<f64>,
-    generation: Vec<u32>,
-    /// Stiffness of each contact while attached, else 0.
-    attached_stiffness: Vec<f64>,
-    /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
-    upper: Vec<f64>,
-    lower: Vec<f64>,
+    /// The rows of the first block, then of the second, and so on.
+    rows: Vec<Row>,
     reattachments: BinaryHeap<Reverse<Due>>,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
@@ -106,19 +113,21 @@ impl Interface {
     #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         let blocks = parameters.blocks;
-        let stride = parameters.contacts_per_block.next_multiple_of(LANES);
-        let slots = blocks * stride;
+        let rows_per_block = parameters.contacts_per_block.div_ceil(LANES);
+        let detached = Row {
+            attached_stiffness: [0.0; LANES],
+            anchor: [0.0; LANES],
+            upper: [f64::INFINITY; LANES],
+            lower: [f64::NEG_INFINITY; LANES],
+            life: [Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; LANES],
+            generation: [0; LANES],
+        };
         let mut interface = Self {
             contacts_per_block: parameters.contacts_per_block,
-            stride,
+            rows_per_block,
             break_on: parameters.break_on,
             disorder: Disorder::new(parameters),
-            life: vec![Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; slots],
-            anchor: vec![0.0; slots],
-            generation: vec![0; slots],
-            attached_stiffness: vec![0.0; slots],
-            upper: vec![f64::INFINITY; slots],
-            lower: vec![f64::NEG_INFINITY; slots],
+            rows: vec![detached; blocks * rows_per_block],
             reattachments: BinaryHeap::new(),
             block_stiffness: vec![0.0; blocks],
             block_pull: vec![0.0; blocks],
@@ -127,9 +136,10 @@ impl Interface {
         };
         for block in 0..blocks {
             for contact in 0..parameters.contacts_per_block {
-                interface.life[block * stride + contact] =
+                let (row, lane) = interface.place(block, contact);
+                interface.rows[row].life[lane] =
                     interface.disorder.draw(block * parameters.contacts_per_block + contact, 0);
-                interface.attach(block * stride + contact, 0.0);
+                interface.attach(block, contact, 0.0);
             }
             interface.gather(block);
         }
@@ -162,11 +172,10 @@ impl Interface {
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.block(), due.contact as usize);
-        let slot = block * self.stride + contact;
-        self.attach(slot, displacement);
+        let [upper, lower] = self.attach(block, contact, displacement);
         self.sum(block);
-        self.block_upper[block] = self.block_upper[block].min(self.upper[slot]);
-        self.block_lower[block] = self.block_lower[block].max(self.lower[slot]);
+        self.block_upper[block] = self.block_upper[block].min(upper);
+        self.block_lower[block] = self.block_lower[block].max(lower);
         self.event(block, contact, due.time(), displacement, Change::Attach)
     }
 
@@ -174,18 +183,20 @@ impl Interface {
     /// tells each to `log`.
     #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is looked at in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
-        let first = block * self.stride;
-        for start in (0..self.stride).step_by(LANES * LANES) {
-            let slots = first + start..first + self.stride.min(start + LANES * LANES);
-            // A bit for each contact.
+        // So many rows as have a bit for each contact.
+        for start in (0..self.rows_per_block).step_by(LANES) {
             let mut reached = 0_u64;
-            for (row, (upper, lower)) in lanes(&self.upper[slots.clone()]).zip(lanes(&self.lower[slots])).enumerate() {
+            for (row, Row { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
                 let in_row: [u8; LANES] =
                     array::from_fn(|lane| u8::from((upper[lane] <= displacement) | (lower[lane] >= displacement)));
                 reached |= (u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56) << (LANES * row);
             }
             while reached != 0 {
-                let contact = start + reached.trailing_zeros() as usize;
+                let contact = LANES * start + reached.trailing_zeros() as usize;
+                if contact >= self.contacts_per_block {
+                    // A displacement that is not finite reaches what no contact has.
+                    break;
+                }
                 log(self.event(block, contact, time, displacement, Change::Break));
                 self.detach(block, contact, time);
                 reached &= reached - 1;
@@ -196,8 +207,8 @@ impl Interface {
 
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
-        for positions in [&mut self.anchor, &mut self.upper, &mut self.lower] {
-            for position in positions {
+        for row in &mut self.rows {
+            for position in row.anchor.iter_mut().chain(&mut row.upper).chain(&mut row.lower) {
                 *position -= shift;
             }
         }
@@ -219,63 +230,77 @@ impl Interface {
     /// Elastic energy in the attached contacts for given displacements in m, in J.
     #[must_use]
     pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
-        (0..displacements.len() * self.stride)
-            .map(|slot| {
-                let elongation = displacements[slot / self.stride] - self.anchor[slot];
-                0.5 * self.attached_stiffness[slot] * elongation * elongation
+        let of_row = |displacement: f64, row: &Row| -> [f64; LANES] {
+            array::from_fn(|lane| {
+                let elongation = displacement - row.anchor[lane];
+                0.5 * row.attached_stiffness[lane] * elongation * elongation
             })
-            .sum()
+        };
+        let rows = self.rows.iter().enumerate();
+        rows.flat_map(|(i, row)| of_row(displacements[i / self.rows_per_block], row)).sum()
+    }
+
+    /// Row and lane of a contact.
+    fn place(&self, block: usize, contact: usize) -> (usize, usize) {
+        (block * self.rows_per_block + contact / LANES, contact % LANES)
+    }
+
+    fn rows_of(&self, block: usize) -> &[Row] {
+        &self.rows[block * self.rows_per_block..][..self.rows_per_block]
     }
 
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
-        let slot = block * self.stride + contact;
-        let Contact { threshold, stiffness, .. } = self.life[slot];
+        let (row, lane) = self.place(block, contact);
+        let Row { life, generation, anchor, .. } = &self.rows[row];
+        let Contact { threshold, stiffness, .. } = life[lane];
         ContactEvent {
             time,
             block,
             contact,
-            generation: self.generation[slot],
+            generation: generation[lane],
             change,
             displacement,
-            force: stiffness * (displacement - self.anchor[slot]),
+            force: stiffness * (displacement - anchor[lane]),
             threshold,
             stiffness,
         }
     }
 
-    fn attach(&mut self, slot: usize, displacement: f64) {
-        let Contact { stiffness, reach, .. } = self.life[slot];
-        self.attached_stiffness[slot] = stiffness;
-        self.anchor[slot] = displacement;
-        self.upper[slot] = displacement + reach;
-        self.lower[slot] = match self.break_on {
+    /// Begins a life of a contact; returns where it breaks, above and below.
+    fn attach(&mut self, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
+        let (row, lane) = self.place(block, contact);
+        let row = &mut self.rows[row];
+        let Contact { stiffness, reach, .. } = row.life[lane];
+        row.attached_stiffness[lane] = stiffness;
+        row.anchor[lane] = displacement;
+        row.upper[lane] = displacement + reach;
+        row.lower[lane] = match self.break_on {
             BreakOn::Magnitude => displacement - reach,
             BreakOn::Tension => f64::NEG_INFINITY,
         };
+        [row.upper[lane], row.lower[lane]]
     }
 
     /// Ends the life of a contact and draws the next.
     fn detach(&mut self, block: usize, contact: usize, time: f64) {
-        let slot = block * self.stride + contact;
-        let index = block * self.contacts_per_block + contact;
-        self.attached_stiffness[slot] = 0.0;
-        self.upper[slot] = f64::INFINITY;
-        self.lower[slot] = f64::NEG_INFINITY;
-        self.generation[slot] += 1;
-        self.life[slot] = self.disorder.draw(index, self.generation[slot]);
-        self.reattachments.push(Reverse(Due::new(time + self.life[slot].delay, block, contact)));
+        let (row, lane) = self.place(block, contact);
+        let row = &mut self.rows[row];
+        row.attached_stiffness[lane] = 0.0;
+        row.upper[lane] = f64::INFINITY;
+        row.lower[lane] = f64::NEG_INFINITY;
+        row.generation[lane] += 1;
+        row.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, row.generation[lane]);
+        self.reattachments.push(Reverse(Due::new(time + row.life[lane].delay, block, contact)));
     }
 
     /// Takes the sums and nearest break positions of a block anew.
     fn gather(&mut self, block: usize) {
         self.sum(block);
-        let first = block * self.stride;
-        let slots = first..first + self.stride;
         let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-        for (above, below) in lanes(&self.upper[slots.clone()]).zip(lanes(&self.lower[slots])) {
+        for row in self.rows_of(block) {
             for lane in 0..LANES {
-                upper[lane] = if above[lane] < upper[lane] { above[lane] } else { upper[lane] };
-                lower[lane] = if below[lane] > lower[lane] { below[lane] } else { lower[lane] };
+                upper[lane] = if row.upper[lane] < upper[lane] { row.upper[lane] } else { upper[lane] };
+                lower[lane] = if row.lower[lane] > lower[lane] { row.lower[lane] } else { lower[lane] };
             }
         }
         self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
@@ -284,13 +309,11 @@ impl Interface {
 
     /// Takes the sums of a block anew, in fixed lanes.
     fn sum(&mut self, block: usize) {
-        let first = block * self.stride;
-        let slots = first..first + self.stride;
         let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
-        for (attached, anchor) in lanes(&self.attached_stiffness[slots.clone()]).zip(lanes(&self.anchor[slots])) {
+        for row in self.rows_of(block) {
             for lane in 0..LANES {
-                stiffness[lane] += attached[lane];
-                pull[lane] += attached[lane] * anchor[lane];
+                stiffness[lane] += row.attached_stiffness[lane];
+                pull[lane] += row.attached_stiffness[lane] * row.anchor[lane];
             }
         }
         self.block_stiffness[block] = across(stiffness, |a, b| a + b);
@@ -298,15 +321,10 @@ impl Interface {
     }
 }
 
-/// Rows of a block's contacts.
-fn lanes(contacts: &[f64]) -> slice::Iter<'_, [f64; LANES]> {
-    contacts.as_chunks().0.iter()
-}
-
 /// Puts lanes together in pairs.
 #[inline(always)]
 fn across(l: [f64; LANES], together: impl Fn(f64, f64) -> f64) -> f64 {
-    let halves: [f64; LANES / 2] = std::array::from_fn(|i| together(l[i], l[i + LANES / 2]));
+    let halves: [f64; LANES / 2] = array::from_fn(|i| together(l[i], l[i + LANES / 2]));
     together(together(halves[0], halves[2]), together(halves[1], halves[3]))
 }
 
