@@ -70,7 +70,7 @@ impl Due {
 /// processor.
 const LANES: usize = 8;
 
-/// As a factor, moves the lowest bits of eight bytes, each 0 or 1, into the highest byte, in order.
+/// Times eight bytes that are 0 or 1 each: their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
 /// Eight contacts of a block, side by side in memory as they are looked at. Those beyond the last stay detached for ever.

@@ -1,9 +1,10 @@
 //! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
 
 use super::Run;
+use super::chain::Chain;
 use super::kernels::Kernels;
 use super::leap::{DriveNow, Driving};
-use super::taylor::{Chain, Series, State};
+use super::taylor::{Series, State};
 use crate::model::Interface;
 use crate::solver::ledger::{Audit, work};
 use crate::solver::segment::{ForceAt, ForcePath, Segment};

@@ -13,8 +13,8 @@
 //! functions vanish fast beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor
 //! steps need, and nothing is evaluated on the way. Contract: the terms left out are a given part of the motion.
 
+use super::chain::Chain;
 use super::lanes::{LANES, Layout, Row};
-use super::taylor::Chain;
 use super::vector::Vector;
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.

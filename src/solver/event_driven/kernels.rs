@@ -1,8 +1,9 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
+use super::chain::Chain;
 use super::glide::{Glide, advance};
 use super::leap::{DriveNow, Leap, split};
-use super::taylor::{Chain, Series, State, StepInput, evaluate, expand, reachable};
+use super::taylor::{Series, State, StepInput, evaluate, expand, reachable};
 use super::vector::Plain;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2, Avx512};
@@ -99,7 +100,7 @@ impl Kernels {
         paths
     }
 
-    /// Expands the state into a series; false if it does not converge within [`MOST_ORDER`].
+    /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
     #[inline]
     pub fn expand(self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
         // SAFETY: `available` yields only paths whose features this processor has.

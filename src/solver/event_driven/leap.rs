@@ -15,11 +15,12 @@
 //! overdamped, it is carried over in one go ([`super::glide`]). Contract: a leap leaves out at most `tolerance` · f_s/k of
 //! any block's displacement at its end, no event on its way, and no largest shear force.
 
+use super::chain::Chain;
 use super::crossing::Driven;
 use super::glide::Glide;
 use super::kernels::Kernels;
 use super::lanes::Layout;
-use super::taylor::{Chain, State};
+use super::taylor::State;
 use crate::solver::ledger::Audit;
 use crate::solver::segment::{ForcePath, Segment};
 use std::f64::consts::TAU;

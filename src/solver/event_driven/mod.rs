@@ -8,6 +8,7 @@
 //! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
 
 mod audit;
+mod chain;
 mod crossing;
 mod glide;
 mod kernels;
@@ -17,10 +18,11 @@ mod step;
 mod taylor;
 mod vector;
 
+use self::chain::Chain;
 use self::kernels::Kernels;
 use self::lanes::Layout;
 use self::leap::{Attempt, Bounds, DriveNow, Leap};
-use self::taylor::{Chain, Series, State};
+use self::taylor::{Series, State};
 use super::ledger::Audit;
 use super::segment::Segment;
 use super::{Limits, Observer, SimulationError, Summary};

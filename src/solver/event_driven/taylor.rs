@@ -5,10 +5,9 @@
 //! terms, times their order, fall under the wanted error. The sum of the terms' magnitudes bounds how far each block
 //! strays within the step.
 
+use super::chain::Chain;
 use super::lanes::{Layout, Row};
 use super::vector::Vector;
-use crate::model::slider::StiffnessMatrix;
-use crate::model::{Interface, Parameters};
 use crate::solver::polynomial::{INVERSE, MOST_COEFFICIENTS};
 
 /// Largest order of a step.
@@ -24,92 +23,6 @@ const INVERSE_FACTORIAL: [f64; MOST_COEFFICIENTS] = {
     }
     inverse
 };
-
-/// What the contacts make of each block, one entry a block.
-#[derive(Clone, Debug)]
-pub(super) struct InLine {
-    /// Diagonal of S/m, in 1/s².
-    pub diagonal: Vec<f64>,
-    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
-    pub pull: Vec<f64>,
-    /// Nearest break positions, in m.
-    pub upper: Vec<f64>,
-    pub lower: Vec<f64>,
-}
-
-/// The chain's coefficients in lanes, all divided by the block mass.
-#[derive(Clone, Debug)]
-pub(super) struct Chain {
-    pub layout: Layout,
-    /// Block mass m, in kg.
-    pub mass: f64,
-    /// Diagonal of S without contacts, in N/m.
-    bare: Vec<Row>,
-    /// K_int/m, in 1/s²; 0 in padding.
-    pub coupling: Vec<Row>,
-    /// Diagonal of S/m, in 1/s².
-    pub diagonal: Vec<Row>,
-    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
-    pub pull: Vec<Row>,
-    /// Nearest break positions, in m.
-    pub upper: Vec<Row>,
-    pub lower: Vec<Row>,
-    /// The same four for the eliminations of a leap, which go from block to block.
-    pub in_line: InLine,
-    /// Damping rate γ, in 1/s.
-    pub damping_rate: f64,
-}
-
-impl Chain {
-    /// The chain without contacts, driven at block 1.
-    pub fn new(parameters: &Parameters, layout: Layout) -> Self {
-        let mut chain = Self {
-            layout,
-            mass: parameters.block_mass(),
-            bare: layout.filled(0.0),
-            coupling: layout.filled(0.0),
-            diagonal: layout.filled(0.0),
-            pull: layout.filled(0.0),
-            upper: layout.filled(f64::INFINITY),
-            lower: layout.filled(f64::NEG_INFINITY),
-            in_line: InLine {
-                diagonal: vec![0.0; layout.blocks],
-                pull: vec![0.0; layout.blocks],
-                upper: vec![f64::INFINITY; layout.blocks],
-                lower: vec![f64::NEG_INFINITY; layout.blocks],
-            },
-            damping_rate: parameters.damping_rate,
-        };
-        let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
-        for (block, diagonal) in bare.diagonal.iter().enumerate() {
-            let (row, lane) = layout.slot(block);
-            chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
-            chain.bare[row][lane] = *diagonal;
-            let diagonal = diagonal / chain.mass;
-            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal, diagonal);
-        }
-        chain
-    }
-
-    /// Takes over what the contacts of a block have become.
-    pub fn update(&mut self, block: usize, interface: &Interface) {
-        let (row, lane) = self.layout.slot(block);
-        let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
-        let pull = interface.block_pull[block] / self.mass;
-        let (upper, lower) = (interface.block_upper[block], interface.block_lower[block]);
-        (self.diagonal[row][lane], self.in_line.diagonal[block]) = (diagonal, diagonal);
-        (self.pull[row][lane], self.in_line.pull[block]) = (pull, pull);
-        (self.upper[row][lane], self.in_line.upper[block]) = (upper, upper);
-        (self.lower[row][lane], self.in_line.lower[block]) = (lower, lower);
-    }
-
-    /// The entry of a block.
-    #[inline]
-    pub fn at(&self, rows: &[Row], block: usize) -> f64 {
-        let (row, lane) = self.layout.slot(block);
-        rows[row][lane]
-    }
-}
 
 /// The drive's displacement U over a step: h^p U^(p), order after order, in m.
 #[derive(Clone, Copy, Debug)]
@@ -257,7 +170,7 @@ pub(super) fn expand<V: Vector, const R: usize>(
     for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
         V::load(velocity).times(length).store(rate);
     }
-    let forcing = Forcing {
+    let recurrence = Recurrence {
         coupling,
         diagonal,
         pull: &chain.pull[..rows],
@@ -267,16 +180,16 @@ pub(super) fn expand<V: Vector, const R: usize>(
         drive: input.drive,
     };
     let order = if R > 0 && V::HAS_MANY_REGISTERS {
-        converge_in_registers::<V, R>(forcing, input, terms)
+        converge_in_registers::<V, R>(recurrence, input, terms)
     } else {
-        converge_in_memory(forcing, input, terms, rows)
+        converge_in_memory(recurrence, input, terms, rows)
     };
-    series.order = order.unwrap_or(MOST_ORDER);
+    series.order = order.unwrap_or(series.order);
     order.is_some()
 }
 
 /// What makes the next order of the last two.
-struct Forcing<'a, V> {
+struct Recurrence<'a, V> {
     /// h² times the coupling and minus the diagonal.
     coupling: &'a [Row],
     diagonal: &'a [Row],
@@ -289,10 +202,10 @@ struct Forcing<'a, V> {
     drive: DriveTerms,
 }
 
-impl<V: Vector> Forcing<'_, V> {
+impl<V: Vector> Recurrence<'_, V> {
     /// Adds pull and drive to Y_{p+2}; order after order.
     #[inline(always)]
-    fn add(&mut self, p: usize, next: &mut [Row]) {
+    fn add_forces(&mut self, p: usize, next: &mut [Row]) {
         if p == 0 {
             for (row, pull) in next.iter_mut().zip(self.pull) {
                 V::load(pull).fused(self.square, V::load(row)).store(row);
@@ -304,9 +217,10 @@ impl<V: Vector> Forcing<'_, V> {
         }
     }
 
-    /// Y_{p+2} of Y_p and Y_{p+1}, also written to `rows`.
+    /// Y_{p+2} of Y_p and Y_{p+1}, also written to `rows`. [`sweep`] and [`Self::add_forces`] in arrays: one form for rows in
+    /// memory and in registers is slower than either.
     #[inline(always)]
-    fn next_order<const R: usize>(&mut self, p: usize, y: [V; R], rate: [V; R], rows: &mut [Row; R]) -> [V; R] {
+    fn next_order<const R: usize>(&mut self, p: usize, y: [V; R], rate: [V; R], rows: &mut [Row]) -> [V; R] {
         let (coupling, diagonal) = (&self.coupling[..R], &self.diagonal[..R]);
         let mut next = y;
         for r in 0..R {
@@ -326,6 +240,7 @@ impl<V: Vector> Forcing<'_, V> {
         if push != 0.0 {
             next[0] = V::load(&FIRST_LANE).fused(V::splat(push), next[0]);
         }
+        let rows = &mut rows[..R];
         for r in 0..R {
             next[r].store(&mut rows[r]);
         }
@@ -336,15 +251,15 @@ impl<V: Vector> Forcing<'_, V> {
 /// Adds orders to Y_0 and Y_1 until the series converges; the last one, if it does.
 #[inline(always)]
 fn converge_in_memory<V: Vector>(
-    mut forcing: Forcing<'_, V>,
+    mut recurrence: Recurrence<'_, V>,
     input: &StepInput,
     terms: &mut [Row],
     rows: usize,
 ) -> Option<usize> {
     for p in 0..MOST_ORDER - 1 {
         let terms = &mut terms[p * rows..(p + 3) * rows];
-        sweep::<V>(forcing.coupling, forcing.diagonal, forcing.damping, terms, rows);
-        forcing.add(p, &mut terms[2 * rows..]);
+        sweep::<V>(recurrence.coupling, recurrence.diagonal, recurrence.damping, terms, rows);
+        recurrence.add_forces(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
         if p % 2 == 1 && order >= input.least_order && are_small::<V>(&terms[rows..], rows, order, input.error) {
@@ -357,7 +272,7 @@ fn converge_in_memory<V: Vector>(
 /// The same with the last two orders in registers, where no sum waits for the memory.
 #[inline(always)]
 fn converge_in_registers<V: Vector, const R: usize>(
-    mut forcing: Forcing<'_, V>,
+    mut recurrence: Recurrence<'_, V>,
     input: &StepInput,
     terms: &mut [Row],
 ) -> Option<usize> {
@@ -368,8 +283,8 @@ fn converge_in_registers<V: Vector, const R: usize>(
     for (pair, rows) in terms[2 * R..].chunks_exact_mut(2 * R).enumerate() {
         let p = 2 * pair;
         let (lower, higher) = rows.split_at_mut(R);
-        even = forcing.next_order(p, even, odd, lower.first_chunk_mut()?);
-        odd = forcing.next_order(p + 1, odd, even, higher.first_chunk_mut()?);
+        even = recurrence.next_order(p, even, odd, lower);
+        odd = recurrence.next_order(p + 1, odd, even, higher);
         let order = p + 3;
         if order >= input.least_order && are_small::<V>(rows, R, order, input.error) {
             return Some(order);

@@ -1,0 +1,91 @@
+//! The chain of blocks as the solver sees it: its coefficients in lanes, kept up with what the contacts become.
+
+use super::lanes::{Layout, Row};
+use crate::model::slider::StiffnessMatrix;
+use crate::model::{Interface, Parameters};
+
+/// What the contacts make of each block, one entry a block.
+#[derive(Clone, Debug)]
+pub(super) struct InLine {
+    /// Diagonal of S/m, in 1/s².
+    pub diagonal: Vec<f64>,
+    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
+    pub pull: Vec<f64>,
+    /// Nearest break positions, in m.
+    pub upper: Vec<f64>,
+    pub lower: Vec<f64>,
+}
+
+/// The chain's coefficients in lanes, all divided by the block mass.
+#[derive(Clone, Debug)]
+pub(super) struct Chain {
+    pub layout: Layout,
+    /// Block mass m, in kg.
+    pub mass: f64,
+    /// Diagonal of S without contacts, in N/m.
+    bare: Vec<Row>,
+    /// K_int/m, in 1/s²; 0 in padding.
+    pub coupling: Vec<Row>,
+    /// Diagonal of S/m, in 1/s².
+    pub diagonal: Vec<Row>,
+    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
+    pub pull: Vec<Row>,
+    /// Nearest break positions, in m.
+    pub upper: Vec<Row>,
+    pub lower: Vec<Row>,
+    /// The same four for the eliminations of a leap, which go from block to block.
+    pub in_line: InLine,
+    /// Damping rate γ, in 1/s.
+    pub damping_rate: f64,
+}
+
+impl Chain {
+    /// The chain without contacts, driven at block 1.
+    pub fn new(parameters: &Parameters, layout: Layout) -> Self {
+        let mut chain = Self {
+            layout,
+            mass: parameters.block_mass(),
+            bare: layout.filled(0.0),
+            coupling: layout.filled(0.0),
+            diagonal: layout.filled(0.0),
+            pull: layout.filled(0.0),
+            upper: layout.filled(f64::INFINITY),
+            lower: layout.filled(f64::NEG_INFINITY),
+            in_line: InLine {
+                diagonal: vec![0.0; layout.blocks],
+                pull: vec![0.0; layout.blocks],
+                upper: vec![f64::INFINITY; layout.blocks],
+                lower: vec![f64::NEG_INFINITY; layout.blocks],
+            },
+            damping_rate: parameters.damping_rate,
+        };
+        let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
+        for (block, diagonal) in bare.diagonal.iter().enumerate() {
+            let (row, lane) = layout.slot(block);
+            chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
+            chain.bare[row][lane] = *diagonal;
+            let diagonal = diagonal / chain.mass;
+            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal, diagonal);
+        }
+        chain
+    }
+
+    /// Takes over what the contacts of a block have become.
+    pub fn update(&mut self, block: usize, interface: &Interface) {
+        let (row, lane) = self.layout.slot(block);
+        let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
+        let pull = interface.block_pull[block] / self.mass;
+        let (upper, lower) = (interface.block_upper[block], interface.block_lower[block]);
+        (self.diagonal[row][lane], self.in_line.diagonal[block]) = (diagonal, diagonal);
+        (self.pull[row][lane], self.in_line.pull[block]) = (pull, pull);
+        (self.upper[row][lane], self.in_line.upper[block]) = (upper, upper);
+        (self.lower[row][lane], self.in_line.lower[block]) = (lower, lower);
+    }
+
+    /// The entry of a block.
+    #[inline]
+    pub fn at(&self, rows: &[Row], block: usize) -> f64 {
+        let (row, lane) = self.layout.slot(block);
+        rows[row][lane]
+    }
+}
