@@ -295,7 +295,7 @@ impl Directory {
     }
 
     fn compare(storage: &dyn Storage, layout: &Layout, sweep: &Sweep) -> Result<Opened, DirectoryError> {
-        // In this order: another run may write the manifest in between.
+        // In this order: another run may write the manifest in between, and none removes it.
         let is_fresh = is_fresh(storage, layout)?;
         let Some((mut manifest, mut sweeps)) = read_manifest(storage, layout)? else {
             return if is_fresh {

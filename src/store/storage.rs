@@ -1,5 +1,8 @@
 //! Storage: the few file operations that results go through, so that a faulty disk can be put underneath.
 
+#[cfg(test)]
+pub(crate) mod over_disk;
+
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};

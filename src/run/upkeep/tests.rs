@@ -4,12 +4,12 @@ use super::*;
 use crate::run::{Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
 use crate::store::dataset::Reader;
-use crate::store::storage::{Disk, Lock, StoredFile};
+use crate::store::storage::over_disk::{Access, OverDisk};
+use crate::store::storage::{Disk, StoredFile};
 use crate::store::tables::{JobRecord, JobResult};
 use crate::sweep::{Job, Sweep};
 use std::collections::BTreeMap;
-use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -24,10 +24,6 @@ struct Dying {
 impl Dying {
     fn after(changes: u64) -> Self {
         Self { changes_left: Arc::new(AtomicU64::new(changes)), exchanges: true }
-    }
-
-    fn change(&self) -> io::Result<()> {
-        change(&self.changes_left)
     }
 }
 
@@ -55,43 +51,15 @@ impl StoredFile for DyingFile {
     }
 }
 
-impl Storage for Dying {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.create_folder(folder))
+impl OverDisk for Dying {
+    fn before(&self, access: Access) -> io::Result<()> {
+        if access == Access::Change { change(&self.changes_left) } else { Ok(()) }
     }
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        self.change()?;
+    fn create_file(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
         Ok(Box::new(DyingFile(Disk.create(file)?, Arc::clone(&self.changes_left))))
     }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.rename(from, to))
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.sync_folder(folder))
-    }
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
-        Disk.list(folder)
-    }
-    fn open(&self, file: &Path) -> io::Result<File> {
-        Disk.open(file)
-    }
-    fn exists(&self, file: &Path) -> io::Result<bool> {
-        Disk.exists(file)
-    }
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.remove(file))
-    }
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
-        self.change().and_then(|()| Disk.remove_folder(folder))
-    }
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
-        if !self.exchanges {
-            return Err(ErrorKind::Unsupported.into());
-        }
-        self.change().and_then(|()| Disk.exchange(one, other))
-    }
-    fn lock(&self, file: &Path) -> io::Result<Lock> {
-        Disk.lock(file)
+    fn exchange_folders(&self, one: &Path, other: &Path) -> io::Result<()> {
+        if self.exchanges { Disk.exchange(one, other) } else { Err(ErrorKind::Unsupported.into()) }
     }
 }
 

@@ -1,77 +1,34 @@
 //! Directories that are begun, changed, damaged, somebody else's, or begun by two runs at once.
 
 use super::*;
-use crate::store::storage::{Disk, StoredFile};
+use crate::store::storage::Disk;
+use crate::store::storage::over_disk::{Access, OverDisk};
 use std::collections::BTreeSet;
-use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A disk on which another run does something just before the n-th operation of this one, unless this one has the lock.
 struct Shared<F> {
     /// What the other run does, until it is done.
     other: Mutex<Option<F>>,
-    operations_left: Mutex<usize>,
+    operations_left: AtomicUsize,
 }
 
-impl<F: FnOnce() + Send> Shared<F> {
-    fn new(n: usize, other: F) -> Self {
-        Self { other: Mutex::new(Some(other)), operations_left: Mutex::new(n) }
-    }
-
-    fn is_done(&self) -> bool {
-        self.other.lock().unwrap().is_none()
-    }
-
-    fn operate(&self) -> Disk {
-        let mut left = self.operations_left.lock().unwrap();
-        if *left == 0
+impl<F: FnOnce() + Send> OverDisk for Shared<F> {
+    fn before(&self, _: Access) -> io::Result<()> {
+        if self.operations_left.fetch_sub(1, Ordering::Relaxed) == 0
             && let Some(other) = self.other.lock().unwrap().take()
         {
             other();
         }
-        *left = left.wrapping_sub(1);
-        Disk
+        Ok(())
     }
-}
-
-impl<F: FnOnce() + Send> Storage for Shared<F> {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        self.operate().create_folder(folder)
-    }
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        self.operate().create(file)
-    }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.operate().rename(from, to)
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.operate().sync_folder(folder)
-    }
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
-        self.operate().list(folder)
-    }
-    fn open(&self, file: &Path) -> io::Result<File> {
-        self.operate().open(file)
-    }
-    fn exists(&self, file: &Path) -> io::Result<bool> {
-        self.operate().exists(file)
-    }
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        self.operate().remove(file)
-    }
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
-        self.operate().remove_folder(folder)
-    }
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
-        self.operate().exchange(one, other)
-    }
-    fn lock(&self, file: &Path) -> io::Result<Lock> {
-        let lock = self.operate().lock(file);
+    fn try_lock(&self, file: &Path) -> io::Result<Lock> {
         // From here on the other would wait.
-        *self.operations_left.lock().unwrap() = usize::MAX;
-        lock
+        self.operations_left.store(usize::MAX, Ordering::Relaxed);
+        Disk.lock(file)
     }
 }
 
@@ -160,9 +117,10 @@ fn two_runs_may_begin_a_directory_at_once_whichever_is_first() {
     loop {
         let root = tempfile::tempdir().unwrap();
         let open = |storage: &dyn Storage| Directory::open(storage, root.path(), &sweep(TWO_SEEDS)).map(drop);
-        let shared = Shared::new(n, || open(&Disk).unwrap());
+        let other = Mutex::new(Some(|| open(&Disk).unwrap()));
+        let shared = Shared { other, operations_left: AtomicUsize::new(n) };
         open(&shared).unwrap_or_else(|error| panic!("before operation {n}: {error}"));
-        if !shared.is_done() {
+        if shared.other.lock().unwrap().is_some() {
             break;
         }
         n += 1;
