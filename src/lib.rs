@@ -24,6 +24,8 @@
 //! | set | all jobs that differ in the seed alone |
 
 pub mod accuracy;
+#[cfg(test)]
+mod documented;
 pub mod figure;
 pub mod model;
 pub mod observe;

@@ -168,9 +168,9 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
         ("simulate --set break_on=force", &["break_on = \"force\"", "\"tension\""]),
         // Its length and its solver.
         ("simulate --slips 0", &["slips = 0", "must be a whole number from 1"]),
-        ("simulate --slips -3", &["--slips", "must be a whole number >= 0"]),
-        ("simulate --slips few", &["--slips", "must be a whole number >= 0"]),
-        ("simulate --discard -1", &["--discard", "must be a whole number >= 0"]),
+        ("simulate --slips -3", &["slips = -3", "must be a whole number from 1"]),
+        ("simulate --slips few", &["--slips", "must be a number"]),
+        ("simulate --discard -1", &["discard = -1", "must be a whole number from 0"]),
         ("simulate --time nan", &["max_time = nan", "must be a finite number > 0, in s"]),
         ("simulate --time -1", &["max_time = -1", "must be a finite number > 0, in s"]),
         ("simulate --time soon", &["--time", "must be a number"]),

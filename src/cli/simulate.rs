@@ -9,14 +9,16 @@ use self::outputs::{Records, check_outputs, write_pictures, write_records, write
 use super::exit::{Exit, UsageError};
 use super::output;
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::{Arg, ArgGroup, ArgMatches, Args, FromArgMatches, ValueEnum};
 use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-use stickslip::model::{Parameters, Symbol, Value};
-use stickslip::observe::{AttachedMap, ContactLog, Profile, SlipObserver, Together, Trace};
+use stickslip::model::{Description, Parameters, Symbol, Value};
+use stickslip::observe::{AttachedMap, ContactLog, Profile, Recording, RecordingKey, SlipObserver, Together, Trace};
 use stickslip::run::{limits, measured};
 use stickslip::solver::{self, Observer};
 use stickslip::store::dataset::Footer;
@@ -26,48 +28,24 @@ use stickslip::sweep::{Job, Sweep, SweepError};
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  stickslip simulate --slips 20
-  stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
-  stickslip simulate --set dfs=0 --slips 1 --contacts contacts.parquet
-  stickslip simulate sweeps/fig1d.toml --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
-
-Every key of the model can be set: N Ns M K Kd k fs dfs tau_r gamma V0 Delta T T_to Delta_to ramp_time FN L
-break_on seed, in SI units; and eta or frequency (Hz) in place of T.")]
+#[command(after_help = after_help(), group(ArgGroup::new(JOB).multiple(true)))]
 pub struct Arguments {
     /// Sweep file with exactly one job, in the place of the flags that name one
-    #[arg(value_name = "SWEEP.toml", conflicts_with_all = JOB_FLAGS)]
+    #[arg(value_name = "SWEEP.toml", conflicts_with = JOB)]
     sweep: Option<PathBuf>,
     /// Set a parameter of the model; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", group = JOB)]
     settings: Vec<String>,
-    /// Record so many slips past start-up [default: 20, unless --time is given]
-    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
-    slips: Option<u64>,
-    /// End at this model time, in s
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
-    time: Option<String>,
-    /// Slips discarded as start-up
-    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N", default_value_t = 5)]
-    discard: u64,
-    /// Fail after so many contact events
-    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
-    max_events: Option<u64>,
-    /// Least breaks of a precursor [default: Ns]
-    #[arg(long, value_parser = count, allow_negative_numbers = true, value_name = "N")]
-    precursor_size: Option<u64>,
-    /// Look for drops of the shear force of at least so many newtons
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "NEWTONS")]
-    drop_size: Option<String>,
+    #[command(flatten)]
+    recording: RecordingFlags,
     /// Method
-    #[arg(long, value_enum, default_value_t = Method::EventDriven)]
+    #[arg(long, value_enum, default_value_t = Method::EventDriven, group = JOB)]
     solver: Method,
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "X")]
+    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
     /// Write shear force, displacement and attached fraction over time, as Parquet
     #[arg(long, value_name = "FILE")]
@@ -111,9 +89,69 @@ impl Arguments {
     }
 }
 
-/// Flags of the job; a sweep file tells them all.
-const JOB_FLAGS: [&str; 10] =
-    ["settings", "slips", "time", "discard", "max_events", "precursor_size", "drop_size", "solver", "tolerance", "dt"];
+/// The group of the flags of a job; a sweep file takes their place.
+const JOB: &str = "job";
+
+fn after_help() -> String {
+    let keys: Vec<String> = Symbol::ALL
+        .chunks(17)
+        .map(|keys| keys.iter().map(|symbol| symbol.key()).collect::<Vec<_>>().join(" "))
+        .collect();
+    format!(
+        "\
+Examples:
+  stickslip simulate --slips 20
+  stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
+  stickslip simulate --set dfs=0 --slips 1 --contacts contacts.parquet
+  stickslip simulate sweeps/fig1d.toml --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
+
+Every key of the model can be set, in SI units; and eta or frequency (Hz) in place of T:
+{}",
+        keys.join("\n")
+    )
+}
+
+/// What a job records, as given by flags: one flag for each key of `[record]` that has one.
+#[derive(Debug)]
+struct RecordingFlags(BTreeMap<RecordingKey, String>);
+
+impl Args for RecordingFlags {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        let flag = |key: RecordingKey| {
+            let Description { key: id, unit, meaning, .. } = key.description();
+            let default = match (key, Recording::default().get(key)) {
+                (RecordingKey::Slips, _) => " [default: 20, unless --time is given]".to_owned(),
+                (_, Value::Absent) => String::new(),
+                (_, default) => format!(" [default: {default}]"),
+            };
+            let value_name = match unit {
+                "s" => "SECONDS",
+                "N" => "NEWTONS",
+                _ => "N",
+            };
+            let flag = Arg::new(id).long(key.flag()?).value_name(value_name).help(format!("{meaning}{default}"));
+            Some(flag.value_parser(number).allow_negative_numbers(true).group(JOB))
+        };
+        command.args(RecordingKey::ALL.into_iter().filter_map(flag))
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for RecordingFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        // A key without a flag is no argument of the command.
+        let given = |key: RecordingKey| Some((key, matches.try_get_one::<String>(key.key()).ok()??.clone()));
+        Ok(Self(RecordingKey::ALL.into_iter().filter_map(given).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Panel {
@@ -145,10 +183,6 @@ struct Report {
     steps: u64,
     leaps: u64,
     wall_seconds: f64,
-}
-
-fn count(text: &str) -> Result<u64, &'static str> {
-    text.parse().map_err(|_| "must be a whole number >= 0")
 }
 
 fn real(text: &str) -> Result<f64, &'static str> {
@@ -253,20 +287,23 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
             return Err(UsageError(format!("--set {key}: no such key; there are {known}, eta, frequency")).into());
         }
     }
-    // With a time alone, slips do not end the run.
-    let slips = arguments.slips.unwrap_or(if arguments.time.is_some() { 1_000_000_000 } else { 20 });
-    let optional =
-        |key: &str, value: Option<String>| value.map_or_else(String::new, |value| format!("{key} = {value}\n"));
-    let limits = [
-        optional("max_time", arguments.time.clone()),
-        optional("max_events", arguments.max_events.map(|events| events.to_string())),
-        optional("precursor_size", arguments.precursor_size.map(|size| size.to_string())),
-        optional("drop_size", arguments.drop_size.clone()),
-    ]
-    .concat();
+    let mut record = String::new();
+    for key in RecordingKey::ALL {
+        let given = |key| arguments.recording.0.get(&key).map(String::as_str);
+        let text = match (key, given(key)) {
+            (_, Some(text)) => text,
+            // With a time alone, slips do not end the run.
+            (RecordingKey::Slips, None) if given(RecordingKey::MaxTime).is_some() => "1000000000",
+            (RecordingKey::Slips, None) => "20",
+            (RecordingKey::Discard, None) => "5",
+            _ => continue,
+        };
+        writeln!(record, "{} = {text}", key.key())?;
+    }
+    let tolerance = arguments.tolerance.iter().map(|tolerance| format!("tolerance = {tolerance}\n"));
     let solver = match (arguments.solver, &arguments.tolerance, &arguments.dt) {
-        (Method::EventDriven, tolerance, None) => {
-            format!("method = \"event-driven\"\n{}", optional("tolerance", tolerance.clone()))
+        (Method::EventDriven, _, None) => {
+            format!("method = \"event-driven\"\n{}", tolerance.collect::<String>())
         }
         (Method::FixedStep, None, Some(dt)) => format!("method = \"fixed-step\"\ndt = {dt}\n"),
         (Method::FixedStep, None, None) => "method = \"fixed-step\"\ndt = 1e-6\n".to_owned(),
@@ -277,13 +314,10 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
             return Err(UsageError("--tolerance: goes with --solver event-driven; use --dt".to_owned()).into());
         }
     };
-    Ok(format!(
-        "name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\nslips = {slips}\ndiscard = {}\n{limits}[solver]\n{solver}",
-        arguments.discard
-    ))
+    Ok(format!("name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\n{record}[solver]\n{solver}"))
 }
 
-/// A message about the sweep text, told of the flags.
+/// A message about the sweep text, as one about the flags.
 fn as_flags(error: SweepError) -> anyhow::Error {
     match error {
         SweepError::Invalid { problem, .. } => UsageError(format!("in the flags: {problem}")).into(),
@@ -293,15 +327,7 @@ fn as_flags(error: SweepError) -> anyhow::Error {
 
 /// The parameters as JSON, under their keys.
 fn as_json(parameters: &Parameters) -> String {
-    let entries = Symbol::ALL.into_iter().map(|symbol| {
-        let value = match parameters.get(symbol) {
-            Value::Count(count) => count.into(),
-            Value::Real(real) => real.into(),
-            Value::BreakOn(rule) => rule.word().into(),
-            Value::Absent => serde_json::Value::Null,
-        };
-        (symbol.key().to_owned(), value)
-    });
+    let entries = Symbol::ALL.into_iter().map(|symbol| (symbol.key().to_owned(), json!(parameters.get(symbol))));
     serde_json::Value::Object(entries.collect()).to_string()
 }
 

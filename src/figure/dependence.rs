@@ -102,7 +102,7 @@ fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
         (_, Value::Real(real)) => Some(real),
         (_, Value::Count(count)) => Some(count as f64),
         (_, Value::BreakOn(rule)) => Some(if rule == BreakOn::Magnitude { 0.0 } else { 1.0 }),
-        (_, Value::Absent) => None,
+        (_, Value::Flag(_) | Value::Absent) => None,
     }
 }
 

@@ -2,16 +2,20 @@
 
 mod disorder;
 mod drive;
+pub(crate) mod fields;
 mod interface;
 mod parameters;
 pub mod slider;
 pub mod theory;
+pub(crate) mod value;
 
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
+pub use fields::Description;
 pub use interface::{Change, ContactEvent, Interface};
-pub(crate) use parameters::Shortest;
-pub use parameters::{BreakOn, Description, ParameterError, Parameters, Symbol, Value};
+pub use parameters::{ParameterError, Parameters, Symbol};
+pub(crate) use value::Shortest;
+pub use value::{BreakOn, Value};
 
 /// Version of the equations and definitions; part of every job id. Raised when the same parameters give other results.
 pub const MODEL_VERSION: u32 = 2;

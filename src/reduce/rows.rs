@@ -112,7 +112,7 @@ impl<'a> ParameterColumns<'a> {
             let column = match Parameters::default().get(symbol) {
                 Value::Real(_) | Value::Absent => ParameterColumn::Real(batch.reals(symbol.key())?),
                 Value::Count(_) => ParameterColumn::Count(batch.counts(symbol.key())?),
-                Value::BreakOn(_) => ParameterColumn::Word(batch.texts(symbol.key())?),
+                Value::BreakOn(_) | Value::Flag(_) => ParameterColumn::Word(batch.texts(symbol.key())?),
             };
             Ok((symbol, column))
         };

@@ -55,6 +55,7 @@ impl<Row> Getter<Row> {
                 Value::Real(real) => real.into(),
                 Value::Count(count) => count.into(),
                 Value::BreakOn(rule) => rule.word().into(),
+                Value::Flag(flag) => flag.into(),
                 Value::Absent => Json::Null,
             },
         }
@@ -100,7 +101,7 @@ impl<Row> Column<Row> {
             Getter::Parameter(symbol, _) => match Parameters::default().get(symbol) {
                 Value::Count(_) => (DataType::Int64, false),
                 Value::Real(_) => (DataType::Float64, false),
-                Value::BreakOn(_) => (DataType::Utf8, false),
+                Value::BreakOn(_) | Value::Flag(_) => (DataType::Utf8, false),
                 Value::Absent => (DataType::Float64, true),
             },
         };
@@ -270,7 +271,7 @@ impl Cells {
                 Value::Real(real) => self.push_real(Some(real)),
                 Value::Absent => self.push_real(None),
                 Value::Count(count) => self.push_count(Some(count)),
-                Value::BreakOn(rule) => self.push_text(Some(rule.word().to_owned())),
+                value => self.push_text(Some(value.to_string())),
             },
         }
     }

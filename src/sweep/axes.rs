@@ -2,19 +2,17 @@
 //!
 //! A grid axis has one column, a zip or a sample several. The points of a sweep are all combinations of one row of each
 //! axis. Contract: no two rows of an axis are equal, and rows that differ in η or the frequency alone differ by more
-//! than [`LEAST_GAP`], so that two points lead to the same parameters only where both are without modulation and differ
+//! than [`MIN_GAP`], so that two points lead to the same parameters only where both are without modulation and differ
 //! in nothing but what fixes the period. Of such points the first counts: the row that [`Axis::is_first`].
 
-use super::quantity::{Point, Quantity, period_quantity};
-use crate::model::{BreakOn, Parameters, Symbol, Value};
+use super::quantity::{Point, Quantity};
+use crate::model::{Parameters, Symbol, Value};
 use std::cmp::Ordering;
 
 /// Most rows of an axis whose rows are held in memory.
-pub(super) const MOST_ROWS: u64 = 1_000_000;
+pub(super) const MAX_ROWS: u64 = 1_000_000;
 /// Least relative distance of two values of η or of the frequency: a thousand roundings, so that the periods differ.
-const LEAST_GAP: f64 = 1e-12;
-/// Relative error of a value of η or of the frequency that is computed back from the period: some ten roundings.
-const LOOK_UP_TOLERANCE: f64 = 1e-14;
+const MIN_GAP: f64 = 1e-12;
 
 /// A column of an axis. Values are checked and canonical.
 #[derive(Clone, Debug)]
@@ -36,12 +34,12 @@ pub(super) enum Axis {
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     columns: Vec<Column>,
-    /// The column that fixes the period.
-    period: Option<usize>,
-    /// Rows ordered by the bits of the other columns, then by the period's.
+    /// The columns in the order in which rows are compared: the one that fixes the period comes last.
+    compared: Vec<usize>,
+    /// Rows in the order of the parameters that they lead to.
     sorted: Vec<u32>,
-    /// For each row the first that differs in the period's column alone; empty without such a column.
-    first: Vec<u32>,
+    /// For each row, whether no earlier one equals it in all but what fixes the period.
+    is_first: Vec<bool>,
 }
 
 /// Two rows of an axis that are the same, or too close to lead to different periods. Counted from 0.
@@ -52,7 +50,7 @@ pub(super) struct Repeated {
 }
 
 impl Axis {
-    /// An axis of columns of equal length, 1 to [`MOST_ROWS`].
+    /// An axis of columns of equal length, 1 to [`MAX_ROWS`].
     pub fn table(columns: Vec<Column>) -> Result<Self, Repeated> {
         Table::new(columns).map(Self::Table)
     }
@@ -75,9 +73,7 @@ impl Axis {
     /// Moves a point to a row.
     pub fn apply(&self, row: u64, point: &mut Point) {
         match self {
-            Self::Counted { symbol, first, .. } => {
-                point.set(Quantity::Parameter(*symbol), Value::Count(first + row));
-            }
+            Self::Counted { symbol, first, .. } => point.set(Quantity::Parameter(*symbol), Value::Count(first + row)),
             Self::Table(table) => {
                 for column in &table.columns {
                     point.set(column.quantity, column.values[index(row)]);
@@ -89,32 +85,21 @@ impl Axis {
     /// Whether no earlier row equals this one in all but the column that fixes the period.
     pub fn is_first(&self, row: u64) -> bool {
         match self {
-            Self::Table(table) if table.period.is_some() => u64::from(table.first[index(row)]) == row,
-            _ => true,
+            Self::Counted { .. } => true,
+            Self::Table(table) => table.is_first[index(row)],
         }
     }
 
-    /// The only row that can lead to these parameters.
+    /// The only row that can lead to these parameters; without modulation one of those that differ in the period alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
             Self::Counted { symbol, first, count } => match wanted.get(*symbol) {
                 Value::Count(value) => value.checked_sub(*first).filter(|row| row < count),
                 _ => None,
             },
-            Self::Table(table) => table.find(wanted).map(u64::from),
-        }
-    }
-
-    /// The values of a quantity on this axis, as numbers; empty if it is not there or a word.
-    pub fn numbers(&self, quantity: Quantity) -> Vec<f64> {
-        match self {
-            Self::Counted { symbol, first, count } if Quantity::Parameter(*symbol) == quantity => {
-                vec![*first as f64, (first + count - 1) as f64]
-            }
-            Self::Counted { .. } => Vec::new(),
             Self::Table(table) => {
-                let column = table.columns.iter().find(|column| column.quantity == quantity);
-                column.map_or_else(Vec::new, |column| column.values.iter().filter_map(number).collect())
+                let found = table.sorted.binary_search_by(|&row| table.compare(row as usize, wanted)).ok()?;
+                Some(u64::from(table.sorted[found]))
             }
         }
     }
@@ -123,116 +108,75 @@ impl Axis {
 impl Table {
     fn new(columns: Vec<Column>) -> Result<Self, Repeated> {
         let rows = columns[0].values.len();
-        let period = columns.iter().position(|column| column.quantity.is_period());
-        let mut table = Self { columns, period, sorted: Vec::new(), first: Vec::new() };
-        let mut sorted: Vec<u32> = (0..).take(rows).collect();
-        sorted.sort_unstable_by(|&a, &b| {
-            let period = |row| table.period_value(row).unwrap_or(0.0);
-            table.compare_others(a, b).then(period(a).total_cmp(&period(b))).then(a.cmp(&b))
+        let mut compared: Vec<usize> = (0..columns.len()).collect();
+        compared.sort_by_key(|&column| columns[column].quantity.is_period());
+        let period = columns.iter().find(|column| column.quantity.is_period());
+        let rank = |row: u32| compared.iter().map(|&column| columns[column].rank(row as usize)).collect::<Vec<_>>();
+        let mut ranked: Vec<(Vec<u64>, u32)> = (0..).take(rows).map(|row| (rank(row), row)).collect();
+        ranked.sort_unstable();
+        let equal_but_for_period = |(left, _): &(Vec<u64>, u32), (right, _): &(Vec<u64>, u32)| {
+            let others = compared.len() - usize::from(period.is_some());
+            left[..others] == right[..others]
+        };
+        let repeated = ranked.windows(2).filter(|pair| {
+            equal_but_for_period(&pair[0], &pair[1])
+                && period.is_none_or(|period| period.is_close(pair[0].1 as usize, pair[1].1 as usize))
         });
-        let repeated = sorted.windows(2).filter(|pair| table.coincide(pair[0], pair[1]));
-        let repeated = repeated.map(|pair| (pair[0].max(pair[1]), pair[0].min(pair[1])));
+        let repeated = repeated.map(|pair| (pair[0].1.max(pair[1].1), pair[0].1.min(pair[1].1)));
         if let Some((later, earlier)) = repeated.min() {
             return Err(Repeated { earlier: earlier as usize, later: later as usize });
         }
-        if period.is_some() {
-            let mut first = vec![0; rows];
-            for group in sorted.chunk_by(|&a, &b| table.compare_others(a, b).is_eq()) {
-                let least = group.iter().copied().min().unwrap_or_default();
-                for &row in group {
-                    first[row as usize] = least;
-                }
-            }
-            table.first = first;
+        let mut is_first = vec![false; rows];
+        for group in ranked.chunk_by(equal_but_for_period) {
+            let first = group.iter().map(|&(_, row)| row).min();
+            is_first[first.unwrap_or_default() as usize] = true;
         }
-        table.sorted = sorted;
-        Ok(table)
+        let sorted = ranked.into_iter().map(|(_, row)| row).collect();
+        Ok(Self { columns, compared, sorted, is_first })
     }
 
-    /// The columns that do not fix the period.
-    fn others(&self) -> impl Iterator<Item = &Column> {
-        self.columns.iter().filter(|column| !column.quantity.is_period())
+    /// Where a row stands in the order of rows, against one that leads to these parameters.
+    fn compare(&self, row: usize, wanted: &Parameters) -> Ordering {
+        let mut orders = self.compared.iter().map(|&column| self.columns[column].compare(row, wanted));
+        orders.find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    }
+}
+
+impl Column {
+    /// Orders the rows as [`Column::compare`] does: a larger η or frequency is a shorter period.
+    fn rank(&self, row: usize) -> u64 {
+        let (_, bits) = self.values[row].bits();
+        if self.is_inverse_period() { !bits } else { bits }
     }
 
-    fn compare_others(&self, a: u32, b: u32) -> Ordering {
-        self.others()
-            .map(|column| bits(column.values[a as usize]).cmp(&bits(column.values[b as usize])))
-            .find(|ordering| ordering.is_ne())
-            .unwrap_or(Ordering::Equal)
-    }
-
-    fn compare_others_to(&self, row: u32, wanted: &Parameters) -> Ordering {
-        self.others()
-            .map(|column| match column.quantity {
-                Quantity::Parameter(symbol) => bits(column.values[row as usize]).cmp(&bits(wanted.get(symbol))),
-                Quantity::Eta | Quantity::Frequency => Ordering::Equal,
-            })
-            .find(|ordering| ordering.is_ne())
-            .unwrap_or(Ordering::Equal)
-    }
-
-    fn period_value(&self, row: u32) -> Option<f64> {
-        self.period.and_then(|column| number(&self.columns[column].values[row as usize]))
-    }
-
-    /// Whether two neighbours in order are too close.
-    fn coincide(&self, a: u32, b: u32) -> bool {
-        if self.compare_others(a, b).is_ne() {
-            return false;
-        }
-        match (self.period_value(a), self.period_value(b)) {
-            (Some(low), Some(high)) => {
-                let gap = if self.period_is_derived() { LEAST_GAP } else { 0.0 };
-                high <= low * (1.0 + gap)
-            }
-            _ => true,
+    /// Compares what a row leads to with these parameters; without modulation every period will do.
+    fn compare(&self, row: usize, wanted: &Parameters) -> Ordering {
+        let value = self.values[row];
+        match self.quantity {
+            Quantity::Parameter(symbol) if symbol != Symbol::T => value.bits().cmp(&wanted.get(symbol).bits()),
+            quantity => match (value.number(), wanted.modulation_period) {
+                (Some(number), Some(period)) => quantity.period(number, wanted).total_cmp(&period),
+                _ => Ordering::Equal,
+            },
         }
     }
 
-    fn period_is_derived(&self) -> bool {
-        self.columns.iter().any(|column| matches!(column.quantity, Quantity::Eta | Quantity::Frequency))
+    /// Whether two rows are too close to lead to different periods.
+    fn is_close(&self, a: usize, b: usize) -> bool {
+        let (Some(a), Some(b)) = (self.values[a].number(), self.values[b].number()) else { return true };
+        let gap = if self.is_inverse_period() { MIN_GAP } else { 0.0 };
+        a.max(b) <= a.min(b) * (1.0 + gap)
     }
 
-    fn find(&self, wanted: &Parameters) -> Option<u32> {
-        let start = self.sorted.partition_point(|&row| self.compare_others_to(row, wanted).is_lt());
-        let found = *self.sorted.get(start).filter(|&&row| self.compare_others_to(row, wanted).is_eq())?;
-        let Some(column) = self.period else { return Some(found) };
-        let Some(period) = wanted.modulation_period else { return Some(self.first[found as usize]) };
-        let value = period_quantity(self.columns[column].quantity, wanted, period);
-        let tolerance = if self.period_is_derived() { LOOK_UP_TOLERANCE } else { 0.0 };
-        let [low, high] = [value * (1.0 - tolerance), value * (1.0 + tolerance)];
-        let position = self.sorted.partition_point(|&row| {
-            let below = self.period_value(row).is_some_and(|value| value < low);
-            self.compare_others_to(row, wanted).is_lt() || (self.compare_others_to(row, wanted).is_eq() && below)
-        });
-        let row = *self.sorted.get(position)?;
-        let near = self.period_value(row).is_some_and(|value| value <= high);
-        (near && self.compare_others_to(row, wanted).is_eq()).then_some(row)
+    fn is_inverse_period(&self) -> bool {
+        matches!(self.quantity, Quantity::Eta | Quantity::Frequency)
     }
 }
 
 /// Rows of a table fit in 32 bits, so in an index.
-#[expect(clippy::cast_possible_truncation, reason = "at most MOST_ROWS")]
+#[expect(clippy::cast_possible_truncation, reason = "at most MAX_ROWS")]
 const fn index(row: u64) -> usize {
     row as usize
-}
-
-/// Bits by which canonical values of one quantity are told apart.
-fn bits(value: Value) -> u64 {
-    match value {
-        Value::Count(count) => count,
-        Value::Real(real) => real.to_bits(),
-        Value::BreakOn(rule) => u64::from(rule == BreakOn::Tension),
-        Value::Absent => u64::MAX,
-    }
-}
-
-fn number(value: &Value) -> Option<f64> {
-    match *value {
-        Value::Count(count) => Some(count as f64),
-        Value::Real(real) => Some(real),
-        Value::BreakOn(_) | Value::Absent => None,
-    }
 }
 
 #[cfg(test)]

@@ -1,16 +1,15 @@
 //! Checks of a sweep as a whole: nothing is set twice, nothing is without effect, every job is valid.
 //!
-//! Single values were checked where they were read. What is left are bounds on combinations (`N N_s`, `dfs <= fs`, the
-//! period behind η), each monotonic in its quantities: if the two worst corners of the grid are valid, all points are. If
-//! not, or if the modulation is ramped, the points are walked through, since a corner may be no point, or dropped by a
-//! condition.
+//! Single values were checked where they were read. What is left are rules between parameters (`N N_s`, `dfs <= fs`, the
+//! period behind η, a whole ramp), checked at every point. No rule reads the seed, so the points of one seed stand for all;
+//! where one of them is invalid, all are walked through, since a condition may drop it.
 
 use super::axes::Axis;
 use super::plan::Sweep;
 use super::quantity::{Point, Quantity};
 use super::read_axes::PlacedAxis;
 use super::source::{Section, Source, SweepError};
-use crate::model::{Shortest, Symbol, Value};
+use crate::model::{Shortest, Symbol};
 
 /// Where each quantity is set.
 pub(super) struct Places<'a> {
@@ -83,30 +82,23 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(file.source.error(place_of("axes"), problem));
     }
     period(sweep, places)?;
-    let is_ramped =
-        places.set.iter().any(|place| matches!(place.quantity, Quantity::Parameter(symbol) if symbol.is_ramp()));
-    if (is_ramped || !corners_are_valid(sweep))
-        && let Some((quantity, problem)) = sweep.walk().find_map(|point| invalid(sweep, &point))
+    if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
+        && let Some(((quantity, problem), point)) = sweep.admitted().find_map(|point| Some((invalid(&point)?, point)))
     {
-        return Err(places.error(quantity, problem));
+        return Err(places.error(quantity, problem + &place(sweep, &point)));
     }
-    let Some(first) = sweep.walk().next() else {
+    let Some(first) = sweep.admitted().next() else {
         return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
-    solver(sweep, &first, file)
-}
-
-/// Refuses a solver that would refuse the first job. A later job can only differ where an axis moves masses or stiffnesses;
-/// it then fails by itself, and the others go on.
-fn solver(sweep: &Sweep, first: &Point, file: &Section<'_>) -> Result<(), SweepError> {
-    let section = file.entry("solver").and_then(|entry| entry.section("[solver]"));
-    let time_step = section.and_then(|section| section.entry("dt")).map_or(0, |entry| entry.at);
+    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others go on.
+    let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
+    let time_step = solver.and_then(|solver| solver.entry("dt")).map_or(0, |entry| entry.at);
     sweep.solver.check(&first.parameters).map_err(|error| file.source.error(time_step, error.to_string()))
 }
 
 /// A period without modulation has no effect, and a modulation without period no meaning.
 fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), SweepError> {
-    let is_modulated = values(sweep, Symbol::Delta).iter().any(|amplitude| *amplitude > 0.0);
+    let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
     match places.set.iter().find(|place| place.quantity.is_period()) {
         Some(place) if !is_modulated => {
             let key = place.quantity.key();
@@ -123,58 +115,24 @@ fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), SweepError> {
     }
 }
 
-/// The values of a parameter over all points, or the ends of a long range.
-fn values(sweep: &Sweep, symbol: Symbol) -> Vec<f64> {
-    let quantity = Quantity::Parameter(symbol);
-    let on_axis: Vec<f64> = sweep.axes.iter().flat_map(|axis| axis.numbers(quantity)).collect();
-    if on_axis.is_empty() { vec![sweep.point(&[]).number(quantity)] } else { on_axis }
-}
-
-/// Whether the points with the most contacts, the least threshold, the largest deviation and the shortest or the longest
-/// period would be valid.
-fn corners_are_valid(sweep: &Sweep) -> bool {
-    let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let amplitudes: Vec<f64> = values(sweep, Symbol::Delta).into_iter().filter(|amplitude| *amplitude > 0.0).collect();
-    let etas: Vec<f64> = sweep.axes.iter().flat_map(|axis| axis.numbers(Quantity::Eta)).collect();
-    [false, true].into_iter().all(|longest| {
-        let pick = |values: &[f64], largest: bool| if largest { most(values) } else { least(values) };
-        let mut corner = sweep.point(&vec![0; sweep.axes.len()]);
-        for (symbol, largest) in
-            [(Symbol::N, true), (Symbol::Ns, true), (Symbol::Fs, false), (Symbol::Dfs, true), (Symbol::V0, !longest)]
-        {
-            corner.set(Quantity::Parameter(symbol), Value::Real(pick(&values(sweep, symbol), largest)));
-        }
-        if !amplitudes.is_empty() {
-            corner.set(Quantity::Parameter(Symbol::Delta), Value::Real(pick(&amplitudes, longest)));
-        }
-        if !etas.is_empty() {
-            corner.set(Quantity::Eta, Value::Real(pick(&etas, !longest)));
-        }
-        invalid(sweep, &corner.canonical()).is_none()
-    })
-}
-
 /// What is wrong with a canonical point, and the quantity to blame.
-fn invalid(sweep: &Sweep, point: &Point) -> Option<(Quantity, String)> {
-    let (quantity, problem) = if point.period_is_derivable() {
-        let error = point.parameters.clone().validated().err()?;
-        (Quantity::Parameter(error.symbol), error.to_string())
-    } else {
+fn invalid(point: &Point) -> Option<(Quantity, String)> {
+    if !point.period_is_derivable() {
         let period = Shortest(point.number(Quantity::Parameter(Symbol::T)));
-        (Quantity::Eta, format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100"))
-    };
-    let moved: Vec<String> = sweep
-        .axes
-        .iter()
-        .flat_map(Axis::quantities)
-        .filter(|quantity| *quantity != Quantity::Parameter(Symbol::BreakOn))
-        .map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity))))
-        .collect();
-    let place = if moved.is_empty() {
-        String::new()
-    } else {
-        format!(", at the point {}; change the axes, or drop it by a where", moved.join(", "))
-    };
-    Some((quantity, format!("{problem}{place}")))
+        let problem = format!("eta: gives T = {period} s; T, Delta and V0 must lie between 1e-100 and 1e100");
+        return Some((Quantity::Eta, problem));
+    }
+    let error = point.parameters.check_rules().err()?;
+    Some((Quantity::Parameter(error.symbol), error.to_string()))
+}
+
+/// Where a point lies on the axes, and the way out.
+fn place(sweep: &Sweep, point: &Point) -> String {
+    let quantities = sweep.axes.iter().flat_map(Axis::quantities).filter(|quantity| *quantity != Quantity::BREAK_ON);
+    let moved: Vec<String> =
+        quantities.map(|quantity| format!("{} = {}", quantity.key(), Shortest(point.number(quantity)))).collect();
+    if moved.is_empty() {
+        return String::new();
+    }
+    format!(", at the point {}; change the axes, or drop it by a where", moved.join(", "))
 }

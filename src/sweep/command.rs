@@ -3,7 +3,7 @@
 use super::job::Job;
 use super::plan::Sweep;
 use crate::model::{Parameters, Symbol, Value};
-use crate::observe::Recording;
+use crate::observe::{Recording, RecordingKey};
 use crate::solver::Solver;
 
 impl Sweep {
@@ -18,22 +18,13 @@ impl Sweep {
                 words.push(format!("--set {}={value}", symbol.key()));
             }
         }
-        let (recording, usual) = (&self.recording, Recording::default());
-        words.push(format!("--slips {}", recording.slips));
-        if recording.discard != usual.discard {
-            words.push(format!("--discard {}", recording.discard));
-        }
-        if let Some(time) = recording.max_time {
-            words.push(format!("--time {}", Value::Real(time)));
-        }
-        if recording.max_events != usual.max_events {
-            words.push(format!("--max-events {}", recording.max_events));
-        }
-        if let Some(size) = recording.precursor_size {
-            words.push(format!("--precursor-size {size}"));
-        }
-        if let Some(size) = recording.drop_size {
-            words.push(format!("--drop-size {}", Value::Real(size)));
+        for key in RecordingKey::ALL {
+            let value = self.recording.get(key);
+            // The default of slips is another there.
+            let is_needed = key == RecordingKey::Slips || value != Recording::default().get(key);
+            if let Some(flag) = key.flag().filter(|_| is_needed) {
+                words.push(format!("--{flag} {value}"));
+            }
         }
         match self.solver {
             solver if solver == Solver::default() => {}

@@ -9,20 +9,14 @@ use super::job::Identity;
 use super::plan::Sweep;
 use super::quantity::Quantity;
 use super::read_axes;
-use super::source::{Entry, Section, Source, SweepError, nearest};
-use crate::model::{Parameters, Symbol};
-use crate::observe::Recording;
+use super::source::{Entry, Section, Source, SweepError};
+use crate::model::{Parameters, Symbol, Value};
+use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Solver, TOLERANCES};
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
-const LONGEST_NAME: usize = 100;
-/// Largest count in `[record]`: what a double, and so every reader of a table, holds exactly.
-const MOST_COUNT: u64 = (1 << 53) - 1;
-/// Solvers by name; the first is meant where none is named.
-const METHODS: [(&str, SolverReader); 2] = [("event-driven", read_event_driven), ("fixed-step", read_fixed_step)];
-
-type SolverReader = fn(&Section<'_>) -> Result<Solver, SweepError>;
+const MAX_NAME: usize = 100;
 
 impl Sweep {
     /// Reads a sweep file.
@@ -75,11 +69,11 @@ fn read_section<T: Default>(
 fn read_name(entry: &Entry<'_>) -> Result<String, SweepError> {
     let allowed = |name: &&str| {
         let characters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(characters) && !name.starts_with('-')
+        (1..=MAX_NAME).contains(&name.len()) && name.chars().all(characters) && !name.starts_with('-')
     };
     let name = entry.word().filter(allowed).map(str::to_owned);
     name.ok_or_else(|| {
-        entry.must_be(&format!("1 to {LONGEST_NAME} letters, digits, _ and - in quotes, not with - in front"))
+        entry.must_be(&format!("1 to {MAX_NAME} letters, digits, _ and - in quotes, not with - in front"))
     })
 }
 
@@ -89,7 +83,7 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<Parameters
     for entry in model.entries() {
         let symbol = Symbol::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
         let value = read_axes::read_value(&entry, Quantity::Parameter(symbol))?;
-        parameters.set(symbol, value).map_err(|_| entry.must_be(symbol.description().allowed))?;
+        parameters.put(symbol, value).ok_or_else(|| entry.must_be(symbol.description().allowed))?;
         places.model(symbol, entry.at);
     }
     Ok(parameters)
@@ -110,50 +104,36 @@ fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, SweepError> {
 }
 
 fn read_recording(record: &Section<'_>) -> Result<Recording, SweepError> {
-    record.only(&["slips", "discard", "max_time", "max_events", "precursor_size", "precursors", "drop_size"])?;
-    let default = Recording::default();
-    let count = |key: &str, least| record.entry(key).map(|entry| entry.count(least, MOST_COUNT)).transpose();
-    let positive = |key: &str, unit| record.entry(key).map(|entry| entry.positive(unit)).transpose();
-    Ok(Recording {
-        slips: count("slips", 1)?.unwrap_or(default.slips),
-        discard: count("discard", 0)?.unwrap_or(default.discard),
-        max_time: positive("max_time", "s")?.or(default.max_time),
-        max_events: count("max_events", 1)?.unwrap_or(default.max_events),
-        precursor_size: count("precursor_size", 1)?.or(default.precursor_size),
-        precursors: record.entry("precursors").map_or(Ok(default.precursors), |entry| entry.flag())?,
-        drop_size: positive("drop_size", "N")?.or(default.drop_size),
-    })
+    let keys = RecordingKey::ALL.map(RecordingKey::key);
+    let mut recording = Recording::default();
+    for entry in record.entries() {
+        let key = RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;
+        let value = entry.value().and_then(|value| key.checked(value));
+        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(key.description().allowed))?;
+    }
+    Ok(recording)
 }
 
 fn read_solver(solver: &Section<'_>) -> Result<Solver, SweepError> {
-    let Some(entry) = solver.entry("method") else {
-        return METHODS[0].1(solver);
-    };
-    let names = METHODS.map(|(name, _)| name);
-    let method = entry.word().ok_or_else(|| entry.must_be(&format!("one of \"{}\"", names.join("\", \""))))?;
-    match METHODS.into_iter().find(|(name, _)| *name == method) {
-        Some((_, read)) => read(solver),
-        None => Err(entry.refuse(format!("unknown method; {}", nearest(method, &names)))),
+    let method = solver.entry("method");
+    match method.map_or(Some("event-driven"), |method| method.word()) {
+        Some("event-driven") => {
+            solver.only(&["method", "tolerance"])?;
+            solver.entry("tolerance").map_or(Ok(Solver::default()), |entry| match entry.value() {
+                Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => {
+                    Ok(Solver::EventDriven { tolerance })
+                }
+                _ => {
+                    let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+                    Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")))
+                }
+            })
+        }
+        Some("fixed-step") => {
+            solver.only(&["method", "dt"])?;
+            let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?.positive("s")?;
+            Ok(Solver::FixedStep { time_step })
+        }
+        _ => Err(solver.required("method", "")?.must_be("\"event-driven\" or \"fixed-step\"")),
     }
-}
-
-fn read_event_driven(solver: &Section<'_>) -> Result<Solver, SweepError> {
-    solver.only(&["method", "tolerance"])?;
-    let tolerance = match solver.entry("tolerance") {
-        None => return Ok(Solver::default()),
-        Some(entry) => match entry.number() {
-            Some(crate::model::Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => tolerance,
-            _ => {
-                let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
-                return Err(entry.must_be(&format!("a number from {least:e} to {most:e}, relative to fs/k")));
-            }
-        },
-    };
-    Ok(Solver::EventDriven { tolerance })
-}
-
-fn read_fixed_step(solver: &Section<'_>) -> Result<Solver, SweepError> {
-    solver.only(&["method", "dt"])?;
-    let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?.positive("s")?;
-    Ok(Solver::FixedStep { time_step })
 }

@@ -17,7 +17,7 @@ use super::source::nearest;
 use crate::model::Symbol;
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
-const MOST_TOKENS: usize = 500;
+const MAX_TOKENS: usize = 500;
 
 /// A condition on a point.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,8 +155,8 @@ fn tokens(text: &str) -> Result<Vec<Token>, ConditionError> {
             }
         };
         tokens.push(Token { position: start + 1, text: characters[start..next].iter().collect() });
-        if tokens.len() > MOST_TOKENS {
-            let problem = format!("more than {MOST_TOKENS} words and signs; split it into a list of conditions");
+        if tokens.len() > MAX_TOKENS {
+            let problem = format!("more than {MAX_TOKENS} words and signs; split it into a list of conditions");
             return Err(ConditionError { position: start + 1, problem });
         }
     }
@@ -342,13 +342,12 @@ fn comparison_sign(text: &str) -> Option<Comparison> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::quantity::Period;
     use super::*;
     use crate::model::Parameters;
 
     fn holds(text: &str) -> bool {
         let parameters = Parameters { modulation_amplitude: 1e-6, ..Parameters::default() };
-        let point = Point { parameters, period: Period::Frequency(49.0) }.canonical();
+        let point = Point { parameters, fixes_period: Some((Quantity::Frequency, 49.0)) }.canonical();
         Condition::parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).holds(&point)
     }
 
@@ -378,7 +377,7 @@ mod tests {
 
     #[test]
     fn without_modulation_eta_and_the_frequency_are_zero() {
-        let point = Point { parameters: Parameters::default(), period: Period::Eta(3.0) }.canonical();
+        let point = Point { parameters: Parameters::default(), fixes_period: Some((Quantity::Eta, 3.0)) }.canonical();
         for text in ["eta == 0", "frequency == 0", "T > 1e300"] {
             assert!(Condition::parse(text).unwrap().holds(&point), "{text}");
         }

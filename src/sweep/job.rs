@@ -4,7 +4,7 @@
 //! recording and the exact bits of every parameter: never over the place in a grid. Contract: pinned by a known-answer
 //! test; another id means that the results are others.
 
-use crate::model::{BreakOn, MODEL_VERSION, Parameters, RNG_SCHEME, Shortest, Symbol, Value};
+use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Shortest, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
 use sha2::{Digest, Sha256};
@@ -22,69 +22,46 @@ pub struct Job {
 /// Bytes of an id: 128 bits, so that ten million jobs collide with a probability of about 1e-25.
 const ID_BYTES: usize = 16;
 
-/// Name of a job. Shown as 32 hexadecimal characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct JobId([u8; ID_BYTES]);
+macro_rules! id {
+    ($(#[$about:meta])* $Id:ident) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $Id([u8; ID_BYTES]);
 
-/// Name of the jobs that differ in the seed alone. Shown as 32 hexadecimal characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct SetId([u8; ID_BYTES]);
+        impl $Id {
+            /// The 16 bytes.
+            #[must_use]
+            pub const fn as_bytes(&self) -> &[u8; ID_BYTES] {
+                &self.0
+            }
+        }
 
-impl JobId {
-    /// The 16 bytes.
-    #[must_use]
-    pub const fn as_bytes(&self) -> &[u8; ID_BYTES] {
-        &self.0
-    }
+        impl fmt::Display for $Id {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+            }
+        }
+    };
 }
 
-impl SetId {
-    /// The 16 bytes.
-    #[must_use]
-    pub const fn as_bytes(&self) -> &[u8; ID_BYTES] {
-        &self.0
-    }
+id! {
+    /// Name of a job. Shown as 32 hexadecimal characters.
+    JobId
 }
 
-fn write_hexadecimal(bytes: &[u8], f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    bytes.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-}
-
-impl fmt::Display for JobId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_hexadecimal(&self.0, f)
-    }
-}
-
-impl fmt::Display for SetId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_hexadecimal(&self.0, f)
-    }
+id! {
+    /// Name of the jobs that differ in the seed alone. Shown as 32 hexadecimal characters.
+    SetId
 }
 
 /// Keys and values of the solver and the recording, as a sweep file writes them. Values read back to the same bits.
-pub(super) fn settings(solver: Solver, recording: &Recording) -> Vec<(&'static str, String)> {
-    let none = || "none".to_owned();
-    let mut settings = match solver {
-        Solver::EventDriven { tolerance } => {
-            vec![("solver.method", "event-driven".to_owned()), ("solver.tolerance", Shortest(tolerance).to_string())]
-        }
-        Solver::FixedStep { time_step } => {
-            vec![("solver.method", "fixed-step".to_owned()), ("solver.dt", Shortest(time_step).to_string())]
-        }
+pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> {
+    let (method, key, value) = match solver {
+        Solver::EventDriven { tolerance } => ("event-driven", "solver.tolerance", tolerance),
+        Solver::FixedStep { time_step } => ("fixed-step", "solver.dt", time_step),
     };
-    let Recording { slips, discard, max_time, max_events, precursor_size, precursors, drop_size } = recording;
-    settings.extend([
-        ("record.slips", slips.to_string()),
-        ("record.discard", discard.to_string()),
-        ("record.max_time", max_time.map_or_else(none, |time| Shortest(time).to_string())),
-        ("record.max_events", max_events.to_string()),
-        ("record.precursor_size", precursor_size.map_or_else(none, |size| size.to_string())),
-        ("record.precursors", precursors.to_string()),
-    ]);
-    // Named only where it is set, so that the ids of other jobs are those of before there was such a key.
-    settings.extend(drop_size.map(|size| ("record.drop_size", Shortest(size).to_string())));
-    settings
+    let solver = [("solver.method", method.to_owned()), (key, Shortest(value).to_string())];
+    solver.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(recording.settings())
 }
 
 /// Gives jobs their ids: all that they share is hashed once.
@@ -120,14 +97,9 @@ impl Identity {
     fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> [u8; ID_BYTES] {
         let mut hasher = self.shared.clone();
         for &symbol in symbols {
-            let (kind, bits) = match parameters.get(symbol) {
-                Value::Count(count) => (b'n', count),
-                Value::Real(real) => (b'r', real.to_bits()),
-                Value::BreakOn(rule) => (b'b', u64::from(rule == BreakOn::Tension)),
-                Value::Absent => (b'-', 0),
-            };
-            let [a, b, c, d, e, f, g, h] = bits.to_le_bytes();
-            hasher.update([kind, a, b, c, d, e, f, g, h]);
+            let (kind, bits) = parameters.get(symbol).bits();
+            hasher.update([kind]);
+            hasher.update(bits.to_le_bytes());
         }
         let digest = hasher.finalize();
         std::array::from_fn(|byte| digest[byte])
@@ -137,6 +109,7 @@ impl Identity {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{BreakOn, Value};
     use std::collections::HashSet;
 
     fn identity() -> Identity {
@@ -167,7 +140,7 @@ mod tests {
                 Value::Count(count) => Value::Count(count + 1),
                 Value::Real(real) => Value::Real(real.next_up()),
                 Value::BreakOn(_) => Value::BreakOn(BreakOn::Tension),
-                Value::Absent => panic!("all are there"),
+                Value::Flag(_) | Value::Absent => panic!("all are there, none is a flag"),
             };
             other.set(symbol, value).unwrap();
             assert!(jobs.insert(identity().job(&other)), "{symbol:?}");

@@ -27,6 +27,6 @@ mod tests;
 
 pub use cost::{predicted_cost, predicted_interval};
 pub use job::{Identity, Job, JobId, SetId};
-pub use parts::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Parts, Plan, Totals};
-pub use plan::{Difference, Jobs, Sweep};
+pub use parts::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use plan::{Difference, Sweep};
 pub use source::SweepError;

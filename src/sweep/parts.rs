@@ -6,7 +6,7 @@
 //! [`PLAN_VERSION`] alone. Memory: one part.
 
 use super::job::Job;
-use super::plan::{Jobs, Sweep};
+use super::plan::Sweep;
 
 /// Predicted CPU time after which a part is full, in s: little is lost with an unfinished part, and files stay few.
 pub const PART_COST: f64 = 5.0;
@@ -52,20 +52,28 @@ impl<'a> Plan<'a> {
         Self { epochs }
     }
 
-    /// The jobs that an epoch owns, in grid order. Empty for an epoch that is not there.
-    pub fn jobs(&self, epoch: usize) -> impl Iterator<Item = Job> + Send + use<'a> {
-        self.owned(epoch).into_iter().flatten()
-    }
-
-    /// The parts of an epoch, in order. Empty for an epoch that is not there.
-    #[must_use]
-    pub fn parts_of(&self, epoch: usize) -> Parts<'a> {
-        Parts { epoch, next: 0, jobs: self.owned(epoch) }
+    /// The jobs that an epoch owns, those that are in no earlier sweep, in grid order.
+    pub(super) fn jobs(self, epoch: usize) -> impl Iterator<Item = Job> + Send + use<'a> {
+        let (earlier, sweep) = (&self.epochs[..epoch], &self.epochs[epoch]);
+        sweep.jobs().filter(move |job| !earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
     }
 
     /// The parts of all epochs, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
-        (0..self.epochs.len()).flat_map(move |epoch| self.parts_of(epoch))
+        (0..self.epochs.len()).flat_map(move |epoch| {
+            let mut source = self.jobs(epoch);
+            (0..).map_while(move |index| {
+                let (mut jobs, mut cost) = (Vec::new(), 0.0);
+                while cost < PART_COST
+                    && jobs.len() < PART_JOBS
+                    && let Some(job) = source.next()
+                {
+                    cost += job.cost;
+                    jobs.push(job);
+                }
+                (!jobs.is_empty()).then_some(Part { epoch, index, jobs, cost })
+            })
+        })
     }
 
     /// Walks through the plan and adds up.
@@ -76,54 +84,5 @@ impl<'a> Plan<'a> {
             parts: totals.parts + 1,
             cost: totals.cost + part.cost,
         })
-    }
-
-    fn owned(&self, epoch: usize) -> Option<Owned<'a>> {
-        let sweep = self.epochs.get(epoch)?;
-        Some(Owned { jobs: sweep.jobs(), earlier: &self.epochs[..epoch] })
-    }
-}
-
-/// The jobs of an epoch that are in no earlier sweep.
-#[derive(Clone, Debug)]
-struct Owned<'a> {
-    jobs: Jobs<'a>,
-    earlier: &'a [Sweep],
-}
-
-impl Iterator for Owned<'_> {
-    type Item = Job;
-
-    fn next(&mut self) -> Option<Job> {
-        self.jobs.find(|job| !self.earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
-    }
-}
-
-/// The parts of an epoch, lazily.
-#[derive(Clone, Debug)]
-pub struct Parts<'a> {
-    epoch: usize,
-    next: u64,
-    jobs: Option<Owned<'a>>,
-}
-
-impl Iterator for Parts<'_> {
-    type Item = Part;
-
-    fn next(&mut self) -> Option<Part> {
-        let source = self.jobs.as_mut()?;
-        let mut jobs = Vec::new();
-        let mut cost = 0.0;
-        while cost < PART_COST && jobs.len() < PART_JOBS {
-            let Some(job) = source.next() else { break };
-            cost += job.cost;
-            jobs.push(job);
-        }
-        if jobs.is_empty() {
-            return None;
-        }
-        let index = self.next;
-        self.next += 1;
-        Some(Part { epoch: self.epoch, index, jobs, cost })
     }
 }

@@ -1,6 +1,6 @@
 //! A sweep: the points of its axes in grid order, those that are jobs, and the look-up of a job without walking.
 //!
-//! Grid order: axes as in the file, the last moves fastest. A point is a job if the condition holds and no earlier point
+//! Grid order: axes as in the file, the last moves fastest. A point is a job if the conditions hold and no earlier point
 //! has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing: there the
 //! first row of the axis that fixes the period counts (see [`Axis`]). Conditions see canonical values, so they judge such
 //! points alike. Memory does not grow with the number of points.
@@ -9,7 +9,7 @@ use super::axes::Axis;
 use super::cost::predicted_cost;
 use super::filter::Condition;
 use super::job::{Identity, Job, JobId, SetId, settings};
-use super::quantity::{Period, Point, Quantity};
+use super::quantity::{Point, Quantity};
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
@@ -87,18 +87,19 @@ impl Sweep {
     }
 
     /// The jobs in grid order.
-    #[must_use]
-    pub fn jobs(&self) -> Jobs<'_> {
-        Jobs { walk: self.walk() }
+    pub fn jobs(&self) -> impl Iterator<Item = Job> + Send + '_ {
+        self.admitted().map(|Point { parameters, .. }| {
+            let cost = predicted_cost(&parameters, &self.recording, self.solver);
+            Job { parameters, cost }
+        })
     }
 
     /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
     #[must_use]
     pub fn contains(&self, parameters: &Parameters) -> bool {
-        let Some(rows) = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<Vec<u64>>>() else {
-            return false;
-        };
-        self.admitted(&rows, self.point(&rows)).is_some_and(|point| point.parameters == *parameters)
+        let rows: Option<Vec<u64>> = self.axes.iter().map(|axis| axis.find(parameters)).collect();
+        let point = rows.map(|rows| self.point(&rows).canonical());
+        point.is_some_and(|point| point.parameters == *parameters && self.admits(&point))
     }
 
     /// The id of a job.
@@ -123,22 +124,18 @@ impl Sweep {
                 .into_iter()
                 .filter(|symbol| !moved(*symbol))
                 .map(|symbol| (format!("model.{}", symbol.key()), sweep.base.get(symbol).to_string()));
-            let settings = settings(sweep.solver, &sweep.recording);
-            let settings = settings.into_iter().map(|(key, value)| (key.to_owned(), value));
-            std::iter::once(("name".to_owned(), sweep.name.clone())).chain(model).chain(settings).collect::<Vec<_>>()
+            let name = std::iter::once(("name".to_owned(), sweep.name.clone()));
+            name.chain(model).chain(settings(sweep.solver, &sweep.recording)).collect::<Vec<_>>()
         };
         let (before, after) = (values(self), values(other));
         let value = |values: &[(String, String)], key: &str| {
             values.iter().find(|(other, _)| other == key).map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
         };
-        let mut keys: Vec<&String> = Vec::new();
-        for (key, _) in before.iter().chain(&after) {
-            if !keys.contains(&key) {
-                keys.push(key);
-            }
-        }
-        keys.into_iter()
-            .map(|key| Difference { key: key.clone(), before: value(&before, key), after: value(&after, key) })
+        let added = after.iter().filter(|(key, _)| before.iter().all(|(other, _)| other != key));
+        before
+            .iter()
+            .chain(added)
+            .map(|(key, _)| Difference { key: key.clone(), before: value(&before, key), after: value(&after, key) })
             .filter(|difference| difference.before != difference.after)
             .collect()
     }
@@ -151,52 +148,55 @@ impl Sweep {
             .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
     }
 
-    /// All points, before the conditions.
-    pub(super) fn walk(&self) -> Walk<'_> {
-        let rows = vec![0; self.axes.len()];
-        Walk { sweep: self, point: self.point(&rows), rows, ended: false }
+    /// The points that are jobs, in canonical form.
+    pub(super) fn admitted(&self) -> impl Iterator<Item = Point> + Send + '_ {
+        self.walk(self.axes.iter().map(Axis::len).collect()).filter(|point| self.admits(point))
+    }
+
+    /// The points of one seed that are jobs if the conditions hold, in canonical form.
+    pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
+        let is_seed = |axis: &Axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)];
+        self.walk(self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect())
+    }
+
+    fn walk(&self, counts: Vec<u64>) -> Walk<'_> {
+        let rows = vec![0; counts.len()];
+        Walk { axes: &self.axes, counts, point: self.point(&rows), rows, ended: false }
     }
 
     /// The point of these rows, as the axes set it.
-    pub(super) fn point(&self, rows: &[u64]) -> Point {
-        let mut point = Point { parameters: self.base.clone(), period: Period::Given };
+    fn point(&self, rows: &[u64]) -> Point {
+        let mut point = Point { parameters: self.base.clone(), fixes_period: None };
         for (axis, &row) in self.axes.iter().zip(rows) {
             axis.apply(row, &mut point);
         }
         point
     }
 
-    /// The canonical form of a point that is a job.
-    pub(super) fn admitted(&self, rows: &[u64], point: Point) -> Option<Point> {
-        let first = point.is_modulated() || self.axes.iter().zip(rows).all(|(axis, &row)| axis.is_first(row));
-        if !first {
-            return None;
-        }
-        let point = point.canonical();
-        self.conditions.iter().all(|condition| condition.holds(&point)).then_some(point)
+    /// Whether a canonical point fulfils the conditions.
+    fn admits(&self, point: &Point) -> bool {
+        self.conditions.iter().all(|condition| condition.holds(point))
     }
 }
 
-/// A walk through the points of a sweep.
-#[derive(Clone, Debug)]
-pub(super) struct Walk<'a> {
-    sweep: &'a Sweep,
-    /// The point that comes next, as the axes set it.
-    point: Point,
+/// A walk through the first rows of each axis, past points that repeat an earlier one. Yields canonical points.
+struct Walk<'a> {
+    axes: &'a [Axis],
+    /// Rows of each axis to be walked through.
+    counts: Vec<u64>,
+    /// The rows of the point that comes next.
     rows: Vec<u64>,
+    /// That point, as the axes set it.
+    point: Point,
     ended: bool,
 }
 
 impl Walk<'_> {
     fn advance(&mut self) {
-        for (axis, row) in self.sweep.axes.iter().zip(&mut self.rows).rev() {
-            *row += 1;
-            let carried = *row == axis.len();
-            if carried {
-                *row = 0;
-            }
+        for ((axis, row), &count) in self.axes.iter().zip(&mut self.rows).zip(&self.counts).rev() {
+            *row = (*row + 1) % count;
             axis.apply(*row, &mut self.point);
-            if !carried {
+            if *row > 0 {
                 return;
             }
         }
@@ -205,34 +205,17 @@ impl Walk<'_> {
 }
 
 impl Iterator for Walk<'_> {
-    /// A point that is a job, in canonical form.
     type Item = Point;
 
     fn next(&mut self) -> Option<Point> {
         while !self.ended {
-            let admitted = self.sweep.admitted(&self.rows, self.point.clone());
+            let is_first = || self.axes.iter().zip(&self.rows).all(|(axis, &row)| axis.is_first(row));
+            let point = (self.point.is_modulated() || is_first()).then(|| self.point.clone().canonical());
             self.advance();
-            if admitted.is_some() {
-                return admitted;
+            if point.is_some() {
+                return point;
             }
         }
         None
-    }
-}
-
-/// The jobs of a sweep, lazily, in grid order.
-#[derive(Clone, Debug)]
-pub struct Jobs<'a> {
-    walk: Walk<'a>,
-}
-
-impl Iterator for Jobs<'_> {
-    type Item = Job;
-
-    fn next(&mut self) -> Option<Job> {
-        let parameters = self.walk.next()?.parameters;
-        let sweep = self.walk.sweep;
-        let cost = predicted_cost(&parameters, &sweep.recording, sweep.solver);
-        Some(Job { parameters, cost })
     }
 }

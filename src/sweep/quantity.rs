@@ -5,6 +5,7 @@
 
 use crate::model::{Parameters, Symbol, Value};
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 /// A parameter, or one of the two quantities that stand for the period T.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,9 +19,11 @@ pub(super) enum Quantity {
 }
 
 /// Range of η, f, Δ, V0 and T where one is derived from the others: their products keep all digits.
-const DERIVABLE: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+const DERIVABLE: RangeInclusive<f64> = 1e-100..=1e100;
 
 impl Quantity {
+    pub const BREAK_ON: Self = Self::Parameter(Symbol::BreakOn);
+
     pub const fn key(self) -> &'static str {
         match self {
             Self::Parameter(symbol) => symbol.key(),
@@ -42,86 +45,56 @@ impl Quantity {
         matches!(self, Self::Parameter(Symbol::T) | Self::Eta | Self::Frequency)
     }
 
+    /// The period T in s that a value of a quantity that fixes it leads to. Monotonic in the value.
+    pub fn period(self, value: f64, parameters: &Parameters) -> f64 {
+        match self {
+            Self::Eta => TAU * parameters.modulation_amplitude / (value * parameters.drive_velocity),
+            Self::Frequency => 1.0 / value,
+            Self::Parameter(_) => value,
+        }
+    }
+
     /// Whether it takes whole numbers only.
-    pub const fn is_count(self) -> bool {
-        matches!(self, Self::Parameter(Symbol::N | Symbol::Ns | Symbol::Seed))
+    pub fn is_count(self) -> bool {
+        matches!(self, Self::Parameter(symbol) if matches!(Parameters::default().get(symbol), Value::Count(_)))
     }
 
     /// The allowed values, as an error message names them.
     pub const fn allowed(self) -> &'static str {
         match self {
-            Self::Parameter(Symbol::T) => "a finite number > 0",
             Self::Parameter(symbol) => symbol.description().allowed,
             Self::Eta | Self::Frequency => "a number > 0, from 1e-100 to 1e100",
         }
     }
 
-    /// The canonical form of a value that this quantity can take by itself; what it can be beside others is checked on
-    /// the points.
+    /// The canonical form of a value that this quantity can take by itself; rules between parameters are checked on the
+    /// points.
     pub fn checked(self, value: Value) -> Option<Value> {
-        match (self, value) {
-            (Self::Parameter(symbol), _) => {
-                // Nothing here limits another parameter: N Ns <= 1e7, dfs <= fs, a period with every amplitude, a ramp that
-                // may take as long as it likes.
-                let mut probe = Parameters {
-                    blocks: 1,
-                    contacts_per_block: 1,
-                    mean_threshold: f64::MAX,
-                    threshold_deviation: 0.0,
-                    modulation_amplitude: 1.0,
-                    modulation_period: Some(f64::MAX),
-                    turning_period: Some(f64::MAX),
-                    ramp_time: 1.0,
-                    ..Parameters::default()
-                };
-                probe.set(symbol, value).ok()?;
-                let canonical = probe.get(symbol);
-                // Without amplitude or duration it is the ramp that is refused.
-                if probe.validated().is_err_and(|error| error.symbol == symbol) {
-                    return None;
-                }
-                Some(match canonical {
-                    // Adding zero turns -0.0 into 0.0.
-                    Value::Real(real) => Value::Real(real + 0.0),
-                    other => other,
-                })
-            }
-            (_, Value::Real(real)) => DERIVABLE.contains(&real).then_some(value),
-            (_, Value::Count(count)) => self.checked(Value::Real(count as f64)),
-            _ => None,
+        match self {
+            Self::Parameter(symbol) => symbol.checked(value),
+            Self::Eta | Self::Frequency => value.number().filter(|number| DERIVABLE.contains(number)).map(Value::Real),
         }
     }
 }
 
-/// Where the period of a point comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Period {
-    /// From T itself, if at all.
-    Given,
-    /// From η.
-    Eta(f64),
-    /// From the frequency, in Hz.
-    Frequency(f64),
-}
-
-/// A point of a sweep: parameters under construction and what fixes their period.
+/// A point of a sweep: parameters under construction, and η or the frequency where it fixes their period.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub parameters: Parameters,
-    pub period: Period,
+    pub fixes_period: Option<(Quantity, f64)>,
 }
 
 impl Point {
     /// Sets a quantity to a checked value.
     pub fn set(&mut self, quantity: Quantity, value: Value) {
-        match (quantity, value) {
-            (Quantity::Eta, Value::Real(eta)) => self.period = Period::Eta(eta),
-            (Quantity::Frequency, Value::Real(frequency)) => self.period = Period::Frequency(frequency),
-            (Quantity::Parameter(symbol), _) => {
-                self.parameters.set(symbol, value).expect("values are checked when the file is read");
+        let fits = match quantity {
+            Quantity::Parameter(symbol) => self.parameters.put(symbol, value),
+            Quantity::Eta | Quantity::Frequency => {
+                self.fixes_period = value.number().map(|number| (quantity, number));
+                self.fixes_period.map(|_| ())
             }
-            _ => unreachable!("eta and frequency are checked to be real"),
-        }
+        };
+        fits.expect("values are checked when the file is read");
     }
 
     /// Whether the modulation is on.
@@ -131,59 +104,34 @@ impl Point {
 
     /// Brings the period into canonical form: derived where it is, absent without modulation.
     pub fn canonical(mut self) -> Self {
-        let parameters = &mut self.parameters;
-        if parameters.modulation_amplitude == 0.0 {
-            parameters.modulation_period = None;
-        } else {
-            match self.period {
-                Period::Given => {}
-                Period::Eta(eta) => {
-                    let rate = eta * parameters.drive_velocity;
-                    parameters.modulation_period = Some(TAU * parameters.modulation_amplitude / rate);
-                }
-                Period::Frequency(frequency) => parameters.modulation_period = Some(1.0 / frequency),
-            }
+        if !self.is_modulated() {
+            self.parameters.modulation_period = None;
+        } else if let Some((quantity, value)) = self.fixes_period {
+            self.parameters.modulation_period = Some(quantity.period(value, &self.parameters));
         }
         self
     }
 
     /// Whether every quantity behind a derived period, and the period, is far from the ends of the doubles.
     pub fn period_is_derivable(&self) -> bool {
-        let parameters = &self.parameters;
-        let ends = [parameters.modulation_amplitude, parameters.drive_velocity];
-        match (self.period, parameters.modulation_period) {
-            (Period::Eta(_), Some(period)) => ends.into_iter().chain([period]).all(|value| DERIVABLE.contains(&value)),
+        let Parameters { modulation_amplitude, drive_velocity, modulation_period, .. } = self.parameters;
+        match (self.fixes_period, modulation_period) {
+            (Some((Quantity::Eta, _)), Some(period)) => {
+                [modulation_amplitude, drive_velocity, period].iter().all(|value| DERIVABLE.contains(value))
+            }
             _ => true,
         }
     }
 
-    /// A quantity of a canonical point as a number. Without modulation η and the frequency are 0 and T is infinite. What
-    /// an axis set is given back as it was set.
+    /// A quantity of a canonical point as a number, not one for a word. Without modulation η and the frequency are 0 and
+    /// T is infinite. What an axis set is given back as it was set.
     pub fn number(&self, quantity: Quantity) -> f64 {
-        match quantity {
-            Quantity::Eta => match self.period {
-                Period::Eta(eta) if self.is_modulated() => eta,
-                _ => self.parameters.eta(),
-            },
-            Quantity::Frequency => match self.period {
-                Period::Frequency(frequency) if self.is_modulated() => frequency,
-                _ => self.parameters.modulation_period.map_or(0.0, |period| 1.0 / period),
-            },
-            Quantity::Parameter(Symbol::T) => self.parameters.modulation_period.unwrap_or(f64::INFINITY),
-            Quantity::Parameter(symbol) => match self.parameters.get(symbol) {
-                Value::Count(count) => count as f64,
-                Value::Real(real) => real,
-                Value::BreakOn(_) | Value::Absent => f64::NAN,
-            },
+        match (quantity, self.fixes_period) {
+            (_, Some((fixing, value))) if fixing == quantity && self.is_modulated() => value,
+            (Quantity::Eta, _) => self.parameters.eta(),
+            (Quantity::Frequency, _) => self.parameters.modulation_period.map_or(0.0, |period| 1.0 / period),
+            (Quantity::Parameter(Symbol::T), _) => self.parameters.modulation_period.unwrap_or(f64::INFINITY),
+            (Quantity::Parameter(symbol), _) => self.parameters.get(symbol).number().unwrap_or(f64::NAN),
         }
-    }
-}
-
-/// The value of a period's quantity that these modulated parameters would come from, to about 1e-15; exact for T.
-pub(super) fn period_quantity(quantity: Quantity, parameters: &Parameters, period: f64) -> f64 {
-    match quantity {
-        Quantity::Eta => TAU * parameters.modulation_amplitude / (period * parameters.drive_velocity),
-        Quantity::Frequency => 1.0 / period,
-        Quantity::Parameter(_) => period,
     }
 }

@@ -11,11 +11,11 @@
 //! Axes stand in the order of the file; the last moves fastest. A range of a whole-number quantity is rounded to whole
 //! numbers.
 
-use super::axes::{Axis, Column, MOST_ROWS, Repeated};
+use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::quantity::Quantity;
-use super::samples::{MOST_SOBOL_POINTS, Range, Sample};
+use super::samples::{MAX_SOBOL_POINTS, Range, Sample};
 use super::source::{Entry, Section, SweepError};
-use crate::model::{BreakOn, Shortest, Symbol, Value};
+use crate::model::{Shortest, Value};
 
 const RANGE_FORMS: &str = "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
 const AXIS_FORMS: &str =
@@ -39,12 +39,12 @@ pub(super) fn read(section: &Section<'_>) -> Result<Vec<PlacedAxis>, SweepError>
             }
             "sobol" => {
                 for table in tables(&entry, "[axes.sobol]")? {
-                    axes.push(read_sample(&table, Sample::Sobol, MOST_SOBOL_POINTS)?);
+                    axes.push(read_sample(&table, Sample::Sobol, MAX_SOBOL_POINTS)?);
                 }
             }
             "latin" => {
                 for table in tables(&entry, "[axes.latin]")? {
-                    axes.push(read_sample(&table, Sample::Latin, MOST_ROWS)?);
+                    axes.push(read_sample(&table, Sample::Latin, MAX_ROWS)?);
                 }
             }
             _ => axes.push(read_single(&entry)?),
@@ -101,8 +101,8 @@ fn read_single(entry: &Entry<'_>) -> Result<PlacedAxis, SweepError> {
 fn listed(entry: &Entry<'_>, quantity: Quantity, values: Values) -> Result<(Vec<Value>, Vec<usize>), SweepError> {
     match values {
         Values::Listed { values, places } => Ok((values, places)),
-        Values::Counted { count, .. } if count > MOST_ROWS => {
-            Err(entry.refuse(format!("a zip has at most {MOST_ROWS} rows; make {} an axis of its own", quantity.key())))
+        Values::Counted { count, .. } if count > MAX_ROWS => {
+            Err(entry.refuse(format!("a zip has at most {MAX_ROWS} rows; make {} an axis of its own", quantity.key())))
         }
         Values::Counted { first, count } => Ok(((first..first + count).map(Value::Count).collect(), Vec::new())),
     }
@@ -113,8 +113,8 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Values, SweepErr
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
         }
-        if list.len() as u64 > MOST_ROWS {
-            return Err(entry.refuse(format!("an axis has at most {MOST_ROWS} listed values; split it into two axes")));
+        if list.len() as u64 > MAX_ROWS {
+            return Err(entry.refuse(format!("an axis has at most {MAX_ROWS} listed values; split it into two axes")));
         }
         let values = list.iter().map(|value| read_value(value, quantity)).collect::<Result<_, _>>()?;
         return Ok(Values::Listed { values, places: list.iter().map(|value| value.at).collect() });
@@ -132,7 +132,7 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Values, SweepErr
     };
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
-    let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MOST_ROWS)?;
+    let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
     let values = range.spaced(points).map(|value| ranged(entry, quantity, value)).collect::<Result<_, _>>()?;
     Ok(Values::Listed { values, places: Vec::new() })
 }
@@ -157,18 +157,13 @@ fn read_count(entry: &Entry<'_>, table: &Section<'_>, quantity: Quantity) -> Res
 
 /// Reads one value of a quantity, as a list or `[model]` gives it.
 pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value, SweepError> {
-    let value = match quantity {
-        Quantity::Parameter(Symbol::BreakOn) => {
-            entry.word().and_then(|word| word.parse::<BreakOn>().ok()).map(Value::BreakOn)
-        }
-        _ => entry.number(),
-    };
     let hint = if entry.node.get_ref().is_array() || entry.node.get_ref().is_table() {
         "; several values belong in [axes]"
     } else {
         ""
     };
-    value
+    entry
+        .value()
         .and_then(|value| quantity.checked(value))
         .ok_or_else(|| entry.must_be(&format!("{}{hint}", quantity.allowed())))
 }
@@ -184,16 +179,13 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
     let [low, high] = ends.as_slice() else {
         return Err(entry.must_be("two numbers [low, high]"));
     };
-    if quantity == Quantity::Parameter(Symbol::BreakOn) {
+    if quantity == Quantity::BREAK_ON {
         return Err(entry.refuse("break_on is a word and has no range; list its values"));
     }
     let end = |entry: &Entry<'_>| {
         let problem = format!("must be {} ({} of {})", quantity.allowed(), entry.key, quantity.key());
-        match read_value(entry, quantity).map_err(|_| entry.refuse(problem))? {
-            Value::Real(real) => Ok(real),
-            Value::Count(count) => Ok(count as f64),
-            Value::BreakOn(_) | Value::Absent => Err(entry.must_be("a number")),
-        }
+        let value = entry.value().and_then(|value| quantity.checked(value));
+        value.and_then(Value::number).ok_or_else(|| entry.refuse(problem))
     };
     let range = Range { low: end(low)?, high: end(high)?, logarithmic };
     if range.low >= range.high {

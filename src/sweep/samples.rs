@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Most points of a Sobol sample: the length of the sequence.
-pub(super) const MOST_SOBOL_POINTS: u64 = 1 << 16;
+pub(super) const MAX_SOBOL_POINTS: u64 = 1 << 16;
 
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]

@@ -32,7 +32,7 @@ pub enum SweepError {
 }
 
 /// Longest value that an error message shows, in characters.
-const LONGEST_EXCERPT: usize = 40;
+const MAX_EXCERPT: usize = 40;
 
 /// A file and its text.
 #[derive(Clone, Copy)]
@@ -73,8 +73,8 @@ impl<'a> Source<'a> {
     fn excerpt(&self, span: Range<usize>) -> String {
         let text = self.text.get(span).unwrap_or_default();
         let line = text.lines().next().unwrap_or_default().trim_end();
-        if line.chars().count() > LONGEST_EXCERPT || line.len() < text.trim_end().len() {
-            format!("{}...", line.chars().take(LONGEST_EXCERPT).collect::<String>())
+        if line.chars().count() > MAX_EXCERPT || line.len() < text.trim_end().len() {
+            format!("{}...", line.chars().take(MAX_EXCERPT).collect::<String>())
         } else {
             line.to_owned()
         }
@@ -177,12 +177,8 @@ impl<'a> Entry<'a> {
         self.node.get_ref().as_str()
     }
 
-    pub fn flag(&self) -> Result<bool, SweepError> {
-        self.node.get_ref().as_bool().ok_or_else(|| self.must_be("true or false"))
-    }
-
-    /// A number as written: a count where it is one.
-    pub fn number(&self) -> Option<Value> {
+    /// The value as written: a count where it is one.
+    pub fn value(&self) -> Option<Value> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
                 let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(Value::Count);
@@ -190,56 +186,35 @@ impl<'a> Entry<'a> {
                 count.or_else(real)
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
+            DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
+            DeValue::String(word) => word.parse().map(Value::BreakOn).ok(),
             _ => None,
         }
     }
 
+    /// A finite number > 0.
     pub fn positive(&self, unit: &str) -> Result<f64, SweepError> {
-        let number = match self.number() {
-            Some(Value::Real(real)) => real,
-            Some(Value::Count(count)) => count as f64,
-            _ => f64::NAN,
-        };
-        if number > 0.0 && number.is_finite() {
-            Ok(number)
-        } else {
-            Err(self.must_be(&format!("a finite number > 0, in {unit}")))
-        }
+        let number = self.value().and_then(Value::number).filter(|number| *number > 0.0 && number.is_finite());
+        number.ok_or_else(|| self.must_be(&format!("a finite number > 0, in {unit}")))
     }
 
     /// A whole number within bounds.
-    pub fn count(&self, least: u64, most: u64) -> Result<u64, SweepError> {
-        match self.number() {
-            Some(Value::Count(count)) if (least..=most).contains(&count) => Ok(count),
-            _ => Err(self.must_be(&format!("a whole number from {least} to {most}"))),
+    pub fn count(&self, min: u64, max: u64) -> Result<u64, SweepError> {
+        match self.value() {
+            Some(Value::Count(count)) if (min..=max).contains(&count) => Ok(count),
+            _ => Err(self.must_be(&format!("a whole number from {min} to {max}"))),
         }
     }
 }
 
 /// The hint for an unknown word: the nearest known one, or all.
 pub(super) fn nearest(word: &str, known: &[&str]) -> String {
-    let best = known.iter().map(|candidate| (edit_distance(word, candidate), candidate)).min_by_key(|(d, _)| *d);
-    match best {
-        // Half of a short word, two letters of a long one.
-        Some((distance, candidate)) if distance <= (word.chars().count() / 2).min(2) => {
-            format!("did you mean {candidate}?")
-        }
-        _ => format!("allowed are {}", known.join(", ")),
+    let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
+    // Half of a short word, two letters of a long one.
+    let max = (word.chars().count() / 2).min(2);
+    let near = known.iter().filter(|candidate| distance(candidate) <= max);
+    match near.min_by_key(|candidate| distance(candidate)) {
+        Some(candidate) => format!("did you mean {candidate}?"),
+        None => format!("allowed are {}", known.join(", ")),
     }
-}
-
-/// Levenshtein distance, blind to case.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let [a, b]: [Vec<char>; 2] = [a, b].map(|word| word.to_lowercase().chars().collect());
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, left) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, right) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(left != right);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -145,5 +145,5 @@ fn a_file_that_is_not_there_is_named() {
 #[test]
 fn an_error_reads_file_line_key_value_and_what_is_allowed() {
     let error = Sweep::parse("name = \"fig3\"\n[model]\nDelta = 1e-6\nT = -0.01", Path::new("sweeps/fig3.toml"));
-    assert_eq!(error.unwrap_err().to_string(), "sweeps/fig3.toml:4: T = -0.01: must be a finite number > 0");
+    assert_eq!(error.unwrap_err().to_string(), "sweeps/fig3.toml:4: T = -0.01: must be a finite number > 0, in s");
 }

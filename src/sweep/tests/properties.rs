@@ -75,7 +75,7 @@ fn perturbed(parameters: &Parameters, symbol: Symbol) -> Option<Parameters> {
     let value = match parameters.get(symbol) {
         Value::Real(real) => Value::Real(real.next_up()),
         Value::Count(count) => Value::Count(count + 1),
-        Value::BreakOn(_) | Value::Absent => return None,
+        _ => return None,
     };
     other.set(symbol, value).ok()?;
     (symbol != Symbol::Delta || parameters.modulation_amplitude > 0.0).then_some(other)

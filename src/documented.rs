@@ -1,0 +1,33 @@
+//! Tables in `docs/` that follow from the code: the tests hold them against it, and write them with `UPDATE_DOCS=1`.
+
+use crate::model::{Description, Value};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Asserts that the first table below a heading of a page describes these fields with their defaults.
+pub(crate) fn assert_documented(page: &str, heading: &str, fields: &[(Description, Value)]) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page);
+    let text = std::fs::read_to_string(&file).unwrap();
+    let start = text.find(&format!("\n{heading}\n")).unwrap();
+    let start = start + text[start..].find("\n|").unwrap() + 1;
+    let end = text[start..].find("\n\n").map_or(text.len(), |end| start + end + 1);
+    let expected = format!("{}{}{}", &text[..start], table(fields), &text[end..]);
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(&file, &expected).unwrap();
+    }
+    let found = std::fs::read_to_string(&file).unwrap();
+    assert!(found == expected, "docs/{page} is out of date: run the tests with UPDATE_DOCS=1");
+}
+
+fn table(fields: &[(Description, Value)]) -> String {
+    let mut text = "| key | symbol | meaning | default | allowed |\n|---|---|---|---|---|\n".to_owned();
+    for (field, default) in fields {
+        let Description { key, symbol, meaning, .. } = field;
+        writeln!(text, "| `{key}` | {symbol} | {meaning} | {default} | {} |", field.requirement()).unwrap();
+    }
+    // A column that is empty everywhere says nothing.
+    if fields.iter().all(|(field, _)| field.symbol.is_empty()) {
+        text = text.replace("| symbol ", "").replacen("|---", "", 1).replace("` |  |", "` |");
+    }
+    text
+}

@@ -1,0 +1,209 @@
+//! Structs whose fields are each described once, in a row of [`fields!`]:
+//!
+//! ```text
+//! fields! {
+//!     /// What the struct is.
+//!     pub struct Parameters by Symbol {
+//!         Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", not_negative and "dfs <= fs",
+//!             "standard deviation of the contact thresholds";
+//!         Seed("seed") seed: u64 = 0, "", count_or_zero, "realisation of the disorder";
+//!     }
+//! }
+//! ```
+//!
+//! `Variant("key", "symbol") field: type = default, "unit", range and "rule", "meaning";`
+//!
+//! | part | meaning |
+//! |---|---|
+//! | `Variant` | the field as a value of the enum behind `by` |
+//! | `"key"` | its name in files, flags and tables |
+//! | `"symbol"` | its symbol in the paper; may be left out |
+//! | `type` | one with a [`FieldType`](super::value::FieldType); an `Option` where the value may be missing |
+//! | `"unit"` | in SI; empty for a pure number, a flag or a word |
+//! | `range` | a name of [`range!`]: the values that the field can take by itself |
+//! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
+//! | `"meaning"` | one line, without a full stop; it also heads columns of tables |
+//!
+//! Out of a row come the field with its documentation, its default, its [`Description`], access by key and the row of the
+//! table in `docs/`, written by the tests with `UPDATE_DOCS=1`.
+
+/// Description of one field.
+#[derive(Clone, Copy, Debug)]
+pub struct Description {
+    /// Key in files, flags and tables.
+    pub key: &'static str,
+    /// Symbol in the paper; empty if it has none.
+    pub symbol: &'static str,
+    /// SI unit; empty for a pure number, a flag or a word.
+    pub unit: &'static str,
+    /// One line, without a full stop.
+    pub meaning: &'static str,
+    /// The values that the field can take by itself, as an error message names them.
+    pub allowed: &'static str,
+    /// What else must hold, beside other fields; empty for nothing.
+    pub rule: &'static str,
+    /// Whether the field can take a number by itself.
+    pub contains: fn(f64) -> bool,
+}
+
+impl Description {
+    /// The allowed values with the rule beside other fields.
+    #[must_use]
+    pub fn requirement(&self) -> String {
+        if self.rule.is_empty() { self.allowed.to_owned() } else { format!("{}, {}", self.allowed, self.rule) }
+    }
+}
+
+/// The ranges of values, each with the words for it and its test.
+macro_rules! range {
+    (words size) => {
+        "a whole number from 1 to 100000"
+    };
+    (test size) => {
+        |number| (1.0..=1e5).contains(&number)
+    };
+    (words count) => {
+        "a whole number from 1 to 2^53 - 1"
+    };
+    (test count) => {
+        |number| (1.0..9_007_199_254_740_992.0).contains(&number)
+    };
+    (words count_or_zero) => {
+        "a whole number from 0 to 2^53 - 1"
+    };
+    (test count_or_zero) => {
+        |number| (0.0..9_007_199_254_740_992.0).contains(&number)
+    };
+    (words positive) => {
+        "a finite number > 0"
+    };
+    (test positive) => {
+        |number| number > 0.0 && number < f64::INFINITY
+    };
+    (words not_negative) => {
+        "a finite number >= 0"
+    };
+    (test not_negative) => {
+        |number| (0.0..f64::INFINITY).contains(&number)
+    };
+    (words flag) => {
+        "true or false"
+    };
+    (test flag) => {
+        |_| false
+    };
+    (words break_on) => {
+        "\"magnitude\" (either sign) or \"tension\""
+    };
+    (test break_on) => {
+        |_| false
+    };
+}
+
+/// A unit behind the words for a range.
+macro_rules! in_unit {
+    ("") => {
+        ""
+    };
+    ($unit:literal) => {
+        concat!(", in ", $unit)
+    };
+}
+
+/// Defines a struct and the enum of its fields, see the top of this file.
+macro_rules! fields {
+    (
+        $(#[$about:meta])*
+        pub struct $Struct:ident by $Key:ident {$(
+            $variant:ident($key:literal $(, $symbol:literal)?) $field:ident: $type:ty = $default:expr,
+                $unit:tt, $range:ident $(and $rule:literal)?, $meaning:literal;
+        )+}
+    ) => {
+        $(#[$about])*
+        pub struct $Struct {$(
+            #[doc = concat!("`", $key, "`: ", $meaning, ". Must be ")]
+            #[doc = concat!(
+                $crate::model::fields::range!(words $range), $crate::model::fields::in_unit!($unit) $(, ", ", $rule)?, "."
+            )]
+            pub $field: $type,
+        )+}
+
+        impl Default for $Struct {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        #[doc = concat!("A field of [`", stringify!($Struct), "`].")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum $Key {$(
+            #[doc = concat!("`", $key, "`: ", $meaning, ".")]
+            $variant,
+        )+}
+
+        impl $Key {
+            /// Every field, in the order of tables and documentation.
+            pub const ALL: [Self; [$($key),+].len()] = [$(Self::$variant),+];
+
+            /// Key, unit, meaning and range.
+            #[must_use]
+            pub const fn description(self) -> $crate::model::Description {
+                match self {$(
+                    Self::$variant => $crate::model::Description {
+                        key: $key,
+                        symbol: concat!($($symbol)?),
+                        unit: $unit,
+                        meaning: $meaning,
+                        allowed: concat!(
+                            $crate::model::fields::range!(words $range), $crate::model::fields::in_unit!($unit)
+                        ),
+                        rule: concat!($($rule)?),
+                        contains: $crate::model::fields::range!(test $range),
+                    },
+                )+}
+            }
+
+            /// Key in files, flags and tables.
+            #[must_use]
+            pub const fn key(self) -> &'static str {
+                self.description().key
+            }
+
+            /// The field with this key.
+            #[must_use]
+            pub fn from_key(key: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|field| field.key() == key)
+            }
+
+            /// The canonical form of a value that the field can take by itself: equal values have equal bits.
+            #[must_use]
+            pub fn checked(self, value: $crate::model::Value) -> Option<$crate::model::Value> {
+                use $crate::model::value::FieldType;
+                let value = match self {$(
+                    Self::$variant => <$type as FieldType>::from_value(value)?.to_value(),
+                )+};
+                value.number().is_none_or(self.description().contains).then_some(value)
+            }
+        }
+
+        impl $Struct {
+            /// The value of a field.
+            #[must_use]
+            pub fn get(&self, field: $Key) -> $crate::model::Value {
+                match field {$(
+                    $Key::$variant => $crate::model::value::FieldType::to_value(&self.$field),
+                )+}
+            }
+
+            /// Sets a field, in or out of its range; none if the kind of value does not fit.
+            pub(crate) fn put(&mut self, field: $Key, value: $crate::model::Value) -> Option<()> {
+                match field {$(
+                    $Key::$variant => self.$field = $crate::model::value::FieldType::from_value(value)?,
+                )+}
+                Some(())
+            }
+        }
+    };
+}
+
+pub(crate) use {fields, in_unit, range};

@@ -1,0 +1,58 @@
+//! What a job records: one struct, each field described once.
+
+use crate::model::fields::fields;
+
+fields! {
+    /// What a job records: how many slips, from where, and which tables.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Recording by RecordingKey {
+        Slips("slips") slips: u64 = 40, "", count, "Slips to record past start-up; then the job ends";
+        Discard("discard") discard: u64 = 5, "", count_or_zero, "Slips of start-up, not recorded";
+        MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
+            "Model time at which a job ends even without its slips; its outcome is then `time limit`";
+        MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", count,
+            "Contact events after which a job counts as failed";
+        PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", count,
+            "Least breaks of a precursor; none: `Ns` of the job";
+        Precursors("precursors") precursors: bool = false, "", flag,
+            "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
+        DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
+            "Least drop of the shear force to look for; none: drops are not looked for";
+    }
+}
+
+impl Recording {
+    /// Keys and values that define a job, part of its id. The keys of the first version always are; later ones only where
+    /// they differ from their default, so that the ids of other jobs stay as they were.
+    pub fn settings(&self) -> impl Iterator<Item = (String, String)> {
+        let default = Self::default();
+        RecordingKey::ALL
+            .into_iter()
+            .filter(move |&key| key <= RecordingKey::Precursors || self.get(key) != default.get(key))
+            .map(|key| (format!("record.{}", key.key()), self.get(key).to_string()))
+    }
+}
+
+impl RecordingKey {
+    /// The flag of `stickslip simulate`, without its dashes; none for what has an effect in the tables of a sweep only.
+    #[must_use]
+    pub fn flag(self) -> Option<String> {
+        match self {
+            Self::Precursors => None,
+            Self::MaxTime => Some("time".to_owned()),
+            _ => Some(self.key().replace('_', "-")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::documented::assert_documented;
+
+    #[test]
+    fn documented_keys_are_those_of_a_recording() {
+        let rows = RecordingKey::ALL.map(|key| (key.description(), Recording::default().get(key)));
+        assert_documented("sweeps.md", "## [record]", &rows);
+    }
+}
