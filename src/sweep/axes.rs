@@ -34,9 +34,7 @@ pub(super) enum Axis {
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     columns: Vec<Column>,
-    /// The columns in the order in which rows are compared: the one that fixes the period comes last.
-    compared: Vec<usize>,
-    /// Rows in the order of the parameters that they lead to.
+    /// Rows in the order of the parameters that they lead to, the period last.
     sorted: Vec<u32>,
     /// For each row, whether no earlier one equals it in all but what fixes the period.
     is_first: Vec<bool>,
@@ -98,7 +96,7 @@ impl Axis {
                 _ => None,
             },
             Self::Table(table) => {
-                let found = table.sorted.binary_search_by(|&row| table.compare(row as usize, wanted)).ok()?;
+                let found = table.sorted.binary_search_by(|&row| table.compare(row, wanted)).ok()?;
                 Some(u64::from(table.sorted[found]))
             }
         }
@@ -107,51 +105,48 @@ impl Axis {
 
 impl Table {
     fn new(columns: Vec<Column>) -> Result<Self, Repeated> {
-        let rows = columns[0].values.len();
-        let mut compared: Vec<usize> = (0..columns.len()).collect();
-        compared.sort_by_key(|&column| columns[column].quantity.is_period());
         let period = columns.iter().find(|column| column.quantity.is_period());
-        let rank = |row: u32| compared.iter().map(|&column| columns[column].rank(row as usize)).collect::<Vec<_>>();
-        let mut ranked: Vec<(Vec<u64>, u32)> = (0..).take(rows).map(|row| (rank(row), row)).collect();
-        ranked.sort_unstable();
-        let equal_but_for_period = |(left, _): &(Vec<u64>, u32), (right, _): &(Vec<u64>, u32)| {
-            let others = compared.len() - usize::from(period.is_some());
-            left[..others] == right[..others]
+        let ranks = |row: u32| {
+            let others = columns.iter().filter(|column| !column.quantity.is_period());
+            let others: Vec<u64> = others.map(|column| column.rank(row)).collect();
+            (others, period.map(|period| period.rank(row)), row)
         };
-        let repeated = ranked.windows(2).filter(|pair| {
-            equal_but_for_period(&pair[0], &pair[1])
-                && period.is_none_or(|period| period.is_close(pair[0].1 as usize, pair[1].1 as usize))
-        });
-        let repeated = repeated.map(|pair| (pair[0].1.max(pair[1].1), pair[0].1.min(pair[1].1)));
-        if let Some((later, earlier)) = repeated.min() {
+        let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
+        ranked.sort_unstable();
+        let mut is_first = vec![false; ranked.len()];
+        let mut repeated: Vec<(u32, u32)> = Vec::new();
+        for group in ranked.chunk_by(|(left, ..), (right, ..)| left == right) {
+            let rows = group.iter().map(|&(.., row)| row);
+            is_first[rows.clone().min().unwrap_or_default() as usize] = true;
+            let neighbours = rows.clone().zip(rows.skip(1));
+            let close = neighbours.filter(|&(a, b)| period.is_none_or(|period| period.is_close(a, b)));
+            repeated.extend(close.map(|(a, b)| (a.max(b), a.min(b))));
+        }
+        if let Some((later, earlier)) = repeated.into_iter().min() {
             return Err(Repeated { earlier: earlier as usize, later: later as usize });
         }
-        let mut is_first = vec![false; rows];
-        for group in ranked.chunk_by(equal_but_for_period) {
-            let first = group.iter().map(|&(_, row)| row).min();
-            is_first[first.unwrap_or_default() as usize] = true;
-        }
-        let sorted = ranked.into_iter().map(|(_, row)| row).collect();
-        Ok(Self { columns, compared, sorted, is_first })
+        let sorted = ranked.into_iter().map(|(.., row)| row).collect();
+        Ok(Self { columns, sorted, is_first })
     }
 
-    /// Where a row stands in the order of rows, against one that leads to these parameters.
-    fn compare(&self, row: usize, wanted: &Parameters) -> Ordering {
-        let mut orders = self.compared.iter().map(|&column| self.columns[column].compare(row, wanted));
+    /// Where a row stands among the sorted ones, against one that leads to these parameters.
+    fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
+        let columns = |fix_period| self.columns.iter().filter(move |column| column.quantity.is_period() == fix_period);
+        let mut orders = columns(false).chain(columns(true)).map(|column| column.compare(row, wanted));
         orders.find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
     }
 }
 
 impl Column {
     /// Orders the rows as [`Column::compare`] does: a larger η or frequency is a shorter period.
-    fn rank(&self, row: usize) -> u64 {
-        let (_, bits) = self.values[row].bits();
+    fn rank(&self, row: u32) -> u64 {
+        let (_, bits) = self.values[row as usize].bits();
         if self.is_inverse_period() { !bits } else { bits }
     }
 
     /// Compares what a row leads to with these parameters; without modulation every period will do.
-    fn compare(&self, row: usize, wanted: &Parameters) -> Ordering {
-        let value = self.values[row];
+    fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
+        let value = self.values[row as usize];
         match self.quantity {
             Quantity::Parameter(symbol) if symbol != Symbol::T => value.bits().cmp(&wanted.get(symbol).bits()),
             quantity => match (value.number(), wanted.modulation_period) {
@@ -162,8 +157,8 @@ impl Column {
     }
 
     /// Whether two rows are too close to lead to different periods.
-    fn is_close(&self, a: usize, b: usize) -> bool {
-        let (Some(a), Some(b)) = (self.values[a].number(), self.values[b].number()) else { return true };
+    fn is_close(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|row| self.values[row as usize].number().unwrap_or(f64::NAN));
         let gap = if self.is_inverse_period() { MIN_GAP } else { 0.0 };
         a.max(b) <= a.min(b) * (1.0 + gap)
     }

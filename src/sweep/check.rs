@@ -34,7 +34,14 @@ impl<'a> Places<'a> {
         self.set.push(Place { quantity: Quantity::Parameter(symbol), at, in_model: true });
     }
 
-    /// A quantity is set on an axis; refused if something else sets it, or the period, already.
+    /// Quantities are set on axes; refused if something else sets them, or the period, already.
+    pub fn axes(&mut self, axes: Vec<PlacedAxis>) -> Result<Vec<Axis>, SweepError> {
+        for PlacedAxis { axis, places } in &axes {
+            axis.quantities().into_iter().zip(places).try_for_each(|(quantity, &at)| self.axis(quantity, at))?;
+        }
+        Ok(axes.into_iter().map(|placed| placed.axis).collect())
+    }
+
     fn axis(&mut self, quantity: Quantity, at: usize) -> Result<(), SweepError> {
         let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
         if let Some(place) = self.set.iter().find(clash) {
@@ -62,16 +69,6 @@ impl<'a> Places<'a> {
         let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
         self.source.error(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
     }
-}
-
-/// Refuses axes that set what is set elsewhere.
-pub(super) fn without_conflicts(axes: Vec<PlacedAxis>, places: &mut Places<'_>) -> Result<Vec<Axis>, SweepError> {
-    axes.into_iter()
-        .map(|placed| {
-            placed.places.into_iter().try_for_each(|(quantity, at)| places.axis(quantity, at))?;
-            Ok(placed.axis)
-        })
-        .collect()
 }
 
 /// All checks of a sweep that is read.

@@ -41,8 +41,7 @@ impl Sweep {
         let name = read_name(&file.required("name", "it becomes a folder, such as name = \"fig3\"")?)?;
         let mut places = Places::new(source);
         let base = read_section(&file, "model", "[model]", |model| read_model(model, &mut places))?;
-        let axes = read_section(&file, "axes", "[axes]", read_axes::read)?;
-        let axes = check::without_conflicts(axes, &mut places)?;
+        let axes = places.axes(read_section(&file, "axes", "[axes]", read_axes::read)?)?;
         let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry))?;
         let recording = read_section(&file, "record", "[record]", read_recording)?;
         let solver = read_section(&file, "solver", "[solver]", read_solver)?;

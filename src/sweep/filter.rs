@@ -10,48 +10,65 @@
 //! ```
 //!
 //! Quantities are the keys of the parameters, `eta` and `frequency`, in SI. Without modulation `eta` and `frequency` are
-//! 0 and `T` is infinite. A comparison with something undefined, such as 0/0, does not hold.
+//! 0 and `T` is infinite. A comparison with something undefined, such as 0/0, does not hold. Read by operator precedence
+//! (V. R. Pratt, POPL 1973).
 
 use super::quantity::{Point, Quantity};
 use super::source::nearest;
-use crate::model::Symbol;
+use std::cmp::Ordering;
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
 const MAX_TOKENS: usize = 500;
 
 /// A condition on a point.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Condition {
-    Compare(Number, Comparison, Number),
-    All(Vec<Self>),
-    Any(Vec<Self>),
-}
+#[derive(Clone, Debug)]
+pub(super) struct Condition(Expression);
 
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Number {
+/// A condition or a number. Reading makes sure that each stands where it may.
+#[derive(Clone, Debug)]
+enum Expression {
     Constant(f64),
     Quantity(Quantity),
     Negative(Box<Self>),
     Combined(Box<(Self, Operator, Self)>),
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Comparison {
-    Less,
-    LessOrEqual,
-    Greater,
-    GreaterOrEqual,
-    Equal,
-    NotEqual,
+/// An operator between two expressions.
+#[derive(Clone, Copy, Debug)]
+struct Operator {
+    sign: &'static str,
+    /// What binds closer has a larger one.
+    precedence: u8,
+    /// The value; that of a condition is 1 if it holds, otherwise 0.
+    combine: fn(f64, f64) -> f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Operator {
-    Plus,
-    Minus,
-    Times,
-    Over,
-}
+/// Precedence of conditions between conditions, and of comparisons: below and above are conditions and numbers.
+const OR: u8 = 1;
+const AND: u8 = 2;
+const COMPARISON: u8 = 3;
+const SUM: u8 = 4;
+const PRODUCT: u8 = 5;
+
+const OPERATORS: [Operator; 12] = [
+    Operator { sign: "or", precedence: OR, combine: f64::max },
+    Operator { sign: "and", precedence: AND, combine: f64::min },
+    Operator { sign: "<", precedence: COMPARISON, combine: |a, b| f64::from(a < b) },
+    Operator { sign: "<=", precedence: COMPARISON, combine: |a, b| f64::from(a <= b) },
+    Operator { sign: ">", precedence: COMPARISON, combine: |a, b| f64::from(a > b) },
+    Operator { sign: ">=", precedence: COMPARISON, combine: |a, b| f64::from(a >= b) },
+    Operator { sign: "==", precedence: COMPARISON, combine: |a, b| f64::from(a == b) },
+    // Not `a != b`, which holds for what is no number.
+    Operator {
+        sign: "!=",
+        precedence: COMPARISON,
+        combine: |a, b| f64::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne)),
+    },
+    Operator { sign: "+", precedence: SUM, combine: |a, b| a + b },
+    Operator { sign: "-", precedence: SUM, combine: |a, b| a - b },
+    Operator { sign: "*", precedence: PRODUCT, combine: |a, b| a * b },
+    Operator { sign: "/", precedence: PRODUCT, combine: |a, b| a / b },
+];
 
 /// What is wrong with a condition, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -68,34 +85,21 @@ impl Condition {
         let tokens = tokens(text)?;
         let mut reader = Reader { tokens: &tokens, next: 0, end: text.chars().count() + 1 };
         let start = reader.position();
-        let term = reader.condition()?;
+        let expression = reader.expression(OR)?;
         if reader.next < tokens.len() {
-            let found = &tokens[reader.next].text;
+            let found = reader.peek();
             return Err(reader.error(format!("\"{found}\" is not expected here; join conditions by and, or")));
         }
-        term.condition(start)
+        expression.demanded(true, start).map(Self)
     }
 
     /// Whether a canonical point fulfils it.
     pub fn holds(&self, point: &Point) -> bool {
-        match self {
-            Self::All(conditions) => conditions.iter().all(|condition| condition.holds(point)),
-            Self::Any(conditions) => conditions.iter().any(|condition| condition.holds(point)),
-            Self::Compare(left, comparison, right) => {
-                left.evaluate(point).partial_cmp(&right.evaluate(point)).is_some_and(|order| match comparison {
-                    Comparison::Less => order.is_lt(),
-                    Comparison::LessOrEqual => order.is_le(),
-                    Comparison::Greater => order.is_gt(),
-                    Comparison::GreaterOrEqual => order.is_ge(),
-                    Comparison::Equal => order.is_eq(),
-                    Comparison::NotEqual => order.is_ne(),
-                })
-            }
-        }
+        self.0.evaluate(point) == 1.0
     }
 }
 
-impl Number {
+impl Expression {
     fn evaluate(&self, point: &Point) -> f64 {
         match self {
             Self::Constant(constant) => *constant,
@@ -103,15 +107,20 @@ impl Number {
             Self::Negative(number) => -number.evaluate(point),
             Self::Combined(combined) => {
                 let (left, operator, right) = &**combined;
-                let (left, right) = (left.evaluate(point), right.evaluate(point));
-                match operator {
-                    Operator::Plus => left + right,
-                    Operator::Minus => left - right,
-                    Operator::Times => left * right,
-                    Operator::Over => left / right,
-                }
+                (operator.combine)(left.evaluate(point), right.evaluate(point))
             }
         }
+    }
+
+    /// This expression, which starts at `position`, where a condition or a number is needed.
+    fn demanded(self, condition: bool, position: usize) -> Result<Self, ConditionError> {
+        let is_condition = matches!(&self, Self::Combined(combined) if combined.1.precedence <= COMPARISON);
+        let problem = match (condition, is_condition) {
+            (true, false) => "a comparison is needed here, such as frequency < 500",
+            (false, true) => "a number is needed here, this is a condition; join conditions by and, or",
+            _ => return Ok(self),
+        };
+        Err(ConditionError { position, problem: problem.to_owned() })
     }
 }
 
@@ -163,34 +172,6 @@ fn tokens(text: &str) -> Result<Vec<Token>, ConditionError> {
     Ok(tokens)
 }
 
-/// A part of a condition, of either kind: which one an opening parenthesis holds shows only later.
-enum Term {
-    Number(Number),
-    Condition(Condition),
-}
-
-impl Term {
-    fn number(self, position: usize) -> Result<Number, ConditionError> {
-        match self {
-            Self::Number(number) => Ok(number),
-            Self::Condition(_) => Err(ConditionError {
-                position,
-                problem: "a number is needed here, this is a condition; join conditions by and, or".to_owned(),
-            }),
-        }
-    }
-
-    fn condition(self, position: usize) -> Result<Condition, ConditionError> {
-        match self {
-            Self::Condition(condition) => Ok(condition),
-            Self::Number(_) => Err(ConditionError {
-                position,
-                problem: "a comparison is needed here, such as frequency < 500".to_owned(),
-            }),
-        }
-    }
-}
-
 struct Reader<'a> {
     tokens: &'a [Token],
     next: usize,
@@ -203,8 +184,8 @@ impl Reader<'_> {
         self.tokens.get(self.next).map_or(self.end, |token| token.position)
     }
 
-    fn error(&self, problem: String) -> ConditionError {
-        ConditionError { position: self.position(), problem }
+    fn error(&self, problem: impl Into<String>) -> ConditionError {
+        ConditionError { position: self.position(), problem: problem.into() }
     }
 
     fn peek(&self) -> &str {
@@ -217,127 +198,63 @@ impl Reader<'_> {
         found
     }
 
-    fn condition(&mut self) -> Result<Term, ConditionError> {
-        self.joined("or", Self::both, Condition::Any)
+    fn operator(&self) -> Option<Operator> {
+        OPERATORS.into_iter().find(|operator| operator.sign == self.peek())
     }
 
-    fn both(&mut self) -> Result<Term, ConditionError> {
-        self.joined("and", Self::comparison, Condition::All)
-    }
-
-    fn joined(
-        &mut self,
-        word: &str,
-        part: fn(&mut Self) -> Result<Term, ConditionError>,
-        join: fn(Vec<Condition>) -> Condition,
-    ) -> Result<Term, ConditionError> {
+    /// Reads an expression whose operators have at least this precedence.
+    fn expression(&mut self, min: u8) -> Result<Expression, ConditionError> {
         let start = self.position();
-        let first = part(self)?;
-        if self.peek() != word {
-            return Ok(first);
-        }
-        let mut conditions = vec![first.condition(start)?];
-        while self.accept(word) {
-            let start = self.position();
-            conditions.push(part(self)?.condition(start)?);
-        }
-        Ok(Term::Condition(join(conditions)))
-    }
-
-    fn comparison(&mut self) -> Result<Term, ConditionError> {
-        let start = self.position();
-        let left = self.sum()?;
-        let Some(comparison) = comparison_sign(self.peek()) else {
-            if matches!(self.peek(), "=" | "!") {
-                return Err(self.error(format!("write {0}= instead of {0}", self.peek())));
-            }
-            return Ok(left);
-        };
-        let left = left.number(start)?;
-        self.next += 1;
-        let start = self.position();
-        let right = self.sum()?.number(start)?;
-        if comparison_sign(self.peek()).is_some() {
-            return Err(self.error("a second comparison; write a < b and b < c instead of a < b < c".to_owned()));
-        }
-        Ok(Term::Condition(Condition::Compare(left, comparison, right)))
-    }
-
-    fn sum(&mut self) -> Result<Term, ConditionError> {
-        self.combined(&[("+", Operator::Plus), ("-", Operator::Minus)], Self::product)
-    }
-
-    fn product(&mut self) -> Result<Term, ConditionError> {
-        self.combined(&[("*", Operator::Times), ("/", Operator::Over)], Self::factor)
-    }
-
-    fn combined(
-        &mut self,
-        operators: &[(&str, Operator)],
-        part: fn(&mut Self) -> Result<Term, ConditionError>,
-    ) -> Result<Term, ConditionError> {
-        let start = self.position();
-        let mut left = part(self)?;
-        while let Some(&(_, operator)) = operators.iter().find(|(sign, _)| *sign == self.peek()) {
+        let mut left = self.factor()?;
+        while let Some(operator) = self.operator().filter(|operator| operator.precedence >= min) {
+            let joins_conditions = operator.precedence < COMPARISON;
+            let demanded = left.demanded(joins_conditions, start)?;
             self.next += 1;
-            let from = self.position();
-            let right = part(self)?.number(from)?;
-            left = Term::Number(Number::Combined(Box::new((left.number(start)?, operator, right))));
+            let position = self.position();
+            let right = self.expression(operator.precedence + 1)?.demanded(joins_conditions, position)?;
+            left = Expression::Combined(Box::new((demanded, operator, right)));
+            if [operator.precedence, self.operator().map_or(0, |next| next.precedence)] == [COMPARISON; 2] {
+                return Err(self.error("a second comparison; write a < b and b < c instead of a < b < c"));
+            }
+        }
+        if matches!(self.peek(), "=" | "!") {
+            return Err(self.error(format!("write {0}= instead of {0}", self.peek())));
         }
         Ok(left)
     }
 
-    fn factor(&mut self) -> Result<Term, ConditionError> {
+    fn factor(&mut self) -> Result<Expression, ConditionError> {
         if self.accept("-") {
             let start = self.position();
-            return Ok(Term::Number(Number::Negative(Box::new(self.factor()?.number(start)?))));
+            return Ok(Expression::Negative(Box::new(self.factor()?.demanded(false, start)?)));
         }
         if self.accept("(") {
-            let inside = self.condition()?;
-            if !self.accept(")") {
-                return Err(self.error("a closing ) is missing".to_owned()));
-            }
-            return Ok(inside);
+            let inside = self.expression(OR)?;
+            return if self.accept(")") { Ok(inside) } else { Err(self.error("a closing ) is missing")) };
         }
-        let number = self.number()?;
-        self.next += 1;
-        Ok(Term::Number(number))
-    }
-
-    fn number(&self) -> Result<Number, ConditionError> {
         let text = self.peek();
-        match text.chars().next() {
-            None => Err(self.error("the condition ends too early; a key or a number is needed".to_owned())),
-            Some(first) if first.is_ascii_digit() || first == '.' => match text.parse() {
-                Ok(constant) if f64::is_finite(constant) => Ok(Number::Constant(constant)),
-                _ => Err(self.error(format!("\"{text}\" is not a number"))),
+        let expression = match text.chars().next() {
+            None => return Err(self.error("the condition ends too early; a key or a number is needed")),
+            Some('0'..='9' | '.') => match text.parse() {
+                Ok(constant) if f64::is_finite(constant) => Expression::Constant(constant),
+                _ => return Err(self.error(format!("\"{text}\" is not a number"))),
             },
-            Some(first) if first.is_ascii_alphabetic() || first == '_' => match Quantity::from_key(text) {
-                Some(Quantity::Parameter(Symbol::BreakOn)) => {
-                    Err(self
-                        .error("break_on is a word and cannot be compared; choose its values on an axis".to_owned()))
+            Some('a'..='z' | 'A'..='Z' | '_') => match Quantity::from_key(text) {
+                Some(Quantity::BREAK_ON) => {
+                    return Err(self.error("break_on is a word and cannot be compared; choose its values on an axis"));
                 }
-                Some(quantity) => Ok(Number::Quantity(quantity)),
+                Some(quantity) => Expression::Quantity(quantity),
                 None => {
-                    let keys: Vec<_> = Quantity::all().map(Quantity::key).filter(|key| *key != "break_on").collect();
-                    Err(self.error(format!("\"{text}\" is not a known quantity; {}", nearest(text, &keys))))
+                    let numbers = Quantity::all().filter(|quantity| *quantity != Quantity::BREAK_ON);
+                    let hint = nearest(text, &numbers.map(Quantity::key).collect::<Vec<_>>());
+                    return Err(self.error(format!("\"{text}\" is not a known quantity; {hint}")));
                 }
             },
-            Some(_) => Err(self.error(format!("\"{text}\" is not expected here; a key or a number is needed"))),
-        }
+            Some(_) => return Err(self.error(format!("\"{text}\" is not expected here; a key or a number is needed"))),
+        };
+        self.next += 1;
+        Ok(expression)
     }
-}
-
-fn comparison_sign(text: &str) -> Option<Comparison> {
-    Some(match text {
-        "<" => Comparison::Less,
-        "<=" => Comparison::LessOrEqual,
-        ">" => Comparison::Greater,
-        ">=" => Comparison::GreaterOrEqual,
-        "==" => Comparison::Equal,
-        "!=" => Comparison::NotEqual,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

@@ -13,41 +13,38 @@
 
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::quantity::Quantity;
-use super::samples::{MAX_SOBOL_POINTS, Range, Sample};
+use super::samples::{Range, Sample};
 use super::source::{Entry, Section, SweepError};
 use crate::model::{Shortest, Value};
 
 const RANGE_FORMS: &str = "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
 const AXIS_FORMS: &str =
     "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
+const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
 /// An axis, and for each quantity on it the byte of the text that sets it.
 pub(super) struct PlacedAxis {
     pub axis: Axis,
-    pub places: Vec<(Quantity, usize)>,
+    pub places: Vec<usize>,
 }
+
+type TableReader = fn(&Section<'_>) -> Result<PlacedAxis, SweepError>;
 
 /// Reads all axes.
 pub(super) fn read(section: &Section<'_>) -> Result<Vec<PlacedAxis>, SweepError> {
     let mut axes = Vec::new();
     for entry in section.entries() {
-        match entry.key {
-            "zip" => {
-                for table in tables(&entry, "[axes.zip]")? {
-                    axes.push(read_zip(&table)?);
-                }
+        let (title, read): (_, TableReader) = match entry.key {
+            "zip" => ("[axes.zip]", read_zip),
+            "sobol" => ("[axes.sobol]", |table| read_sample(table, Sample::Sobol)),
+            "latin" => ("[axes.latin]", |table| read_sample(table, Sample::Latin)),
+            _ => {
+                axes.push(read_single(&entry)?);
+                continue;
             }
-            "sobol" => {
-                for table in tables(&entry, "[axes.sobol]")? {
-                    axes.push(read_sample(&table, Sample::Sobol, MAX_SOBOL_POINTS)?);
-                }
-            }
-            "latin" => {
-                for table in tables(&entry, "[axes.latin]")? {
-                    axes.push(read_sample(&table, Sample::Latin, MAX_ROWS)?);
-                }
-            }
-            _ => axes.push(read_single(&entry)?),
+        };
+        for table in tables(&entry, title)? {
+            axes.push(read(&table)?);
         }
     }
     Ok(axes)
@@ -69,46 +66,29 @@ fn known(entry: &Entry<'_>, title: &str, also: &[&'static str]) -> Result<Quanti
     })
 }
 
-/// Values as an entry gives them.
-enum Values {
-    Listed { values: Vec<Value>, places: Vec<usize> },
-    Counted { first: u64, count: u64 },
-}
-
 fn read_single(entry: &Entry<'_>) -> Result<PlacedAxis, SweepError> {
     let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"])?;
-    let places = vec![(quantity, entry.at)];
-    let axis = match (read_values(entry, quantity)?, quantity) {
-        (Values::Counted { first, count }, Quantity::Parameter(symbol)) => Axis::Counted { symbol, first, count },
-        (values, _) => {
-            let (values, positions) = listed(entry, quantity, values)?;
-            Axis::table(vec![Column { quantity, values: values.clone() }]).map_err(|Repeated { earlier, later }| {
-                let (key, value) = (entry.key, values[later]);
-                let problem = format!(
-                    "{key} = {value}: repeats value {} of this axis, or nearly, as value {}; \
-                     keep one, or take fewer points",
-                    earlier + 1,
-                    later + 1
-                );
-                entry.source.error(positions.get(later).copied().unwrap_or(entry.at), problem)
-            })?
-        }
-    };
+    let places = vec![entry.at];
+    if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
+        return Ok(PlacedAxis { axis: Axis::Counted { symbol, first, count }, places });
+    }
+    let values = read_values(entry, quantity)?;
+    let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
+    let axis = Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
+        let (value, at) = values[later];
+        let (earlier, later) = (earlier + 1, later + 1);
+        let problem = format!(
+            "{} = {value}: repeats value {earlier} of this axis, or nearly, as value {later}; \
+             keep one, or take fewer points",
+            entry.key
+        );
+        entry.source.error(at, problem)
+    })?;
     Ok(PlacedAxis { axis, places })
 }
 
-/// Writes counted values out.
-fn listed(entry: &Entry<'_>, quantity: Quantity, values: Values) -> Result<(Vec<Value>, Vec<usize>), SweepError> {
-    match values {
-        Values::Listed { values, places } => Ok((values, places)),
-        Values::Counted { count, .. } if count > MAX_ROWS => {
-            Err(entry.refuse(format!("a zip has at most {MAX_ROWS} rows; make {} an axis of its own", quantity.key())))
-        }
-        Values::Counted { first, count } => Ok(((first..first + count).map(Value::Count).collect(), Vec::new())),
-    }
-}
-
-fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Values, SweepError> {
+/// Reads the values of a quantity, each with the byte of the text that sets it.
+fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, SweepError> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -116,43 +96,49 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Values, SweepErr
         if list.len() as u64 > MAX_ROWS {
             return Err(entry.refuse(format!("an axis has at most {MAX_ROWS} listed values; split it into two axes")));
         }
-        let values = list.iter().map(|value| read_value(value, quantity)).collect::<Result<_, _>>()?;
-        return Ok(Values::Listed { values, places: list.iter().map(|value| value.at).collect() });
+        return list.iter().map(|value| Ok((read_value(value, quantity)?, value.at))).collect();
+    }
+    match read_count(entry, quantity)? {
+        Some((_, count)) if count > MAX_ROWS => {
+            let key = quantity.key();
+            return Err(entry.refuse(format!("a zip has at most {MAX_ROWS} rows; make {key} an axis of its own")));
+        }
+        Some((first, count)) => {
+            return Ok((first..first + count).map(|value| (Value::Count(value), entry.at)).collect());
+        }
+        None => {}
     }
     let Some(table) = entry.section("an axis") else {
         let setting =
             if matches!(quantity, Quantity::Parameter(_)) { "; a single value belongs in [model]" } else { "" };
         return Err(entry.must_be(&format!("{AXIS_FORMS}{setting}")));
     };
-    if table.entry("count").is_some() {
-        return read_count(entry, &table, quantity);
-    }
-    let Some(range) = read_range(&table, quantity)? else {
-        return Err(entry.must_be(AXIS_FORMS));
-    };
+    let range = read_range(&table, quantity)?.ok_or_else(|| entry.must_be(AXIS_FORMS))?;
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
     let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
-    let values = range.spaced(points).map(|value| ranged(entry, quantity, value)).collect::<Result<_, _>>()?;
-    Ok(Values::Listed { values, places: Vec::new() })
+    range.spaced(points).map(|value| Ok((ranged(entry, quantity, value)?, entry.at))).collect()
 }
 
-fn read_count(entry: &Entry<'_>, table: &Section<'_>, quantity: Quantity) -> Result<Values, SweepError> {
+/// Reads the first of counted values and their number; none if the entry has another form.
+fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, SweepError> {
+    let Some(table) = entry.section("an axis") else { return Ok(None) };
+    let Some(count) = table.entry("count") else { return Ok(None) };
     table.only(&["count", "first"])?;
     if !quantity.is_count() {
         return Err(entry.must_be("a list or a range: { count = n } fits N, Ns and seed only"));
     }
     // Far above any seed: the last value is checked below.
-    let most = 1 << 53;
-    let count = table.required("count", "write { count = n }")?.count(1, most)?;
-    let first = table.entry("first").map_or(Ok(0), |first| first.count(0, most))?;
+    let max = 1 << 53;
+    let count = count.count(1, max)?;
+    let first = table.entry("first").map_or(Ok(0), |first| first.count(0, max))?;
     for value in [first, first + count - 1] {
         if quantity.checked(Value::Count(value)).is_none() {
             let problem = format!("{} = {value}: must be {}; use first and count", entry.key, quantity.allowed());
             return Err(entry.source.error(entry.at, problem));
         }
     }
-    Ok(Values::Counted { first, count })
+    Ok(Some((first, count)))
 }
 
 /// Reads one value of a quantity, as a list or `[model]` gives it.
@@ -208,63 +194,56 @@ fn ranged(entry: &Entry<'_>, quantity: Quantity, value: f64) -> Result<Value, Sw
 }
 
 fn read_zip(table: &Section<'_>) -> Result<PlacedAxis, SweepError> {
-    let mut columns: Vec<Column> = Vec::new();
-    let mut places = Vec::new();
+    let mut columns: Vec<(Column, usize)> = Vec::new();
     for entry in table.entries() {
         let quantity = known(&entry, table.title, &[])?;
-        let (values, _) = listed(&entry, quantity, read_values(&entry, quantity)?)?;
-        if let Some(first) = columns.first().filter(|first| first.values.len() != values.len()) {
+        let values: Vec<Value> = read_values(&entry, quantity)?.into_iter().map(|(value, _)| value).collect();
+        if let Some((first, _)) = columns.first().filter(|(first, _)| first.values.len() != values.len()) {
             let (key, expected) = (first.quantity.key(), first.values.len());
             let problem =
                 format!("has {} values, {key} has {expected}: columns of a zip have equal length", values.len());
             return Err(entry.refuse(problem));
         }
-        columns.push(Column { quantity, values });
-        places.push((quantity, entry.at));
+        columns.push((Column { quantity, values }, entry.at));
     }
     if columns.len() < 2 {
         let problem = "zip: needs at least two columns that move together; a single one is an axis of its own";
         return Err(table.source.error(table.at, problem));
     }
-    let axis = Axis::table(columns).map_err(|Repeated { earlier, later }| {
-        let problem = format!("zip: row {} repeats row {} (counted from 1); keep one", later + 1, earlier + 1);
-        table.source.error(table.at, problem)
-    })?;
-    Ok(PlacedAxis { axis, places })
+    placed(table, columns)
 }
 
-fn read_sample(table: &Section<'_>, sample: Sample, most_points: u64) -> Result<PlacedAxis, SweepError> {
+fn read_sample(table: &Section<'_>, sample: Sample) -> Result<PlacedAxis, SweepError> {
     const SETTINGS: [&str; 2] = ["points", "seed"];
-    let points = table.required("points", "the number of points of the sample")?.count(1, most_points)?;
+    let points = table.required("points", "the number of points of the sample")?.count(1, sample.max_points())?;
     let seed = table.entry("seed").map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)))?;
     let [points, seed] = [points, seed].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
-    let mut columns: Vec<Column> = Vec::new();
-    let mut places = Vec::new();
-    for entry in table.entries().into_iter().filter(|entry| !SETTINGS.contains(&entry.key)) {
+    let mut columns: Vec<(Column, usize)> = Vec::new();
+    for (dimension, entry) in (0..).zip(table.entries().into_iter().filter(|entry| !SETTINGS.contains(&entry.key))) {
         let quantity = known(&entry, table.title, &SETTINGS)?;
-        let forms = "{ linear = [low, high] } or { log = [low, high] } in a sample";
-        let form = entry.section("a range of a sample").ok_or_else(|| entry.must_be(forms))?;
+        let form = entry.section("a range of a sample").ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
         form.only(&["linear", "log"])?;
-        let range = read_range(&form, quantity)?.ok_or_else(|| entry.must_be(forms))?;
-        let dimension = u32::try_from(columns.len()).unwrap_or(u32::MAX);
+        let range = read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
         let coordinates = sample.coordinates(dimension, points, seed);
         let values =
             coordinates.into_iter().map(|x| ranged(&entry, quantity, range.at(x))).collect::<Result<_, _>>()?;
-        columns.push(Column { quantity, values });
-        places.push((quantity, entry.at));
+        columns.push((Column { quantity, values }, entry.at));
     }
     if columns.is_empty() {
         let problem =
             format!("{}: needs a range for at least one quantity, such as V0 = {{ log = [1e-5, 1e-4] }}", table.title);
         return Err(table.source.error(table.at, problem));
     }
+    placed(table, columns)
+}
+
+/// The axis of a zip or a sample.
+fn placed(table: &Section<'_>, columns: Vec<(Column, usize)>) -> Result<PlacedAxis, SweepError> {
+    let (columns, places) = columns.into_iter().unzip();
     let axis = Axis::table(columns).map_err(|Repeated { earlier, later }| {
-        let problem = format!(
-            "{}: point {} falls on point {}; widen the ranges, or take fewer points",
-            table.title,
-            later + 1,
-            earlier + 1
-        );
+        let (title, earlier, later) = (table.title, earlier + 1, later + 1);
+        let problem =
+            format!("{title}: row {later} repeats row {earlier} (counted from 1); keep one, or take fewer points");
         table.source.error(table.at, problem)
     })?;
     Ok(PlacedAxis { axis, places })

@@ -5,11 +5,9 @@
 //! (M. D. McKay et al., Technometrics 21, 239, 1979). Logarithms and exponentials come from `libm`: the same bits on every
 //! machine.
 
+use super::axes::MAX_ROWS;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-
-/// Most points of a Sobol sample: the length of the sequence.
-pub(super) const MAX_SOBOL_POINTS: u64 = 1 << 16;
 
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +52,14 @@ pub(super) enum Sample {
 }
 
 impl Sample {
+    /// Most points; of a Sobol sample the length of the sequence.
+    pub const fn max_points(self) -> u64 {
+        match self {
+            Self::Sobol => 1 << 16,
+            Self::Latin => MAX_ROWS,
+        }
+    }
+
     /// The coordinates of all points in one dimension, each in [0, 1).
     pub fn coordinates(self, dimension: u32, points: u32, seed: u32) -> Vec<f64> {
         match self {

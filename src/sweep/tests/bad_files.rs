@@ -96,7 +96,11 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
         ("name = \"a\"\n[axes.sobol]\npoints = 65537\nV0 = { log = [1, 2] }", 3, &["points = 65537", "65536"]),
         ("name = \"a\"\n[axes.latin]\npoints = 4", 2, &["at least one quantity"]),
         ("name = \"a\"\n[axes.latin]\npoints = 4\nV0 = [1, 2]", 4, &["V0 = [1, 2]", "in a sample"]),
-        ("name = \"a\"\n[axes.latin]\npoints = 9\nN = { linear = [1, 2] }", 2, &["falls on point", "fewer points"]),
+        (
+            "name = \"a\"\n[axes.latin]\npoints = 9\nN = { linear = [1, 2] }",
+            2,
+            &["row 2 repeats row 1", "fewer points"],
+        ),
         ("name = \"a\"\nwhere = \"V0 < \"", 2, &["where = \"V0 < \"", "character 6"]),
         ("name = \"a\"\nwhere = [\"V0 < 1\",\n\"v < 1\"]", 3, &["\"v < 1\"", "character 1", "not a known quantity"]),
         ("name = \"a\"\nwhere = true", 2, &["where = true", "a condition in quotes"]),
