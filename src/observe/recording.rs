@@ -13,11 +13,11 @@ fields! {
         MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", count,
             "Contact events after which a job counts as failed";
         PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", count,
-            "Least breaks of a precursor; none: `Ns` of the job";
+            "Minimum number of breaks of a precursor; none: `Ns` of the job";
         Precursors("precursors") precursors: bool = false, "", flag,
             "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
         DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
-            "Least drop of the shear force to look for; none: drops are not looked for";
+            "Minimum drop of the shear force to look for; none: drops are not looked for";
     }
 }
 

@@ -1,4 +1,4 @@
-//! Sweep files: strict TOML in, a [`Sweep`] that can run out.
+//! Sweep files: strict TOML in, a valid [`Sweep`] out.
 //!
 //! Whatever is unknown, impossible, contradictory or without effect is refused with file, line, key, value and the way
 //! out. Contract: every job of a sweep that was read has valid parameters (see `check.rs`), and there is at least one.

@@ -12,7 +12,7 @@ use super::plan::Sweep;
 pub const PART_COST: f64 = 5.0;
 /// Most jobs of a part, so that a part of cheap jobs fits in memory.
 pub const PART_JOBS: usize = 4096;
-/// Version of the way from sweeps to parts: order, cost and limits. A directory keeps the one that it was begun with.
+/// Version of how sweeps become parts: order, cost and limits. A directory keeps the one that it was started with.
 pub const PLAN_VERSION: u32 = 2;
 
 /// The sweeps of a directory in the order in which they were run.

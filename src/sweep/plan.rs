@@ -159,9 +159,19 @@ impl Sweep {
         self.walk(self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect())
     }
 
-    fn walk(&self, counts: Vec<u64>) -> Walk<'_> {
-        let rows = vec![0; counts.len()];
-        Walk { axes: &self.axes, counts, point: self.point(&rows), rows, ended: false }
+    /// Walks through so many rows of each axis, past points that repeat an earlier one. Yields canonical points.
+    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Send + '_ {
+        let mut rows = vec![0; counts.len()];
+        (0..counts.iter().product()).filter_map(move |number: u64| {
+            let mut rest = number;
+            for (row, count) in rows.iter_mut().zip(&counts).rev() {
+                *row = rest % count;
+                rest /= count;
+            }
+            let point = self.point(&rows);
+            let is_first = || self.axes.iter().zip(&rows).all(|(axis, &row)| axis.is_first(row));
+            (point.is_modulated() || is_first()).then(|| point.canonical())
+        })
     }
 
     /// The point of these rows, as the axes set it.
@@ -176,46 +186,5 @@ impl Sweep {
     /// Whether a canonical point fulfils the conditions.
     fn admits(&self, point: &Point) -> bool {
         self.conditions.iter().all(|condition| condition.holds(point))
-    }
-}
-
-/// A walk through the first rows of each axis, past points that repeat an earlier one. Yields canonical points.
-struct Walk<'a> {
-    axes: &'a [Axis],
-    /// Rows of each axis to be walked through.
-    counts: Vec<u64>,
-    /// The rows of the point that comes next.
-    rows: Vec<u64>,
-    /// That point, as the axes set it.
-    point: Point,
-    ended: bool,
-}
-
-impl Walk<'_> {
-    fn advance(&mut self) {
-        for ((axis, row), &count) in self.axes.iter().zip(&mut self.rows).zip(&self.counts).rev() {
-            *row = (*row + 1) % count;
-            axis.apply(*row, &mut self.point);
-            if *row > 0 {
-                return;
-            }
-        }
-        self.ended = true;
-    }
-}
-
-impl Iterator for Walk<'_> {
-    type Item = Point;
-
-    fn next(&mut self) -> Option<Point> {
-        while !self.ended {
-            let is_first = || self.axes.iter().zip(&self.rows).all(|(axis, &row)| axis.is_first(row));
-            let point = (self.point.is_modulated() || is_first()).then(|| self.point.clone().canonical());
-            self.advance();
-            if point.is_some() {
-                return point;
-            }
-        }
-        None
     }
 }

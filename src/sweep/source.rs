@@ -1,6 +1,8 @@
 //! The text of a sweep file: sections, entries and values that know their place, and errors that name it.
 //!
-//! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written.
+//! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written. Not by serde's
+//! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
+//! value as written nor the way out.
 
 use crate::model::Value;
 use std::ops::Range;

@@ -22,7 +22,7 @@ fn assert_refused(table: &[(&str, usize, &[&str])]) {
 }
 
 #[test]
-fn what_is_no_toml_is_refused_with_its_line() {
+fn invalid_toml_is_refused_with_its_line() {
     assert_refused(&[
         ("name = \"a\"\n[model\nN = 3", 2, &["TOML"]),
         ("name = \"a\"\n\n[model]\nN = ", 4, &["TOML"]),
@@ -119,7 +119,7 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
 }
 
 #[test]
-fn what_contradicts_itself_or_has_no_effect_is_refused_with_the_other_place() {
+fn contradictions_and_settings_without_effect_are_refused_with_the_other_place() {
     assert_refused(&[
         ("name = \"a\"\n[model]\nV0 = 1e-4\n[axes]\nV0 = [1]", 5, &["V0", "[model]", "line 3", "keep one"]),
         ("name = \"a\"\n[axes]\nV0 = [1]\n[axes.zip]\nV0 = [2]\nN = [1]", 5, &["V0", "[axes]", "line 3"]),
@@ -141,7 +141,7 @@ fn what_contradicts_itself_or_has_no_effect_is_refused_with_the_other_place() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_named() {
+fn a_missing_file_is_named() {
     let error = Sweep::from_file(Path::new("no/such/file.toml")).unwrap_err();
     assert!(error.to_string().starts_with("no/such/file.toml: cannot be read: "), "{error}");
 }

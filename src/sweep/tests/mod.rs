@@ -85,7 +85,7 @@ fn without_modulation_one_point_stands_for_all_periods() {
 }
 
 #[test]
-fn without_modulation_rows_of_a_zip_are_told_apart_by_their_other_columns() {
+fn without_modulation_rows_of_a_zip_differ_by_their_other_columns() {
     let sweep = sweep("[axes.zip]\ndfs = [0, 0, 0.1, 0]\nDelta = [0, 0, 0, 1]\nT = [1, 2, 3, 1]");
     let deviations = [0.0, 0.1, 0.0].map(Value::Real);
     assert_eq!(values(&sweep, Symbol::Dfs), deviations);
@@ -113,15 +113,15 @@ fn samples_fill_their_ranges() {
 }
 
 #[test]
-fn differences_are_told_but_for_axes_and_conditions() {
+fn differences_are_reported_except_in_axes_and_conditions() {
     let before = sweep("[model]\nK = 1e8\n[axes]\nV0 = [1e-4]");
     let same = sweep("where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]");
     assert_eq!(before.difference(&same), []);
     let other =
         sweep("name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\n[solver]\ntolerance = 1e-7");
-    let told: Vec<String> = before.difference(&other).iter().map(ToString::to_string).collect();
+    let reported: Vec<String> = before.difference(&other).iter().map(ToString::to_string).collect();
     assert_eq!(
-        told,
+        reported,
         [
             "name: test -> b",
             "model.K: 1e8 -> 2e8",

@@ -18,8 +18,8 @@ fn listed(values: &[f64]) -> String {
 }
 
 /// Distinct positive numbers, in no order.
-fn numbers(most: usize) -> impl Strategy<Value = Vec<f64>> {
-    btree_set(1_u32..4000, 1..=most)
+fn numbers(max: usize) -> impl Strategy<Value = Vec<f64>> {
+    btree_set(1_u32..4000, 1..=max)
         .prop_map(|set| set.into_iter().map(|n| f64::from(n) * 1e-7).collect::<Vec<_>>())
         .prop_shuffle()
 }
@@ -107,7 +107,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_no_job_is_not_found(text in texts(), of in any::<prop::sample::Index>()) {
+    fn parameters_of_no_job_are_not_found(text in texts(), of in any::<prop::sample::Index>()) {
         let sweep = sweep(&text);
         let jobs: Vec<Job> = sweep.jobs().collect();
         let ids: HashSet<_> = jobs.iter().map(|job| sweep.job_id(&job.parameters)).collect();
