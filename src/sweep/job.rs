@@ -110,6 +110,7 @@ impl Identity {
 mod tests {
     use super::*;
     use crate::model::{BreakOn, Value};
+    use crate::observe::RecordingKey;
     use std::collections::HashSet;
 
     fn identity() -> Identity {
@@ -151,18 +152,15 @@ mod tests {
 
     #[test]
     fn solver_and_recording_change_every_id() {
-        let default = Recording::default();
-        let recordings = [
-            Recording { slips: 41, ..default },
-            Recording { discard: 6, ..default },
-            Recording { max_time: Some(1.0), ..default },
-            Recording { max_events: 7, ..default },
-            Recording { precursor_size: Some(20), ..default },
-            Recording { precursors: true, ..default },
-            Recording { drop_size: Some(5.0), ..default },
-            Recording { drop_size: Some(5.0_f64.next_up()), ..default },
-            default,
-        ];
+        let mut recordings = vec![Recording::default()];
+        for key in RecordingKey::ALL {
+            let before = recordings.len();
+            for value in [Value::Real(7.0), Value::Real(7.0_f64.next_up()), Value::Flag(true)] {
+                let mut other = Recording::default();
+                recordings.extend(other.put(key, value).map(|()| other));
+            }
+            assert!(recordings.len() > before, "{key:?}");
+        }
         let mut ids = HashSet::new();
         for time_step in [1e-6, 1e-6_f64.next_up()] {
             for recording in &recordings {
