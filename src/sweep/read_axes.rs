@@ -126,7 +126,7 @@ fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)
     let Some(count) = table.entry("count") else { return Ok(None) };
     table.only(&["count", "first"])?;
     if !quantity.is_count() {
-        return Err(entry.must_be("a list or a range: { count = n } fits N, Ns and seed only"));
+        return Err(entry.must_be("a list or a range: { count = n } fits whole numbers only, such as seed"));
     }
     // Far above any seed: the last value is checked below.
     let max = 1 << 53;

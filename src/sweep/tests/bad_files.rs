@@ -85,7 +85,7 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
         ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], points = 0 }", 3, &["points = 0", "a whole number from 2"]),
         ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], linear = [1, 2], points = 4 }", 3, &["keep one"]),
         ("name = \"a\"\n[axes]\nN = { linear = [1, 3], points = 4 }", 3, &["N = 2", "repeats", "fewer points"]),
-        ("name = \"a\"\n[axes]\nV0 = { count = 3 }", 3, &["V0", "fits N, Ns and seed"]),
+        ("name = \"a\"\n[axes]\nV0 = { count = 3 }", 3, &["V0", "fits whole numbers only"]),
         ("name = \"a\"\n[axes]\nN = { count = 3 }", 3, &["N = 0", "first"]),
         ("name = \"a\"\n[axes]\nseed = { count = 0 }", 3, &["count = 0", "a whole number from 1"]),
         ("name = \"a\"\n[axes]\nbreak_on = { linear = [1, 2], points = 2 }", 3, &["list its values"]),
