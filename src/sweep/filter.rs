@@ -136,33 +136,27 @@ fn tokens(text: &str) -> Result<Vec<Token>, ConditionError> {
     let mut next = 0;
     while let Some(&character) = characters.get(next) {
         let start = next;
-        let while_in = |from: usize, allowed: &dyn Fn(char) -> bool| {
-            from + characters[from..].iter().take_while(|character| allowed(**character)).count()
-        };
-        next = match character {
-            character if character.is_whitespace() => {
-                next += 1;
-                continue;
-            }
-            'a'..='z' | 'A'..='Z' | '_' => while_in(start, &|c| c.is_ascii_alphanumeric() || c == '_'),
-            '0'..='9' | '.' => {
-                let mantissa = while_in(start, &|c| c.is_ascii_digit() || c == '.');
-                if matches!(characters.get(mantissa), Some('e' | 'E')) {
-                    let signed = usize::from(matches!(characters.get(mantissa + 1), Some('+' | '-')));
-                    while_in(mantissa + 1 + signed, &|c| c.is_ascii_alphanumeric())
-                } else {
-                    while_in(mantissa, &|c| c.is_ascii_alphanumeric() || c == '_')
+        next += 1;
+        match character {
+            _ if character.is_whitespace() => continue,
+            'a'..='z' | 'A'..='Z' | '0'..='9' | '_' | '.' => {
+                let is_number = !character.is_ascii_alphabetic();
+                while characters.get(next).is_some_and(|&c| match c {
+                    '+' | '-' => is_number && matches!(characters[next - 1], 'e' | 'E'),
+                    _ => c.is_ascii_alphanumeric() || c == '_' || c == '.',
+                }) {
+                    next += 1;
                 }
             }
-            '<' | '>' | '=' | '!' => start + 1 + usize::from(characters.get(start + 1) == Some(&'=')),
-            '+' | '-' | '*' | '/' | '(' | ')' => start + 1,
+            '<' | '>' | '=' | '!' => next += usize::from(characters.get(next) == Some(&'=')),
+            '+' | '-' | '*' | '/' | '(' | ')' => {}
             other => {
                 let problem = format!(
                     "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ), < <= > >= == !=, and, or"
                 );
-                return Err(ConditionError { position: start + 1, problem });
+                return Err(ConditionError { position: next, problem });
             }
-        };
+        }
         tokens.push(Token { position: start + 1, text: characters[start..next].iter().collect() });
         if tokens.len() > MAX_TOKENS {
             let problem = format!("more than {MAX_TOKENS} words and signs; split it into a list of conditions");
