@@ -1,15 +1,16 @@
-//! The paper's equations: parameters, drive, slider, interface, disorder, theory. Knows no solver and no file.
+//! The paper's equations: parameters, equation of motion, drive, interface, disorder, theory. Knows no solver and no file.
 
 mod disorder;
 mod drive;
+pub mod equation;
 mod interface;
 mod parameters;
-pub mod slider;
 pub mod theory;
 
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
 pub use interface::{Change, ContactEvent, Interface};
+#[cfg(feature = "sweeps")]
 pub(crate) use parameters::Shortest;
 pub use parameters::{BreakOn, Description, ParameterError, Parameters, Symbol, Value};
 

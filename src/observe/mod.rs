@@ -3,12 +3,14 @@
 //! Knows no solver's inside and no file. Each observer computes one thing; a run holds those that its sweep asks for.
 
 mod drops;
+mod measure;
 mod phase;
 mod rupture;
 mod sample;
 mod slip;
 
 pub use drops::Drops;
+pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use rupture::{Rupture, advance_speed};
 pub use sample::{AttachedMap, ContactLog, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};

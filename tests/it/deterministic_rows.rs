@@ -2,7 +2,7 @@
 //!
 //! Reference values were computed independently of this program; each test allows the rounding of their last digit.
 
-use stickslip::model::slider::{StiffnessMatrix, largest_frequency, stability_limit};
+use stickslip::model::equation::{StiffnessMatrix, largest_frequency, stability_limit};
 use stickslip::model::theory::{
     decay_per_block, exact_decay_per_block, load_maximum_phase, minimum_phase, minimum_phase_asymptote,
     rigid_block_friction, total_strength,

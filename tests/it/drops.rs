@@ -3,8 +3,7 @@
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use stickslip::model::Parameters;
-use stickslip::observe::{Drops, Recording, Slip};
-use stickslip::run::kernel;
+use stickslip::observe::{Drops, Recording, Slip, measure};
 use stickslip::solver::Solver;
 
 /// Slips of four seeds.
@@ -12,7 +11,7 @@ fn slips(parameters: &Parameters, slips: u64, drop_size: Option<f64>) -> Vec<Sli
     let recording = Recording { slips, drop_size, ..Recording::default() };
     let of_seed = |seed| {
         let parameters = Parameters { seed, ..parameters.clone() };
-        kernel(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap().slips
+        measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap().slips
     };
     (0..4_u64).into_par_iter().flat_map_iter(of_seed).collect()
 }

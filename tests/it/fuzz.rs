@@ -10,11 +10,12 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use stickslip::run::{Options, Shard, compact, kernel, run, verify};
-use stickslip::store::dataset::Reader;
-use stickslip::store::manifest::Directory;
-use stickslip::store::storage::Disk;
+use stickslip::observe::measure;
+use stickslip::results::manifest::Directory;
+use stickslip::run::{Options, Shard, compact, run, verify};
 use stickslip::sweep::Sweep;
+use stickslip::table::file::Reader;
+use stickslip::table::storage::Disk;
 
 /// No case takes longer; it takes milliseconds.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -155,7 +156,8 @@ static RESULTS: LazyLock<Results> = LazyLock::new(|| {
         let options =
             Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
         let (recording, solver) = (*sweep.recording(), sweep.solver());
-        let kernel = |job: &stickslip::sweep::Job, stop: &AtomicBool| kernel(&job.parameters, &recording, solver, stop);
+        let kernel =
+            |job: &stickslip::sweep::Job, stop: &AtomicBool| measure(&job.parameters, &recording, solver, stop);
         run(&Disk, &sweep, &folder.path().join(name), options, &kernel, &mut |_| ()).unwrap();
     }
     compact(&Disk, &folder.path().join("compacted")).unwrap();
@@ -262,7 +264,7 @@ proptest! {
         prop_assert_eq!(verification.whole, !is_changed);
         prop_assert!(!is_changed || verification.problems.iter().any(|problem| problem.path == file));
         // What is read of the footer alone, before any seal is looked at, may be refused but must not break.
-        let _ = stickslip::store::dataset::footer(&Disk, &file);
+        let _ = stickslip::table::file::footer(&Disk, &file);
         prop_assert!(begin.elapsed() < LONGEST);
     }
 }

@@ -8,6 +8,7 @@ mod damage;
 mod deterministic_rows;
 mod drops;
 mod energy_ledger;
+mod equation_of_motion;
 mod failures;
 mod figures;
 mod fuzz;

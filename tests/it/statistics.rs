@@ -12,12 +12,11 @@
 
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use stickslip::model::slider::StiffnessMatrix;
+use stickslip::model::equation::StiffnessMatrix;
 use stickslip::model::theory::exact_decay_per_block;
 use stickslip::model::{Change, ContactEvent, Parameters};
-use stickslip::observe::Recording;
+use stickslip::observe::{Recording, measure};
 use stickslip::reduce::quantile;
-use stickslip::run::kernel;
 use stickslip::solver::{Limits, Observer, Segment, Solver, simulate};
 
 /// Intervals between slips past start-up, in s, sorted.
@@ -29,7 +28,7 @@ impl Intervals {
         let recording = Recording { slips, ..Recording::default() };
         let of_seed = |seed| {
             let parameters = Parameters { seed, ..parameters.clone() }.validated().unwrap();
-            let result = kernel(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
+            let result = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
             result.slips.iter().filter_map(|slip| slip.interval).collect::<Vec<_>>()
         };
         let mut intervals: Vec<f64> = (0..seeds).into_par_iter().flat_map_iter(of_seed).collect();

@@ -4,8 +4,8 @@
 //! as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two which
 //! prepare the same files at once never write into each other's.
 
-use crate::store::layout::Layout;
-use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
+use crate::results::layout::Layout;
+use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
 use std::ffi::OsString;
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, ErrorKind};
@@ -150,7 +150,7 @@ pub fn clear(storage: &dyn Storage, staging: &Path) -> Result<(), StorageError> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::storage::Disk;
+    use crate::table::storage::Disk;
     use std::fs;
 
     #[test]

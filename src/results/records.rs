@@ -2,7 +2,7 @@
 
 use crate::model::{Change, ContactEvent};
 use crate::observe::{MapRow, ProfileRow, TraceRow};
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// Shear force and displacement at regular instants.
 pub fn trace() -> Table<TraceRow> {

@@ -3,15 +3,15 @@
 use super::rows::{TableFiles, check};
 use super::survivors::{Survivors, survivors};
 use super::{Problem, Remedy, Verification, problem_of};
-use crate::store::compact::Without;
-use crate::store::compaction::{Compaction, compacted_files};
-use crate::store::dataset::DatasetError;
-use crate::store::layout::{Layout, compacted_file};
-use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::seal;
-use crate::store::storage::Storage;
-use crate::store::tables;
+use crate::results::compact::Without;
+use crate::results::compaction::{Compaction, compacted_files};
+use crate::results::layout::{Layout, compacted_file};
+use crate::results::manifest::{Directory, DirectoryError};
+use crate::results::tables;
 use crate::sweep::Plan;
+use crate::table::checksum;
+use crate::table::file::DatasetError;
+use crate::table::storage::Storage;
 use std::path::PathBuf;
 
 /// Verifies the compacted files. Gives the directory with what of them can be kept, and what cannot.
@@ -97,7 +97,7 @@ fn is_whole(storage: &dyn Storage, directory: &Directory, record: &Compaction) -
     for (table, files) in &record.files {
         for (number, file) in files.iter().enumerate() {
             let path = layout.table(table).join(file);
-            if *file != compacted_file(number, &seal::check(storage, &path)?) {
+            if *file != compacted_file(number, &checksum::check(storage, &path)?) {
                 return Err(DatasetError::damaged(&path)("it is another file than its name tells"));
             }
         }

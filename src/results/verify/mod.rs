@@ -19,13 +19,13 @@ mod survivors;
 
 pub use repair::{RepairError, Repaired, repair};
 
-use crate::store::compact::Without;
-use crate::store::dataset::DatasetError;
-use crate::store::layout::part_name;
-use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError};
+use crate::results::compact::Without;
+use crate::results::layout::part_name;
+use crate::results::manifest::{Directory, DirectoryError};
 use crate::sweep::Plan;
+use crate::table::checksum;
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -149,7 +149,7 @@ fn examine(
     let reduced = directory.layout().reduced();
     for name in storage.list(&reduced).map_err(StorageError::at("list", &reduced))? {
         let path = reduced.join(name);
-        if let Err(error) = seal::check(storage, &path) {
+        if let Err(error) = checksum::check(storage, &path) {
             verification.problems.push(Problem::of_file(path, problem_of(&error), Remedy::Reduce));
         }
     }

@@ -1,11 +1,11 @@
 //! Repair: what is damaged is moved to `run/quarantine/`, what can be restored is restored; the next run does the rest.
 
 use super::{Remedy, Verification, beginning, examine};
-use crate::store::compact::{CompactError, compact, move_away};
-use crate::store::layout::file_of;
-use crate::store::manifest::DirectoryError;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::compact::{CompactError, compact, move_away};
+use crate::results::layout::file_of;
+use crate::results::manifest::DirectoryError;
+use crate::results::tables;
+use crate::table::storage::{Storage, StorageError};
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -1,13 +1,13 @@
 //! What a directory belongs to: manifest and copies of sweep files hold the same texts, so either restores the other.
 
 use super::{Problem, Remedy};
-use crate::store::dataset::{files, footer};
-use crate::store::layout::{Layout, name_of};
-use crate::store::manifest::{Directory, DirectoryError, Manifest, read_alone, read_text};
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::layout::{Layout, name_of};
+use crate::results::manifest::{Directory, DirectoryError, Manifest, read_alone, read_text};
+use crate::results::tables;
 use crate::sweep::Sweep;
+use crate::table::checksum;
+use crate::table::file::{files, footer};
+use crate::table::storage::{Storage, StorageError};
 use std::path::Path;
 
 /// Reads the sweeps of a directory, from where they are whole; what is not is a problem.
@@ -125,6 +125,6 @@ fn part_texts(storage: &dyn Storage, layout: &Layout, epoch: usize) -> Option<St
     let of_epoch = parts
         .into_iter()
         .filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&begins)));
-    let mut whole = of_epoch.filter(|path| seal::check(storage, path).is_ok());
+    let mut whole = of_epoch.filter(|path| checksum::check(storage, path).is_ok());
     footer(storage, &whole.next()?).ok()?.remove("sweep")
 }

@@ -13,7 +13,7 @@
 //! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
 //! folders: a stray file of any name there breaks some reader.
 
-use crate::store::tables;
+use crate::results::tables;
 use crate::sweep::Part;
 use std::path::{Path, PathBuf};
 
@@ -167,7 +167,7 @@ pub fn file_of(part: &str) -> String {
     format!("{part}.{EXTENSION}")
 }
 
-/// Name of a compacted file with this number and [seal](crate::store::seal).
+/// Name of a compacted file with this number and [seal](crate::table::checksum).
 #[must_use]
 pub fn compacted_file(number: usize, seal: &str) -> String {
     format!("{COMPACT}{number:06}-{}.{EXTENSION}", &seal[..SEAL_CHARACTERS])

@@ -4,15 +4,15 @@
 
 use super::problem_of;
 use super::rows::{groups, jobs};
-use crate::store::compaction::{Compaction, compacted_files};
-use crate::store::dataset::DatasetError;
-use crate::store::layout::{compacted_file, part_file, part_name};
-use crate::store::manifest::Directory;
-use crate::store::part::label;
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::compaction::{Compaction, compacted_files};
+use crate::results::layout::{compacted_file, part_file, part_name};
+use crate::results::manifest::Directory;
+use crate::results::part::label;
+use crate::results::tables;
 use crate::sweep::Plan;
+use crate::table::checksum;
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 
@@ -59,7 +59,7 @@ pub(super) fn survivors(
         names.retain(|name| {
             let path = folder.join(name);
             let number = name.split('-').nth(1).and_then(|number| number.parse().ok()).unwrap_or(usize::MAX);
-            let problem = match seal::check(storage, &path) {
+            let problem = match checksum::check(storage, &path) {
                 Ok(seal) if *name == compacted_file(number, &seal) => return true,
                 Ok(_) => "it is another file than its name tells".to_owned(),
                 Err(error) => problem_of(&error),

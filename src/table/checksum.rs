@@ -3,8 +3,8 @@
 //! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the footer
 //! under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of its pages.
 
-use crate::store::dataset::DatasetError;
-use crate::store::storage::{Storage, StorageError};
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
@@ -14,9 +14,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// The footer's key of the seal.
-pub const KEY: &str = "seal";
+pub const FOOTER_KEY: &str = "seal";
 /// What stands in its place while the hash is taken.
-pub const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// How the format writes a key of 4 and a text of 64 characters. No sweep file may hold such control characters.
 const MARK: &[u8] = b"\x18\x04seal\x18\x40";
 /// Bytes after the footer: its length in four of them, and [`MAGIC`].
@@ -40,7 +40,7 @@ pub fn hexadecimal(hash: &[u8]) -> String {
 fn place(end: &[u8]) -> Option<usize> {
     let mark = end.windows(MARK.len()).position(|bytes| bytes == MARK)?;
     let place = mark + MARK.len();
-    (place + BLANK.len() <= end.len()).then_some(place)
+    (place + PLACEHOLDER.len() <= end.len()).then_some(place)
 }
 
 /// Seals a file whose footer comes last: `hasher` has seen all bytes before it. Gives the seal.
@@ -48,7 +48,7 @@ pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
     let place = place(footer)?;
     hasher.update(&*footer);
     let seal = hexadecimal(&hasher.finalize());
-    footer[place..place + BLANK.len()].copy_from_slice(seal.as_bytes());
+    footer[place..place + PLACEHOLDER.len()].copy_from_slice(seal.as_bytes());
     Some(seal)
 }
 
@@ -82,8 +82,8 @@ fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
     let Some(place) = place(&bytes) else { return Ok(Err("it has no seal")) };
-    let seal = bytes[place..place + BLANK.len()].to_owned();
-    bytes[place..place + BLANK.len()].copy_from_slice(BLANK.as_bytes());
+    let seal = bytes[place..place + PLACEHOLDER.len()].to_owned();
+    bytes[place..place + PLACEHOLDER.len()].copy_from_slice(PLACEHOLDER.as_bytes());
 
     let mut hasher = Sha256::new();
     file.seek(SeekFrom::Start(0))?;
@@ -133,9 +133,9 @@ pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::columns::{Column, Getter, Table};
-    use crate::store::dataset::{Footer, TableWriter};
-    use crate::store::storage::Disk;
+    use crate::table::columns::{Column, Getter, Table};
+    use crate::table::file::{Footer, TableWriter};
+    use crate::table::storage::Disk;
     use std::collections::BTreeMap;
     use std::fs;
 

@@ -4,10 +4,10 @@
 //! that fit in memory are sorted, then merged a few at a time. The order is (V0, Delta, T, set, seed), then that within the
 //! job; every table has these columns. Memory: one run, or a batch of each of the files that are merged at once.
 
-use crate::store::columns::Table;
-use crate::store::dataset::{Batch, DatasetError, Footer, Reader, TableWriter};
-use crate::store::layout::compacted_file;
-use crate::store::storage::{Storage, StorageError};
+use crate::results::layout::compacted_file;
+use crate::table::columns::Table;
+use crate::table::file::{Batch, DatasetError, Footer, Reader, TableWriter};
+use crate::table::storage::{Storage, StorageError};
 use arrow_array::Array;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -313,8 +313,8 @@ impl<Row> Target<'_, Row> {
 mod tests {
     use super::*;
     use crate::model::{Parameters, Symbol};
-    use crate::store::columns::{Column, Getter};
-    use crate::store::storage::Disk;
+    use crate::table::columns::{Column, Getter};
+    use crate::table::storage::Disk;
     use std::fs;
 
     /// A row: its job's parameters and its number within the job.

@@ -3,21 +3,22 @@
 //! A part has one file in each table. The one in `jobs` comes last, so a part is done exactly if that is there, or if its
 //! rows were compacted.
 
-use crate::store::columns::Table;
-use crate::store::commit::{Commit, create_folder};
-use crate::store::dataset::{Batch, DatasetError, Footer, Reader, TableWriter, files};
-use crate::store::layout::{Layout, is_compacted, part_file};
-use crate::store::manifest::Directory;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables::{self, FAILED, JobLabel, JobResult, JobRow, PrecursorRow, SlipRow};
+use crate::observe::Measurements;
+use crate::results::commit::{Commit, create_folder};
+use crate::results::layout::{Layout, is_compacted, part_file};
+use crate::results::manifest::Directory;
+use crate::results::tables::{self, FAILED, JobLabel, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::{Part, Sweep};
+use crate::table::columns::Table;
+use crate::table::file::{Batch, DatasetError, Footer, Reader, TableWriter, files};
+use crate::table::storage::{Storage, StorageError};
 use arrow_array::Array;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// What a job of a part ended with: its measurements, or why it failed.
-pub type Outcome = Result<JobResult, String>;
+pub type Outcome = Result<Measurements, String>;
 
 /// What every row says about job number `position` of a part.
 #[must_use]

@@ -8,14 +8,14 @@
 mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
-use crate::store::commit::{Commit, clear, create_folder};
-use crate::store::compaction::Compaction;
-use crate::store::dataset::{DatasetError, PROGRAM};
-use crate::store::layout::{Layout, RUN, RUN_FOLDERS};
-use crate::store::seal;
-use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
-use crate::store::tables;
+use crate::results::commit::{Commit, clear, create_folder};
+use crate::results::compaction::Compaction;
+use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
+use crate::results::tables;
 use crate::sweep::{Job, PLAN_VERSION, Part, Sweep, SweepError};
+use crate::table::checksum;
+use crate::table::file::{DatasetError, PROGRAM};
+use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
 use arrow_schema::Schema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -330,7 +330,7 @@ impl Directory {
             commit.stage_bytes(&self.layout.sweep(epoch), sweep.text().as_bytes())?;
         }
         let path = self.layout.manifest();
-        let text = seal::to_json(manifest)
+        let text = checksum::to_json(manifest)
             .map_err(|error| DirectoryError::Damaged { path: path.clone(), problem: error.to_string() })?;
         // Last, so that a manifest never names a sweep that is not there.
         commit.stage_bytes(&path, text.as_bytes())?;
@@ -386,7 +386,7 @@ pub(super) fn read_alone(storage: &dyn Storage, layout: &Layout) -> Result<Optio
     if format != FORMAT {
         return Err(DirectoryError::Format { path, format });
     }
-    let manifest: Manifest = seal::from_json(&text).map_err(|problem| damaged(&path, problem))?;
+    let manifest: Manifest = checksum::from_json(&text).map_err(|problem| damaged(&path, problem))?;
     if manifest.current >= manifest.sweeps.len() {
         return Err(damaged(&path, format!("there is no sweep {}", manifest.current)));
     }

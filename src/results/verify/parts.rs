@@ -2,14 +2,14 @@
 
 use super::rows::{TableFiles, check};
 use super::{Problem, Remedy, Verification, problem_of};
-use crate::store::compact::Without;
-use crate::store::dataset::{DatasetError, footer, has_columns};
-use crate::store::layout::{EXTENSION, file_of, is_compacted, named_part, part_file, part_name};
-use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::compact::Without;
+use crate::results::layout::{EXTENSION, file_of, is_compacted, named_part, part_file, part_name};
+use crate::results::manifest::{Directory, DirectoryError};
+use crate::results::tables;
 use crate::sweep::{Part, Plan};
+use crate::table::checksum;
+use crate::table::file::{DatasetError, footer, has_columns};
+use crate::table::storage::{Storage, StorageError};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -118,7 +118,7 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
             continue;
         }
         // What a killed run left is whole, too, and is read by those who read the folder.
-        if let Err(error) = seal::check(storage, &path).and_then(|_| belongs(storage, directory, part, &path)) {
+        if let Err(error) = checksum::check(storage, &path).and_then(|_| belongs(storage, directory, part, &path)) {
             errors.push(error);
         }
     }

@@ -3,12 +3,12 @@
 //! The names of compacted files hold their seals, so a record fits one state of the tables alone. While tables are
 //! exchanged the file has the records before and after: which of them holds is told by the files that are there.
 
-use crate::store::commit::Commit;
-use crate::store::dataset::DatasetError;
-use crate::store::layout::{Layout, is_compacted, name_of};
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::commit::Commit;
+use crate::results::layout::{Layout, is_compacted, name_of};
+use crate::results::tables;
+use crate::table::checksum;
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Read as _};
@@ -83,7 +83,7 @@ impl Compaction {
             Err(error) if error.kind() == ErrorKind::InvalidData => return Err(DatasetError::damaged(&path)(error)),
             read => read.map_err(StorageError::at("read", &path))?,
         };
-        let record: Record = seal::from_json(&text).map_err(DatasetError::damaged(&path))?;
+        let record: Record = checksum::from_json(&text).map_err(DatasetError::damaged(&path))?;
         if record.format != FORMAT {
             return Err(DatasetError::damaged(&path)(format!("it has format {}, not {FORMAT}", record.format)));
         }
@@ -96,7 +96,7 @@ impl Compaction {
     /// When it cannot be written.
     pub fn stage(commit: &mut Commit<'_>, layout: &Layout, compactions: Vec<Self>) -> Result<(), DatasetError> {
         let path = layout.compacted();
-        let text = seal::to_json(&Record { format: FORMAT, compactions }).map_err(DatasetError::damaged(&path))?;
+        let text = checksum::to_json(&Record { format: FORMAT, compactions }).map_err(DatasetError::damaged(&path))?;
         Ok(commit.stage_bytes(&path, text.as_bytes())?)
     }
 

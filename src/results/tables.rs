@@ -3,10 +3,9 @@
 //! Quantities are SI. Nothing in a table tells when, where or how fast it was computed.
 
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Precursor, Slip};
-use crate::solver::Summary;
-use crate::store::columns::{Column, Getter, Table};
-use crate::store::records;
+use crate::observe::{Measurements, Precursor, Slip};
+use crate::results::records;
+use crate::table::columns::{Column, Getter, Table};
 
 /// Outcome of a job that recorded all its slips.
 pub const DONE: &str = "done";
@@ -14,28 +13,6 @@ pub const DONE: &str = "done";
 pub const TIME_LIMIT: &str = "time limit";
 /// Outcome of a job that could not be finished.
 pub const FAILED: &str = "failed";
-
-/// What a job measured.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct JobResult {
-    /// Slips past start-up, in order.
-    pub slips: Vec<Slip>,
-    /// Their precursors, in order; empty if not recorded.
-    pub precursors: Vec<Precursor>,
-    /// The job as a whole.
-    pub record: JobRecord,
-}
-
-/// Measurements of a job as a whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct JobRecord {
-    /// Ruptures of any size, start-up included.
-    pub ruptures: u64,
-    /// Time average of the shear force `F_S` past start-up, in N; `None` if start-up did not end.
-    pub mean_friction: Option<f64>,
-    /// How the solver ended and what it did.
-    pub summary: Summary,
-}
 
 /// What every row says about its job.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,19 +49,19 @@ pub struct JobRow<'a> {
     /// The job.
     pub job: &'a JobLabel,
     /// What it measured, or why it failed.
-    pub result: Result<&'a JobResult, &'a str>,
+    pub result: Result<&'a Measurements, &'a str>,
 }
 
 impl JobRow<'_> {
     fn outcome(&self) -> &'static str {
         match self.result {
             Err(_) => FAILED,
-            Ok(result) if result.record.summary.satisfied => DONE,
+            Ok(result) if result.summary.satisfied => DONE,
             Ok(_) => TIME_LIMIT,
         }
     }
 
-    fn measured<T>(&self, of: impl FnOnce(&JobResult) -> T) -> Option<T> {
+    fn measured<T>(&self, of: impl FnOnce(&Measurements) -> T) -> Option<T> {
         self.result.ok().map(of)
     }
 }
@@ -265,43 +242,38 @@ pub fn jobs<'a>() -> Table<JobRow<'a>> {
             "ruptures",
             "",
             "ruptures of any size, start-up included",
-            OptionalCount(|row| row.measured(|result| result.record.ruptures)),
+            OptionalCount(|row| row.measured(|result| result.ruptures)),
         ),
-        Column::new(
-            "breaks",
-            "",
-            "contacts broken",
-            OptionalCount(|row| row.measured(|result| result.record.summary.breaks)),
-        ),
+        Column::new("breaks", "", "contacts broken", OptionalCount(|row| row.measured(|result| result.summary.breaks))),
         Column::new(
             "reattachments",
             "",
             "contacts reattached",
-            OptionalCount(|row| row.measured(|result| result.record.summary.reattachments)),
+            OptionalCount(|row| row.measured(|result| result.summary.reattachments)),
         ),
         Column::new(
             "mean_friction",
             "N",
             "time average of the shear force past start-up",
-            OptionalReal(|row| row.measured(|result| result.record.mean_friction).flatten()),
+            OptionalReal(|row| row.measured(|result| result.mean_friction).flatten()),
         ),
         Column::new(
             "simulated_time",
             "s",
             "model time reached",
-            OptionalReal(|row| row.measured(|result| result.record.summary.end_time)),
+            OptionalReal(|row| row.measured(|result| result.summary.end_time)),
         ),
         Column::new(
             "steps",
             "",
             "steps of the solver",
-            OptionalCount(|row| row.measured(|result| result.record.summary.steps)),
+            OptionalCount(|row| row.measured(|result| result.summary.steps)),
         ),
         Column::new(
             "leaps",
             "",
             "of these, leaps over quiet time",
-            OptionalCount(|row| row.measured(|result| result.record.summary.leaps)),
+            OptionalCount(|row| row.measured(|result| result.summary.leaps)),
         ),
     ]);
     Table { name: "jobs", meaning: "One row per job", columns }
@@ -319,7 +291,7 @@ pub fn markdown() -> String {
 pub(crate) mod tests {
     use super::*;
     use crate::observe::Modulation;
-    use crate::store::columns::tests::assert_documented;
+    use crate::table::columns::tests::assert_documented;
     use arrow_array::cast::AsArray;
     use arrow_array::types::Int64Type;
 

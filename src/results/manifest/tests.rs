@@ -1,8 +1,8 @@
 //! Directories that are begun, changed, damaged, somebody else's, or begun by two runs at once.
 
 use super::*;
-use crate::store::storage::Disk;
-use crate::store::storage::over_disk::{Access, OverDisk};
+use crate::table::storage::Disk;
+use crate::table::storage::over_disk::{Access, OverDisk};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
@@ -81,16 +81,16 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
     refused("[model]\nK = 2e8\n[record]\nslips = 4", &["model.K", "record.slips: 3 -> 4"]);
     let path = root.path().join("run/manifest.json");
     let text = fs::read_to_string(&path).unwrap();
-    let mut other: Manifest = seal::from_json(&text).unwrap();
+    let mut other: Manifest = checksum::from_json(&text).unwrap();
     other.rng_scheme = "dice".to_owned();
     other.tables.get_mut("slips").unwrap().iter_mut().filter(|column| *column == "onset").for_each(|column| {
         *column = "start".to_owned();
     });
-    fs::write(&path, seal::to_json(&other).unwrap()).unwrap();
+    fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
     refused("[model]\nK = 1e8\n[record]\nslips = 3", &["random numbers: dice -> ", "without [\"start\"]"]);
-    let mut other: Manifest = seal::from_json(&text).unwrap();
+    let mut other: Manifest = checksum::from_json(&text).unwrap();
     other.identity = "0".repeat(32);
-    fs::write(&path, seal::to_json(&other).unwrap()).unwrap();
+    fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
     refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
     fs::write(&path, text.replace("\"format\": 3", "\"format\": 4, \"new\": 0")).unwrap();
     let error = Directory::read(&Disk, root.path()).unwrap_err().to_string();

@@ -5,11 +5,11 @@
 //! not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
-use crate::store::columns::{DESCRIPTION, RowBuffer, Table, UNIT};
-use crate::store::layout::EXTENSION;
-use crate::store::seal;
-use crate::store::storage::{Storage, StorageError, StoredFile};
+use crate::results::layout::EXTENSION;
 use crate::sweep::Sweep;
+use crate::table::checksum;
+use crate::table::columns::{DESCRIPTION, RowBuffer, Table, UNIT};
+use crate::table::storage::{Storage, StorageError, StoredFile};
 use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
@@ -120,7 +120,7 @@ impl Footer {
     fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
         let (units, meaning) = (by_name(schema, UNIT), by_name(schema, DESCRIPTION));
         let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
-        let footer = footer.with(seal::KEY, seal::BLANK);
+        let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let mut properties = WriterProperties::builder()
             .set_created_by(concat!("stickslip version ", env!("CARGO_PKG_VERSION")).to_owned())
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
@@ -237,7 +237,7 @@ impl<Row> TableWriter<Row> {
         }
         let (path, mut file) = (self.path, self.file);
         let footer = self.writer.into_inner().and_then(|mut footer| {
-            let sealed = seal::close(self.hasher, &mut footer);
+            let sealed = checksum::close(self.hasher, &mut footer);
             sealed.map(|seal| (seal, footer)).ok_or_else(|| ParquetError::General("the footer has no seal".to_owned()))
         });
         let (seal, footer) = footer.map_err(|source| DatasetError::Write { path: path.clone(), source })?;
@@ -368,7 +368,7 @@ impl<'a> Reader<'a> {
 
     /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
     fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
-        seal::check(self.storage, path)?;
+        checksum::check(self.storage, path)?;
         let file = self.storage.open(path).map_err(StorageError::at("read", path))?;
         decode(path, || {
             let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
@@ -413,8 +413,8 @@ impl Iterator for Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::columns::{Column, Getter};
-    use crate::store::storage::Disk;
+    use crate::table::columns::{Column, Getter};
+    use crate::table::storage::Disk;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use std::fs::{self, File};
 

@@ -5,17 +5,17 @@
 //! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step
 //! leaves the tables of before or of after.
 
-use crate::store::columns::Table;
-use crate::store::commit::{Commit, create_folder};
-use crate::store::compaction::Compaction;
-use crate::store::dataset::{DatasetError, Footer, footer};
-use crate::store::layout::{Layout, part_file, part_name};
-use crate::store::manifest::Directory;
-use crate::store::merge::Merge;
-use crate::store::part::{failures, label};
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables;
+use crate::results::commit::{Commit, create_folder};
+use crate::results::compaction::Compaction;
+use crate::results::layout::{Layout, part_file, part_name};
+use crate::results::manifest::Directory;
+use crate::results::merge::Merge;
+use crate::results::part::{failures, label};
+use crate::results::tables;
 use crate::sweep::Plan;
+use crate::table::columns::Table;
+use crate::table::file::{DatasetError, Footer, footer};
+use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use std::collections::{BTreeSet, HashSet};
 use std::io::ErrorKind;

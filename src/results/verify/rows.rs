@@ -1,7 +1,7 @@
 //! Rows of all tables held against each other: the same jobs in the same order, each with as many slips as it tells of.
 
-use crate::store::dataset::{Batch, DatasetError, Reader};
-use crate::store::storage::Storage;
+use crate::table::file::{Batch, DatasetError, Reader};
+use crate::table::storage::Storage;
 use arrow_array::Array;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
