@@ -1,5 +1,4 @@
 //! Hard cases: every one ends as it must, and says so.
-#![allow(clippy::tests_outside_test_module, reason = "an integration test")]
 
 use stickslip::accuracy::{HardCase, hard_cases};
 use stickslip::model::{Change, Parameters};

@@ -9,7 +9,6 @@
 //! | Δ = 0, identical contacts | 0.1118 (5) | 0.0157 | 0.0989 0.1037 0.1076 0.1129 0.1508 |
 //! | Δ = 1 µm, 1/T = 29 Hz | 0.1371 (6) | 0.0164 | 0.1262 0.1343 0.1378 0.1399 0.1447 |
 //! | Δ = 1 µm, 1/T = 58 Hz | 0.1273 (12) | 0.0364 | 0.0692 0.0993 0.1376 0.1381 0.2065 |
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;

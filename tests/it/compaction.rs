@@ -1,11 +1,8 @@
 //! Compaction by the built program: the same bytes whatever the history, every row once for readers at any time and after
 //! any kill, and a directory that goes on working.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
+use crate::program::Folder;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use program::Folder;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;

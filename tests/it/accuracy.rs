@@ -1,9 +1,6 @@
 //! Scaling on the command line: tables, JSON and figure tell the same.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{Folder, json};
+use crate::program::{Folder, json};
 
 #[test]
 fn scaling_writes_what_it_prints() {

@@ -1,9 +1,6 @@
 //! Jobs that fail, in the built program: they stop no other, are told with their reason, and can be had again alone.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{FAILING, Folder, json};
+use crate::program::{FAILING, Folder, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use stickslip::sweep::Sweep;

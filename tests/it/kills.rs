@@ -1,10 +1,7 @@
 //! The built program, killed at random instants many times over: nothing that was committed is lost, run again or there
 //! twice, and the tables end with the bytes of an uninterrupted run.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{Folder, MANY, MANY_PARTS, wait};
+use crate::program::{Folder, MANY, MANY_PARTS, wait};
 use std::collections::BTreeSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};

@@ -1,10 +1,7 @@
 //! One simulation on the command line: the first break of the model, the same slips as in a sweep, and records that agree
 //! with each other.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{Folder, Rows};
+use crate::program::{Folder, Rows};
 use std::collections::BTreeMap;
 
 /// Fig. 1's driving spring, in N/m, and velocity, in m/s.
@@ -177,7 +174,7 @@ fn a_sweep_file_of_one_job_is_simulated_like_its_flags() {
     folder.write("one.toml", text);
     let simulated = |job: &str, table: &str| {
         let report = folder.ends(0, &format!("simulate {job} --slip-table {table} --json")).stdout;
-        (program::json(&report)["job_id"].clone(), folder.file(table).cells)
+        (crate::program::json(&report)["job_id"].clone(), folder.file(table).cells)
     };
     let from_file = simulated("one.toml", "file.parquet");
     let from_flags = simulated("--set N=9 --set Delta=1e-6 --set seed=3 --set frequency=58 --slips 3", "flags.parquet");

@@ -1,9 +1,6 @@
 //! Which figures a sweep gets: those whose data it has, and no others.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::Folder;
+use crate::program::Folder;
 
 /// Always there under modulation.
 const MODULATED: [&str; 2] = ["phi-eta", "tau-T"];

@@ -1,7 +1,6 @@
 //! The model's deterministic numbers: strength, stiffness, frequencies, first break, Eq. 1 and Eq. 2.
 //!
 //! Reference values were computed independently of this program; each test allows the rounding of their last digit.
-#![allow(clippy::tests_outside_test_module, reason = "an integration test")]
 
 use stickslip::model::slider::{StiffnessMatrix, largest_frequency, stability_limit};
 use stickslip::model::theory::{

@@ -1,10 +1,7 @@
 //! Whole runs of the built program: where results lie, that interruptions, threads, shards and extensions leave no trace in
 //! them, and what exit codes say.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
+use crate::program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
 use std::fs;
 use std::path::PathBuf;
 

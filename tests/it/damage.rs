@@ -1,10 +1,7 @@
 //! A corpus of damage to results directories: each kind is found and named, nothing is changed by looking, and the commands
 //! that are printed make the tables what they were.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::Folder;
+use crate::program::Folder;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
 //! The built program, run in a folder of its own; and its tables, read back by another way than its own.
-#![allow(dead_code, reason = "each test file uses a part of it")]
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};

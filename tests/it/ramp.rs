@@ -1,5 +1,4 @@
 //! A ramp of the modulation within a run: the same in both solvers, exact, and balanced, also where it is steep.
-#![allow(clippy::tests_outside_test_module, reason = "an integration test")]
 
 use std::collections::HashMap;
 use stickslip::model::{Change, Parameters};

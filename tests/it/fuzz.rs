@@ -2,7 +2,6 @@
 //! hang, and never another result than that of the file as it was written.
 //!
 //! `PROPTEST_CASES` sets the number of cases of each test.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
 use proptest::prelude::*;
 use proptest::sample::Index;

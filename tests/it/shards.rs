@@ -1,9 +1,6 @@
 //! Several processes of the built program on one directory, and runs that have little time.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::{Folder, MANY, json, wait};
+use crate::program::{Folder, MANY, json, wait};
 use std::time::{Duration, Instant};
 
 /// A single part.

@@ -1,10 +1,7 @@
 //! Bad input, as sweep files and as flags of every command: exit code 2, a message with the key and the way out, and
 //! nothing written.
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
-mod program;
-
-use program::Folder;
+use crate::program::Folder;
 
 /// A small sweep that is right.
 const GOOD: &str = "name = \"good\"\n[model]\nN = 3\nNs = 4\n[record]\nslips = 2\n";

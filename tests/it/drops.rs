@@ -1,5 +1,4 @@
 //! Slips as the drops of the shear force show them, against those of the contacts (Fig. 1d).
-#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "an integration test")]
 
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;

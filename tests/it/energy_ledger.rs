@@ -1,5 +1,4 @@
 //! The energy ledger balances: an error certificate of every solver, on the model of Fig. 1.
-#![allow(clippy::tests_outside_test_module, reason = "an integration test")]
 
 use stickslip::model::Parameters;
 use stickslip::observe::ContactLog;
