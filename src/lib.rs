@@ -3,12 +3,12 @@
 //!
 //! ```text
 //! sweep file -> plan -> jobs -> kernel -> events -> tables -> reduced data -> figures
-//!               sweep/    run/    solver/   observe/  store/     reduce/         figure/
+//!               sweep/    run/    solver/   observe/  results/   reduce/         figure/
 //!                                 model/
 //! ```
 //!
-//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `store` <- `run`; `store` <- `reduce` <- `figure`.
-//! `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
+//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`.
+//! The feature `sweeps` gates all but `model`, `solver` and `observe`, the physics alone. `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -23,14 +23,22 @@
 //! | shard | a share of the parts, run by one process beside others; a claim keeps it from being run twice at once |
 //! | set | all jobs that differ in the seed alone |
 
+#[cfg(feature = "sweeps")]
 pub mod accuracy;
 #[cfg(test)]
 mod documented;
+#[cfg(feature = "sweeps")]
 pub mod figure;
 pub mod model;
 pub mod observe;
+#[cfg(feature = "sweeps")]
 pub mod reduce;
+#[cfg(feature = "sweeps")]
+pub mod results;
+#[cfg(feature = "sweeps")]
 pub mod run;
 pub mod solver;
-pub mod store;
+#[cfg(feature = "sweeps")]
 pub mod sweep;
+#[cfg(feature = "sweeps")]
+pub mod table;

@@ -4,7 +4,7 @@
 //! by name. Anything else is told with time and cause.
 
 use super::cpu;
-use crate::model::slider::{StiffnessMatrix, stability_limit};
+use crate::model::equation::{StiffnessMatrix, stability_limit};
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
 use crate::solver::{Limits, SimulationError, Solver, Summary, simulate_audited};

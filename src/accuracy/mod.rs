@@ -30,8 +30,8 @@ pub use write::{as_json, scaling_json, stability_json, write, write_scaling, wri
 use crate::figure::FigureError;
 use crate::model::Parameters;
 use crate::solver::{Limits, SimulationError, Solver};
-use crate::store::dataset::DatasetError;
-use crate::store::storage::StorageError;
+use crate::table::file::DatasetError;
+use crate::table::storage::StorageError;
 
 /// A study that cannot be made or written.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use super::scaling::{Exponents, SizeRow};
 use super::study::{DistanceRow, MethodRow};
 use crate::model::{Parameters, Symbol};
 use crate::solver::Solver;
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// Method of a solver, as sweep files name it.
 pub(super) fn method(solver: Solver) -> &'static str {
@@ -342,7 +342,7 @@ pub fn markdown() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::columns::tests::assert_documented;
+    use crate::table::columns::tests::assert_documented;
 
     #[test]
     fn documented_tables_of_accuracy_are_those_written() {

@@ -7,10 +7,10 @@ use super::tables::{distances, exponents, method, methods, sizes, stability};
 use super::{AccuracyError, Stability, cpu};
 use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
-use crate::store::columns::Table;
-use crate::store::commit::{Commit, create_folder};
-use crate::store::dataset::{Footer, PROGRAM, TableWriter};
-use crate::store::storage::Storage;
+use crate::results::commit::{Commit, create_folder};
+use crate::table::columns::Table;
+use crate::table::file::{Footer, PROGRAM, TableWriter};
+use crate::table::storage::Storage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -237,8 +237,8 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::solver::Solver;
-    use crate::store::dataset::Reader;
-    use crate::store::storage::Disk;
+    use crate::table::file::Reader;
+    use crate::table::storage::Disk;
 
     fn findings() -> Findings {
         let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });

@@ -9,7 +9,7 @@ use stickslip::accuracy::{
     self, Distances, Findings, MethodRow, Quantity, Scaling, ScalingFindings, Stability, Study, described,
     drive_in_words, hard_cases, scaling_json, stability_json,
 };
-use stickslip::store::storage::Disk;
+use stickslip::table::storage::Disk;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]

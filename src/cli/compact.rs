@@ -6,8 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use stickslip::store::compact::Compacted;
-use stickslip::store::storage::Disk;
+use stickslip::results::compact::Compacted;
+use stickslip::table::storage::Disk;
 
 /// Make few large sorted files of the tables of a results directory, the same bytes whatever its history
 #[derive(Debug, Args)]

@@ -1,13 +1,13 @@
 //! Exit codes, and which error ends with which.
 
 use stickslip::reduce::ReduceError;
+use stickslip::results::compact::CompactError;
+use stickslip::results::manifest::DirectoryError;
+use stickslip::results::verify::RepairError;
 use stickslip::run::{RunError, UpkeepError};
 use stickslip::solver::SimulationError;
-use stickslip::store::compact::CompactError;
-use stickslip::store::dataset::DatasetError;
-use stickslip::store::manifest::DirectoryError;
-use stickslip::store::verify::RepairError;
 use stickslip::sweep::SweepError;
+use stickslip::table::file::DatasetError;
 
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

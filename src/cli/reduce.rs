@@ -7,10 +7,10 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use stickslip::figure::draw_all;
 use stickslip::reduce::{self, ReductionSummary};
-use stickslip::store::dataset::Footer;
-use stickslip::store::layout::Layout;
-use stickslip::store::manifest::Directory;
-use stickslip::store::storage::Disk;
+use stickslip::results::layout::Layout;
+use stickslip::results::manifest::Directory;
+use stickslip::table::file::Footer;
+use stickslip::table::storage::Disk;
 
 /// Reduce the tables of a results directory to Fig. 3-style data
 #[derive(Debug, Args)]

@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stickslip::figure::draw_all;
+use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
-use stickslip::run::{Options, RunReport, Shard, kernel};
-use stickslip::store::manifest::Directory;
-use stickslip::store::storage::Disk;
+use stickslip::results::manifest::Directory;
+use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
+use stickslip::table::storage::Disk;
 
 /// Run a sweep, or go on with it; then reduce and plot
 #[derive(Debug, Args)]
@@ -111,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         &sweep,
         &root,
         options,
-        &|job, interrupt| kernel(&job.parameters, &recording, solver, interrupt),
+        &|job, interrupt| measure(&job.parameters, &recording, solver, interrupt),
         &mut |event| progress.show(event),
     )?;
     if arguments.json {

@@ -18,13 +18,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Description, Parameters, Symbol, Value};
-use stickslip::observe::{AttachedMap, ContactLog, Profile, Recording, RecordingKey, SlipObserver, Together, Trace};
-use stickslip::run::{limits, measured};
+use stickslip::observe::{
+    AttachedMap, ContactLog, Measurements, Profile, Recording, RecordingKey, SlipObserver, Together, Trace,
+};
+use stickslip::results::tables;
+use stickslip::results::tables::{JobLabel, SlipRow};
 use stickslip::solver::{self, Observer};
-use stickslip::store::dataset::Footer;
-use stickslip::store::tables;
-use stickslip::store::tables::{JobLabel, JobResult, SlipRow};
 use stickslip::sweep::{Job, Sweep, SweepError};
+use stickslip::table::file::Footer;
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
@@ -227,9 +228,9 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let never = AtomicBool::new(false);
     let begin = Instant::now();
     let mut observer = Together { lead: &mut slips, others };
-    let summary = solver::simulate(parameters, sweep.solver(), limits(sweep.recording(), &never), &mut observer)?;
+    let summary = solver::simulate(parameters, sweep.solver(), sweep.recording().limits(&never), &mut observer)?;
     let wall = begin.elapsed().as_secs_f64();
-    let result = measured(slips, summary);
+    let result = Measurements::new(slips, summary);
 
     let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
     let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
@@ -331,8 +332,8 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(json: bool, label: &JobLabel, JobResult { slips, record, .. }: &JobResult, wall: f64) -> Result<()> {
-    let summary = &record.summary;
+fn report(json: bool, label: &JobLabel, measured: &Measurements, wall: f64) -> Result<()> {
+    let (slips, summary) = (&measured.slips, &measured.summary);
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
     let report = Report {
@@ -341,10 +342,10 @@ fn report(json: bool, label: &JobLabel, JobResult { slips, record, .. }: &JobRes
         simulated_seconds: summary.end_time,
         slips: slips.len(),
         mean_interval_seconds: mean,
-        mean_friction_newtons: record.mean_friction,
+        mean_friction_newtons: measured.mean_friction,
         breaks: summary.breaks,
         reattachments: summary.reattachments,
-        ruptures: record.ruptures,
+        ruptures: measured.ruptures,
         steps: summary.steps,
         leaps: summary.leaps,
         wall_seconds: wall,

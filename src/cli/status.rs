@@ -5,9 +5,9 @@ use super::output;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
+use stickslip::results::manifest::Directory;
 use stickslip::run::Failure;
-use stickslip::store::manifest::Directory;
-use stickslip::store::storage::Disk;
+use stickslip::table::storage::Disk;
 
 /// Show what of a results directory is done, failed, missing and running, and the predicted time left
 #[derive(Debug, Args)]

@@ -6,9 +6,9 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use stickslip::store::layout::Layout;
-use stickslip::store::storage::Disk;
-use stickslip::store::verify::{Problem, Verification};
+use stickslip::results::layout::Layout;
+use stickslip::results::verify::{Problem, Verification};
+use stickslip::table::storage::Disk;
 
 /// Check that every file of a results directory is whole and every job is there once, and say what to do if not
 #[derive(Debug, Args)]

@@ -5,9 +5,9 @@ use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, staircase};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{HistogramBin, SetSummary, WRITER, read_backbone, read_histograms, read_points, read_sets};
-use crate::store::commit::{Commit, alone, create_folder};
-use crate::store::layout::Layout;
-use crate::store::storage::Storage;
+use crate::results::commit::{Commit, alone, create_folder};
+use crate::results::layout::Layout;
+use crate::table::storage::Storage;
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
@@ -105,8 +105,8 @@ fn title(parameters: &Parameters, swept: &[Symbol]) -> String {
 mod tests {
     use super::*;
     use crate::reduce::{BackboneBin, Point, reduced_file};
-    use crate::store::dataset::{Footer, TableWriter};
-    use crate::store::storage::Disk;
+    use crate::table::file::{Footer, TableWriter};
+    use crate::table::storage::Disk;
     use std::fs;
 
     fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetSummary {

@@ -32,8 +32,8 @@ pub use simulation::{AttachedMap, simulation};
 pub use staircase::staircase;
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
-use crate::store::dataset::DatasetError;
-use crate::store::storage::StorageError;
+use crate::table::file::DatasetError;
+use crate::table::storage::StorageError;
 
 /// A figure that cannot be drawn.
 #[derive(Debug, thiserror::Error)]

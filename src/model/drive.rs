@@ -5,6 +5,7 @@
 //! where cycles join. The [`Drive`] is that of one cycle, the one in force; without a ramp, and after it, a cycle has no end.
 
 use super::Parameters;
+use super::theory::eta;
 use std::f64::consts::TAU;
 
 /// The far end of the driving spring, within one cycle of the modulation.
@@ -103,10 +104,10 @@ impl Drive {
         self.amplitude > 0.0
     }
 
-    /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate; 0 without modulation.
+    /// η of the cycle in force, see [`eta`].
     #[must_use]
     pub fn eta(&self) -> f64 {
-        self.angular_frequency * self.amplitude / self.velocity
+        eta(self.angular_frequency, self.amplitude, self.velocity)
     }
 
     /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long runs.

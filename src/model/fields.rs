@@ -196,6 +196,7 @@ macro_rules! fields {
             }
 
             /// Sets a field, in or out of its range; none if the kind of value does not fit.
+            #[cfg_attr(not(feature = "sweeps"), allow(dead_code, reason = "some structs are read from files only"))]
             pub(crate) fn put(&mut self, field: $Key, value: $crate::model::Value) -> Option<()> {
                 match field {$(
                     $Key::$variant => self.$field = $crate::model::value::FieldType::from_value(value)?,

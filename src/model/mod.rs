@@ -1,11 +1,11 @@
-//! The paper's equations: parameters, drive, slider, interface, disorder, theory. Knows no solver and no file.
+//! The paper's equations: parameters, equation of motion, drive, interface, disorder, theory. Knows no solver and no file.
 
 mod disorder;
 mod drive;
+pub mod equation;
 pub(crate) mod fields;
 mod interface;
 mod parameters;
-pub mod slider;
 pub mod theory;
 pub(crate) mod value;
 
@@ -14,6 +14,7 @@ pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactEvent, Interface};
 pub use parameters::{ParameterError, Parameters, Symbol};
+#[cfg(feature = "sweeps")]
 pub(crate) use value::Shortest;
 pub use value::{BreakOn, Value};
 

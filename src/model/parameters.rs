@@ -4,6 +4,7 @@
 //! files, flags, table columns, the documentation) goes through [`Symbol`].
 
 use super::fields::fields;
+use super::theory::eta;
 use super::{BreakOn, Value};
 use std::f64::consts::TAU;
 
@@ -154,10 +155,10 @@ impl Parameters {
         self.turning_period.map_or(0.0, |period| TAU / period).max(self.modulation_frequency())
     }
 
-    /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate; 0 without modulation.
+    /// η of the modulation, see [`eta`](super::theory::eta).
     #[must_use]
     pub fn eta(&self) -> f64 {
-        self.modulation_frequency() * self.modulation_amplitude / self.drive_velocity
+        eta(self.modulation_frequency(), self.modulation_amplitude, self.drive_velocity)
     }
 
     /// Wave crossing time `t_c = N sqrt(m/K_int)`, in s: no front spans a longer gap between breaks. For one block, its

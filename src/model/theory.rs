@@ -15,6 +15,13 @@ pub fn exact_decay_per_block(parameters: &Parameters) -> f64 {
     2.0 * libm::asinh(0.5 * decay_per_block(parameters))
 }
 
+/// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate, from the angular frequency 2π/T in rad/s, the
+/// amplitude Δ in m and the velocity V0 in m/s; 0 without modulation.
+#[must_use]
+pub fn eta(angular_frequency: f64, amplitude: f64, drive_velocity: f64) -> f64 {
+    angular_frequency * amplitude / drive_velocity
+}
+
 /// Φ_max = asin(1/η), in rad: the phase of the largest load in each period, for η >= 1; `None` below, where the load only
 /// grows.
 #[must_use]

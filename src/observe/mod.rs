@@ -3,6 +3,7 @@
 //! Knows no solver's inside and no file. Each observer computes one thing; a run holds those that its sweep asks for.
 
 mod drops;
+mod measure;
 mod phase;
 mod recording;
 mod rupture;
@@ -10,6 +11,7 @@ mod sample;
 mod slip;
 
 pub use drops::Drops;
+pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use recording::{Recording, RecordingKey};
 pub use rupture::{Rupture, advance_speed};

@@ -6,7 +6,7 @@ fields! {
     /// What a job records: how many slips, from where, and which tables.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Recording by RecordingKey {
-        Slips("slips") slips: u64 = 40, "", count, "Slips to record past start-up; then the job ends";
+        Slips("slips") slips: u64 = 40, "", count, "Slips to record after start-up; then the job ends";
         Discard("discard") discard: u64 = 5, "", count_or_zero, "Slips of start-up, not recorded";
         MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
             "Model time at which a job ends even without its slips; its outcome is then `time limit`";

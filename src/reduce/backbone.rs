@@ -5,7 +5,7 @@ use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use super::set::FinishedSet;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! Histograms of the interval τ, one per parameter set (Fig. 2).
 
 use super::SetRow;
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// Bins per mean interval: 1.9 ms at the paper's standard case, where the peaks are 5 ms wide and 50 ms apart.
 pub const BINS_PER_MEAN: f64 = 60.0;

@@ -28,7 +28,7 @@ pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
 pub use set_row::{SetJobs, SetRow, sets};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow, startup};
 
-use crate::model::theory::{load_maximum_phase, minimum_phase};
+use crate::model::theory::{eta, load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
 /// How far under φ_min a phase must lie to count as under the back-bone, in rad. Inertia and the finite duration of the
@@ -58,7 +58,7 @@ struct SlipSample {
 impl SlipSample {
     /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
     fn eta(&self, drive_velocity: f64) -> f64 {
-        self.period.map_or(0.0, |period| TAU / period * self.amplitude / drive_velocity)
+        self.period.map_or(0.0, |period| eta(TAU / period, self.amplitude, drive_velocity))
     }
 }
 

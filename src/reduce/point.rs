@@ -1,6 +1,6 @@
 //! A sample of slips for scatter figures.
 
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// Slips up to which all become points; of more, every k-th in table order, so that at most so many remain.
 pub const MOST_POINTS: u64 = 20_000;

@@ -3,9 +3,9 @@
 use super::rows::{ParameterColumns, count, real};
 use super::{BackboneBin, HistogramBin, Point, Way, reduced_file};
 use crate::model::Parameters;
-use crate::store::dataset::{Batch, DatasetError, Reader};
-use crate::store::layout::Layout;
-use crate::store::storage::Storage;
+use crate::results::layout::Layout;
+use crate::table::file::{Batch, DatasetError, Reader};
+use crate::table::storage::Storage;
 use arrow_array::Float64Array;
 
 /// A set as figures need it. Quantities are SI; `None` where there is nothing to average.

@@ -13,12 +13,12 @@ use super::set::SetSlips;
 use super::set_row::{SetJobs, sets};
 use super::startup::startup;
 use crate::model::{Symbol, Value};
-use crate::store::commit::{Commit, alone, create_folder};
-use crate::store::dataset::{DatasetError, Footer, Reader, TableWriter, files};
-use crate::store::layout::Layout;
-use crate::store::part::committed_files;
-use crate::store::storage::{Storage, StorageError};
-use crate::store::tables::{jobs, slips};
+use crate::results::commit::{Commit, alone, create_folder};
+use crate::results::layout::Layout;
+use crate::results::part::committed_files;
+use crate::results::tables::{jobs, slips};
+use crate::table::file::{DatasetError, Footer, Reader, TableWriter, files};
+use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
@@ -253,10 +253,10 @@ fn gather(
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::{Modulation, Slip};
+    use crate::observe::{Measurements, Modulation, Slip};
+    use crate::results::tables::{JobLabel, JobRow, SlipRow};
     use crate::solver::Summary;
-    use crate::store::storage::Disk;
-    use crate::store::tables::{JobLabel, JobRecord, JobResult, JobRow, SlipRow};
+    use crate::table::storage::Disk;
     use std::fs;
 
     const PERIOD: f64 = 0.01;
@@ -276,7 +276,7 @@ mod tests {
         }
     }
 
-    fn job_result(job: &JobLabel, slips: u32) -> JobResult {
+    fn job_result(job: &JobLabel, slips: u32) -> Measurements {
         let slip = |number: u32| Slip {
             number: u64::from(number),
             onset: f64::from(number) * 12.0 * PERIOD,
@@ -298,10 +298,11 @@ mod tests {
             drops: None,
         };
         let summary = Summary { satisfied: true, ..Summary::default() };
-        JobResult {
+        Measurements {
             slips: (0..slips).map(slip).collect(),
-            precursors: Vec::new(),
-            record: JobRecord { ruptures: 0, mean_friction: Some(430.0), summary },
+            mean_friction: Some(430.0),
+            summary,
+            ..Measurements::default()
         }
     }
 
@@ -315,9 +316,9 @@ mod tests {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
             let mut slip_writer =
-                TableWriter::create(&Disk, &path, crate::store::tables::slips(), &Footer::default()).unwrap();
+                TableWriter::create(&Disk, &path, crate::results::tables::slips(), &Footer::default()).unwrap();
             let labels: Vec<JobLabel> = (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
-            let results: Vec<JobResult> = labels.iter().map(|label| job_result(label, slips)).collect();
+            let results: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
             for (job, result) in labels.iter().zip(&results) {
                 result.slips.iter().for_each(|slip| slip_writer.push(&SlipRow { job, slip }).unwrap());
             }
@@ -325,7 +326,7 @@ mod tests {
             if part < 2 {
                 let path = layout.table("jobs").join(&name);
                 let mut job_writer =
-                    TableWriter::create(&Disk, &path, crate::store::tables::jobs(), &Footer::default()).unwrap();
+                    TableWriter::create(&Disk, &path, crate::results::tables::jobs(), &Footer::default()).unwrap();
                 for (job, result) in labels.iter().zip(&results) {
                     job_writer.push(&JobRow { job, result: Ok(result) }).unwrap();
                 }

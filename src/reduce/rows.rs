@@ -2,8 +2,8 @@
 
 use super::{Moments, SetJobs, SlipSample};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
-use crate::store::dataset::{Batch, DatasetError};
-use crate::store::tables::FAILED;
+use crate::results::tables::FAILED;
+use crate::table::file::{Batch, DatasetError};
 use arrow_array::{Array, Float64Array, Int64Array, StringArray};
 use std::collections::BTreeMap;
 

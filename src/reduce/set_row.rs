@@ -3,7 +3,7 @@
 use super::confidence::Interval;
 use super::moments::Moments;
 use crate::model::{Parameters, Symbol};
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// What the jobs table tells about a set.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::rank::{Sample, holm, rank_test};
 use super::set::KeptSlip;
-use crate::store::columns::{Column, Getter, Table};
+use crate::table::columns::{Column, Getter, Table};
 
 /// Slip numbers that are looked at one by one; all from this one on are what they are held against.
 pub const STARTUP_NUMBERS: usize = 20;

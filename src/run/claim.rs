@@ -7,10 +7,10 @@
 //! processes run the same shard, as after a suspended one was taken for dead, they write the same bytes, each under staged
 //! names of its own.
 
+use crate::results::commit::{create_folder, token};
+use crate::results::layout::Layout;
 use crate::run::log::host;
-use crate::store::commit::{create_folder, token};
-use crate::store::layout::Layout;
-use crate::store::storage::{Lock, Storage, StorageError, wait_for_lock};
+use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -161,8 +161,8 @@ fn grows(storage: &dyn Storage, file: &Path, before: &[u8], patience: Duration) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::storage::Disk;
-    use crate::store::storage::over_disk::OverDisk;
+    use crate::table::storage::Disk;
+    use crate::table::storage::over_disk::OverDisk;
     use std::fs::{self, File};
     use std::io;
 

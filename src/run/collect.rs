@@ -1,15 +1,14 @@
 //! The collector: hands jobs to the workers, puts their outcomes together into parts, and commits them.
 
-use crate::run::kernel::Kernel;
+use crate::results::layout::part_name;
+use crate::results::part::{self, Outcome};
 use crate::run::log::{Entry, Log};
 use crate::run::survey::{Scope, Task};
 use crate::run::walltime::Walltime;
-use crate::run::{RunError, RunEvent, RunReport};
+use crate::run::{Kernel, RunError, RunEvent, RunReport};
 use crate::solver::SimulationError;
-use crate::store::dataset::DatasetError;
-use crate::store::layout::part_name;
-use crate::store::part::{self, Outcome};
 use crate::sweep::{Job, Part};
+use crate::table::file::DatasetError;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::any::Any;
 use std::collections::{BTreeMap, HashMap};

@@ -2,10 +2,10 @@
 //!
 //! One file for each run, so that runs on several hosts do not write into each other's.
 
-use crate::store::commit::create_folder;
-use crate::store::dataset::PROGRAM;
-use crate::store::layout::Layout;
-use crate::store::storage::{Storage, StorageError, StoredFile};
+use crate::results::commit::create_folder;
+use crate::results::layout::Layout;
+use crate::table::file::PROGRAM;
+use crate::table::storage::{Storage, StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Write as _};
 use std::path::PathBuf;
@@ -178,7 +178,7 @@ pub fn pace(storage: &dyn Storage, layout: &Layout) -> Result<Option<f64>, Stora
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::storage::Disk;
+    use crate::table::storage::Disk;
 
     #[test]
     fn a_log_reads_back_without_its_half_written_end() {

@@ -13,7 +13,6 @@
 
 mod claim;
 mod collect;
-mod kernel;
 mod log;
 mod shard;
 mod status;
@@ -23,27 +22,31 @@ mod tests;
 mod upkeep;
 mod walltime;
 
-pub use kernel::{Kernel, kernel, limits, measured};
 pub use log::{Entry, Line, host};
 pub use shard::{Shard, ShardError};
 pub use status::{Failure, MOST_FAILURES, Status, status};
 pub use upkeep::{UpkeepError, compact, repair, verify};
 
+use crate::observe::Measurements;
+use crate::results::commit::{clear, settle};
+use crate::results::manifest::{Directory, DirectoryError};
 use crate::run::claim::{Claim, PATIENCE, clear_leftovers};
 use crate::run::collect::Collector;
 use crate::run::log::Log;
 use crate::run::survey::{Scope, Survey};
 use crate::run::walltime::Walltime;
-use crate::store::commit::{clear, settle};
-use crate::store::dataset::DatasetError;
-use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::storage::{Storage, StorageError};
-use crate::sweep::Sweep;
+use crate::solver::SimulationError;
+use crate::sweep::{Job, Sweep};
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
+
+/// What runs a job: until it is done, cannot go on, or the flag turns true, which is [`SimulationError::Interrupted`].
+pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
 
 /// How to run.
 #[derive(Clone, Copy, Debug)]

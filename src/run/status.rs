@@ -1,13 +1,13 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
+use crate::results::manifest::Directory;
+use crate::results::part;
 use crate::run::claim::is_claimed;
 use crate::run::log::{self, Entry};
 use crate::run::shard::Shard;
 use crate::run::survey::Scope;
-use crate::store::dataset::DatasetError;
-use crate::store::manifest::Directory;
-use crate::store::part;
-use crate::store::storage::Storage;
+use crate::table::file::DatasetError;
+use crate::table::storage::Storage;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,12 +1,12 @@
 //! Surveys: which parts of a directory are done, and which of their jobs remain to be run.
 
+use crate::results::manifest::Directory;
+use crate::results::part::{failed_jobs, is_done};
 use crate::run::shard::Shard;
 use crate::run::walltime::Walltime;
-use crate::store::dataset::DatasetError;
-use crate::store::manifest::Directory;
-use crate::store::part::{failed_jobs, is_done};
-use crate::store::storage::Storage;
 use crate::sweep::{Part, Plan};
+use crate::table::file::DatasetError;
+use crate::table::storage::Storage;
 use std::sync::Arc;
 
 /// What of a directory a run looks after.

@@ -6,13 +6,13 @@
 #[cfg(test)]
 mod tests;
 
+use crate::results::compact::{CompactError, Compacted, Without};
+use crate::results::layout::Layout;
+use crate::results::manifest::{Directory, DirectoryError};
+use crate::results::verify::{Remedy, RepairError, Repaired, Verification};
 use crate::run::claim::{Claim, PATIENCE, is_claimed};
 use crate::run::log::{self, Entry, Log};
-use crate::store::compact::{CompactError, Compacted, Without};
-use crate::store::layout::Layout;
-use crate::store::manifest::{Directory, DirectoryError};
-use crate::store::storage::{Storage, StorageError};
-use crate::store::verify::{Remedy, RepairError, Repaired, Verification};
+use crate::table::storage::{Storage, StorageError};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -62,16 +62,16 @@ pub enum UpkeepError {
     },
 }
 
-/// Verifies a directory: see [`crate::store::verify::verify`].
+/// Verifies a directory: see [`crate::results::verify::verify`].
 ///
 /// # Errors
 /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
 pub fn verify(storage: &dyn Storage, root: &Path) -> Result<Verification, UpkeepError> {
     let committed = committed(storage, &Layout::new(root))?;
-    Ok(crate::store::verify::verify(storage, root, &committed)?)
+    Ok(crate::results::verify::verify(storage, root, &committed)?)
 }
 
-/// Takes away what is damaged, so that the next run makes it anew: see [`crate::store::verify::repair`].
+/// Takes away what is damaged, so that the next run makes it anew: see [`crate::results::verify::repair`].
 ///
 /// # Errors
 /// When a shard runs, or something cannot be moved or written.
@@ -80,13 +80,13 @@ pub fn repair(storage: &dyn Storage, root: &Path) -> Result<Repaired, UpkeepErro
     // Tells what is no results directory before anything is written.
     verify(storage, root)?;
     alone(storage, &layout, || -> Result<_, UpkeepError> {
-        let repaired = crate::store::verify::repair(storage, root, &committed(storage, &layout)?)?;
+        let repaired = crate::results::verify::repair(storage, root, &committed(storage, &layout)?)?;
         withdrawn(storage, &layout, &repaired.parts)?;
         Ok(repaired)
     })
 }
 
-/// Compacts a directory: see [`crate::store::compact::compact`].
+/// Compacts a directory: see [`crate::results::compact::compact`].
 ///
 /// # Errors
 /// When a shard runs, something is damaged, or the file system cannot do it.
@@ -98,7 +98,7 @@ pub fn compact(storage: &dyn Storage, root: &Path) -> Result<Compacted, UpkeepEr
             return Err(UpkeepError::Damaged { path: problem.path, problem: problem.problem });
         }
         let directory = Directory::read(storage, root)?;
-        Ok(crate::store::compact::compact(storage, &directory, &Without::default(), None)?)
+        Ok(crate::results::compact::compact(storage, &directory, &Without::default(), None)?)
     })
 }
 
@@ -117,7 +117,7 @@ pub(super) fn withdraw_failed(storage: &dyn Storage, directory: &Directory) -> R
         let directory = directory.clone().with_compaction(storage)?;
         let without = Without { parts: failed(&directory), ..Without::default() };
         withdrawn(storage, layout, &without.parts)?;
-        crate::store::compact::compact(storage, &directory, &without, None)?;
+        crate::results::compact::compact(storage, &directory, &without, None)?;
         Ok(())
     })
 }

@@ -14,7 +14,7 @@ pub use ledger::Ledger;
 pub use segment::{ForcePath, Segment};
 
 use self::ledger::Audit;
-use crate::model::slider::stability_limit;
+use crate::model::equation::stability_limit;
 use crate::model::{ContactEvent, Parameters};
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;

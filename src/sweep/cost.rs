@@ -59,7 +59,7 @@ pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: So
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::slider::StiffnessMatrix;
+    use crate::model::equation::StiffnessMatrix;
 
     #[test]
     fn intervals_at_the_defaults_are_those_seen() {

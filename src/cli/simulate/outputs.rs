@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use stickslip::figure::{self, Picture};
 use stickslip::model::{ContactEvent, Parameters};
 use stickslip::observe::{MapRow, ProfileRow, TraceRow};
-use stickslip::store::columns::Table;
-use stickslip::store::dataset::{Footer, TableWriter};
-use stickslip::store::records;
-use stickslip::store::storage::Disk;
+use stickslip::results::records;
 use stickslip::sweep::{Sweep, predicted_interval};
+use stickslip::table::columns::Table;
+use stickslip::table::file::{Footer, TableWriter};
+use stickslip::table::storage::Disk;
 
 /// More samples than this, of 24 bytes each, are a mistake.
 const MOST_SAMPLES: f64 = 1e8;

@@ -1,6 +1,6 @@
 //! The operations on a disk, and what can befall them.
 
-/// An operation of [`Storage`](crate::store::storage::Storage) or of its files.
+/// An operation of [`Storage`](crate::table::storage::Storage) or of its files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Operation {
     CreateFolder,

@@ -4,7 +4,7 @@ use super::fault::{Fault, Operation};
 use super::faulty_disk::{FaultyDisk, MOUNT};
 use super::*;
 use crate::reduce::reduce;
-use crate::store::dataset::Footer;
+use crate::table::file::Footer;
 
 /// Few jobs a part, by the predicted cost: 8 jobs in two parts with the first two seeds.
 fn small_sweep(seeds: u64) -> Sweep {

@@ -4,7 +4,7 @@
 //! synced, the names in a folder when the folder is.
 
 use super::fault::{Fault, Operation};
-use crate::store::storage::{Lock, Storage, StoredFile};
+use crate::table::storage::{Lock, Storage, StoredFile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs::File;

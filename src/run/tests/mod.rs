@@ -6,14 +6,15 @@ mod faulty_disk;
 
 use super::*;
 use crate::model::Parameters;
+use crate::observe::Measurements;
 use crate::observe::{Modulation, Precursor, Slip};
+use crate::results::layout::Layout;
+use crate::results::tables;
 use crate::solver::{SimulationError, Summary};
-use crate::store::columns::Table;
-use crate::store::dataset::Reader;
-use crate::store::layout::Layout;
-use crate::store::storage::Disk;
-use crate::store::tables::{self, JobRecord, JobResult};
 use crate::sweep::{Job, PART_COST};
+use crate::table::columns::Table;
+use crate::table::file::Reader;
+use crate::table::storage::Disk;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::sync::Mutex;
@@ -30,7 +31,7 @@ fn sweep(seeds: u64, model: &str) -> Sweep {
     Sweep::parse(&text, Path::new("test.toml")).unwrap()
 }
 
-fn measure(parameters: &Parameters) -> JobResult {
+fn measure(parameters: &Parameters) -> Measurements {
     let count = parameters.seed % 4;
     let onset = |number: u64| parameters.seed as f64 + parameters.drive_velocity + number as f64;
     let slips = (0..count).map(|number| Slip {
@@ -65,12 +66,17 @@ fn measure(parameters: &Parameters) -> JobResult {
         front_speed: None,
     });
     let summary = Summary { end_time: onset(count), satisfied: true, ..Summary::default() };
-    let record = JobRecord { ruptures: 9, mean_friction: Some(300.0), summary };
-    JobResult { slips: slips.collect(), precursors: precursors.collect(), record }
+    Measurements {
+        slips: slips.collect(),
+        precursors: precursors.collect(),
+        ruptures: 9,
+        mean_friction: Some(300.0),
+        summary,
+    }
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "a kernel")]
-fn fine(job: &Job, _: &AtomicBool) -> Result<JobResult, SimulationError> {
+fn fine(job: &Job, _: &AtomicBool) -> Result<Measurements, SimulationError> {
     Ok(measure(&job.parameters))
 }
 
@@ -175,7 +181,7 @@ fn a_second_run_does_nothing() {
 }
 
 /// Fails for one seed and panics for another, as long as told.
-fn faulty(job: &Job, faults: bool) -> Result<JobResult, SimulationError> {
+fn faulty(job: &Job, faults: bool) -> Result<Measurements, SimulationError> {
     match job.parameters.seed {
         7 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
         11 if faults => panic!("index {} out of bounds", 99),

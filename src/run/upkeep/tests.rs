@@ -1,13 +1,13 @@
 //! Upkeep on a disk that dies at each operation in turn, on one that cannot exchange folders, and beside a run.
 
 use super::*;
+use crate::observe::Measurements;
 use crate::run::{Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
-use crate::store::dataset::Reader;
-use crate::store::storage::over_disk::{Access, OverDisk};
-use crate::store::storage::{Disk, StoredFile};
-use crate::store::tables::{JobRecord, JobResult};
 use crate::sweep::{Job, Sweep};
+use crate::table::file::Reader;
+use crate::table::storage::over_disk::{Access, OverDisk};
+use crate::table::storage::{Disk, StoredFile};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, ErrorKind, Write};
@@ -76,10 +76,9 @@ const FEWER: u64 = 30;
 const SEEDS: u64 = 60;
 
 #[expect(clippy::unnecessary_wraps, reason = "a kernel")]
-fn kernel(job: &Job, _: &AtomicBool) -> Result<JobResult, SimulationError> {
+fn kernel(job: &Job, _: &AtomicBool) -> Result<Measurements, SimulationError> {
     let summary = Summary { end_time: job.parameters.drive_velocity, satisfied: true, ..Summary::default() };
-    let record = JobRecord { ruptures: job.parameters.seed, mean_friction: None, summary };
-    Ok(JobResult { slips: Vec::new(), precursors: Vec::new(), record })
+    Ok(Measurements { ruptures: job.parameters.seed, summary, ..Measurements::default() })
 }
 
 fn run_all(root: &Path, seeds: u64) -> u64 {

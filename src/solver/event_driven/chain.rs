@@ -1,7 +1,7 @@
 //! The chain of blocks as the solver sees it: its coefficients in lanes, kept up with what the contacts become.
 
 use super::lanes::{Layout, Row};
-use crate::model::slider::StiffnessMatrix;
+use crate::model::equation::StiffnessMatrix;
 use crate::model::{Interface, Parameters};
 
 /// What the contacts make of each block, one entry a block.

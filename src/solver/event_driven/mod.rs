@@ -26,7 +26,7 @@ use self::taylor::{Series, State};
 use super::ledger::Audit;
 use super::segment::Segment;
 use super::{Limits, Observer, SimulationError, Summary};
-use crate::model::slider::largest_frequency;
+use crate::model::equation::largest_frequency;
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
 use std::sync::atomic::Ordering;
 

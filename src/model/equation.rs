@@ -1,0 +1,139 @@
+//! The equation of motion, and the slider in it as an elastic chain: its stiffness matrix S and its frequencies.
+//!
+//! ```text
+//! m x_j'' = K_int (x_{j-1} - 2 x_j + x_{j+1}) + [j = 1] F_S - Σ_i k_i (x_j - a_i) - m γ x_j'
+//! F_S     = K_d (V0 t + Δ (cos(2π t/T) - 1) - x_1)
+//! ```
+//!
+//! At the ends the missing neighbour drops out. The sum runs over the attached contacts of block j; `a_i` is where contact
+//! i attached. S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block, and the
+//! driving spring at block 1. All blocks have the same mass m, so the squared angular frequencies are the eigenvalues of
+//! S/m. The solvers have their own fast forms of all this; [`acceleration`] is the plain one that they are tested against.
+
+use super::{Drive, Parameters};
+
+/// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
+#[must_use]
+pub fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
+    drive.stiffness * (drive.motion(time).0 - trailing_edge)
+}
+
+/// Forces of the attached contacts of one block: Σ `k_i` in N/m and Σ `k_i a_i` in N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactSums {
+    /// Σ `k_i`, in N/m.
+    pub stiffness: f64,
+    /// Σ `k_i a_i`, in N.
+    pub pull: f64,
+}
+
+/// Accelerations x'' of the blocks, in m/s²: the equation of motion, term by term.
+///
+/// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at `time`.
+#[must_use]
+pub fn acceleration(
+    parameters: &Parameters,
+    drive: &Drive,
+    time: f64,
+    displacement: &[f64],
+    velocity: &[f64],
+    contacts: &[ContactSums],
+) -> Vec<f64> {
+    let (x, mass, coupling) = (displacement, parameters.block_mass(), parameters.coupling_stiffness());
+    let of_block = |j: usize| {
+        let before = if j > 0 { coupling * (x[j - 1] - x[j]) } else { shear_force(drive, time, x[0]) };
+        let after = if j + 1 < x.len() { coupling * (x[j + 1] - x[j]) } else { 0.0 };
+        let held = contacts[j].stiffness * x[j] - contacts[j].pull;
+        (before + after - held) / mass - parameters.damping_rate * velocity[j]
+    };
+    (0..x.len()).map(of_block).collect()
+}
+
+/// The tridiagonal stiffness matrix of the slider for given contact stiffnesses.
+#[derive(Clone, Debug)]
+pub struct StiffnessMatrix {
+    /// Diagonal, one entry a block, in N/m.
+    pub diagonal: Vec<f64>,
+    /// Off-diagonal entry -`K_int`, the same everywhere, in N/m.
+    pub coupling: f64,
+}
+
+impl StiffnessMatrix {
+    /// The matrix for `contacts[j]` N/m of attached contacts at block j, with the driving spring.
+    #[must_use]
+    pub fn new(parameters: &Parameters, contacts: &[f64]) -> Self {
+        let coupling = parameters.coupling_stiffness();
+        let last = contacts.len() - 1;
+        let mut diagonal: Vec<f64> = contacts
+            .iter()
+            .enumerate()
+            .map(|(j, contact)| {
+                let neighbours = usize::from(j > 0) + usize::from(j < last);
+                contact + neighbours as f64 * coupling
+            })
+            .collect();
+        diagonal[0] += parameters.drive_stiffness;
+        Self { diagonal, coupling: -coupling }
+    }
+
+    /// The matrix with every contact attached, at its mean stiffness.
+    #[must_use]
+    pub fn intact(parameters: &Parameters) -> Self {
+        Self::new(parameters, &vec![parameters.block_contact_stiffness(); parameters.blocks])
+    }
+
+    /// Number of eigenvalues below a value, by the signs of the pivots of S - λ.
+    fn eigenvalues_below(&self, value: f64) -> usize {
+        let mut pivot = 1.0_f64;
+        let mut below = 0;
+        for (j, diagonal) in self.diagonal.iter().enumerate() {
+            let fill = if j == 0 { 0.0 } else { self.coupling * self.coupling / pivot };
+            pivot = diagonal - value - fill;
+            if pivot == 0.0 {
+                pivot = f64::MIN_POSITIVE;
+            }
+            below += usize::from(pivot < 0.0);
+        }
+        below
+    }
+
+    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite if an
+    /// entry has overflowed.
+    #[must_use]
+    pub fn eigenvalue(&self, index: usize) -> f64 {
+        let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
+        if !widest.is_finite() {
+            return f64::INFINITY;
+        }
+        let (mut low, mut high) = (-f64::EPSILON * widest, widest * (1.0 + f64::EPSILON));
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return high;
+            }
+            if self.eigenvalues_below(middle) > index { high = middle } else { low = middle }
+        }
+    }
+
+    /// Solves S y = f e_1 for y_1 = y of the trailing edge and returns f/y_1, in N/m: the stiffness seen there.
+    #[must_use]
+    pub fn end_stiffness(&self) -> f64 {
+        let last = self.diagonal.len() - 1;
+        self.diagonal[..last]
+            .iter()
+            .rev()
+            .fold(self.diagonal[last], |pivot, diagonal| diagonal - self.coupling * self.coupling / pivot)
+    }
+}
+
+/// Largest angular frequency of the intact slider, in rad/s.
+#[must_use]
+pub fn largest_frequency(parameters: &Parameters) -> f64 {
+    (StiffnessMatrix::intact(parameters).eigenvalue(parameters.blocks - 1) / parameters.block_mass()).sqrt()
+}
+
+/// Largest stable time step 2/ω_max of an explicit leapfrog scheme on the intact slider, in s.
+#[must_use]
+pub fn stability_limit(parameters: &Parameters) -> f64 {
+    2.0 / largest_frequency(parameters)
+}

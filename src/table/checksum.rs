@@ -1,0 +1,176 @@
+//! Seals: a file tells the SHA-256 of its own bytes, so that any changed bit of it is found.
+//!
+//! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the footer
+//! under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of its pages.
+
+use crate::table::file::DatasetError;
+use crate::table::storage::{Storage, StorageError};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// The footer's key of the seal.
+pub const FOOTER_KEY: &str = "seal";
+/// What stands in its place while the hash is taken.
+pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+/// How the format writes a key of 4 and a text of 64 characters. No sweep file may hold such control characters.
+const MARK: &[u8] = b"\x18\x04seal\x18\x40";
+/// Bytes after the footer: its length in four of them, and [`MAGIC`].
+const END: usize = 8;
+/// First and last bytes of a file.
+const MAGIC: &[u8] = b"PAR1";
+/// Bytes that are read and hashed at once.
+const CHUNK: usize = 1 << 16;
+
+/// SHA-256 in hexadecimal characters.
+#[must_use]
+pub fn hexadecimal(hash: &[u8]) -> String {
+    hash.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Where the hash stands in bytes that end a file.
+fn place(end: &[u8]) -> Option<usize> {
+    let mark = end.windows(MARK.len()).position(|bytes| bytes == MARK)?;
+    let place = mark + MARK.len();
+    (place + PLACEHOLDER.len() <= end.len()).then_some(place)
+}
+
+/// Seals a file whose footer comes last: `hasher` has seen all bytes before it. Gives the seal.
+pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
+    let place = place(footer)?;
+    hasher.update(&*footer);
+    let seal = hexadecimal(&hasher.finalize());
+    footer[place..place + PLACEHOLDER.len()].copy_from_slice(seal.as_bytes());
+    Some(seal)
+}
+
+/// Reads a file and compares its bytes with its seal, which it gives.
+///
+/// # Errors
+/// When the file cannot be read, is no sealed table file, or is not as it was written.
+pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError> {
+    let file = storage.open(path).map_err(StorageError::at("read", path))?;
+    let compared = compare(file).map_err(StorageError::at("read", path))?;
+    compared.map_err(|problem| DatasetError::damaged(path)(problem))
+}
+
+fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str>> {
+    const CUT: &str = "it is cut off, or no Parquet file";
+    let length = file.seek(SeekFrom::End(0))?;
+    if length < (MAGIC.len() + END) as u64 {
+        return Ok(Err(CUT));
+    }
+    let footer_end = length - END as u64;
+    file.seek(SeekFrom::Start(footer_end))?;
+    let mut end = [0; END];
+    file.read_exact(&mut end)?;
+    let [a, b, c, d, magic @ ..] = end;
+    let footer = u64::from(u32::from_le_bytes([a, b, c, d]));
+    if magic != MAGIC || footer > footer_end {
+        return Ok(Err(CUT));
+    }
+    let begin = footer_end - footer;
+    file.seek(SeekFrom::Start(begin))?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    let Some(place) = place(&bytes) else { return Ok(Err("it has no seal")) };
+    let seal = bytes[place..place + PLACEHOLDER.len()].to_owned();
+    bytes[place..place + PLACEHOLDER.len()].copy_from_slice(PLACEHOLDER.as_bytes());
+
+    let mut hasher = Sha256::new();
+    file.seek(SeekFrom::Start(0))?;
+    let mut data = file.take(begin);
+    let mut chunk = vec![0; CHUNK];
+    loop {
+        let read = data.read(&mut chunk)?;
+        if read == 0 {
+            break;
+        }
+        hasher.update(&chunk[..read]);
+    }
+    hasher.update(&bytes);
+    let expected = hexadecimal(&hasher.finalize());
+    Ok(if expected.as_bytes() == seal { Ok(expected) } else { Err("its bytes are not those that were written") })
+}
+
+/// A value with the SHA-256 of the rest of its text.
+#[derive(Serialize)]
+struct Sealed<'a, T> {
+    #[serde(flatten)]
+    value: &'a T,
+    sha256: String,
+}
+
+/// A value as JSON with a seal: the same text for the same value.
+///
+/// # Errors
+/// When the value has no form as a JSON object.
+pub fn to_json<T: Serialize>(value: &T) -> serde_json::Result<String> {
+    let sha256 = hexadecimal(&Sha256::digest(serde_json::to_string_pretty(value)?));
+    Ok(serde_json::to_string_pretty(&Sealed { value, sha256 })? + "\n")
+}
+
+/// The value of such a text.
+///
+/// # Errors
+/// What is wrong with a text that [`to_json`] did not write.
+pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, String> {
+    let mut object: Map<String, Value> = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    object.remove("sha256").ok_or("it has no seal")?;
+    let value = serde_json::from_value(Value::Object(object)).map_err(|error| error.to_string())?;
+    let expected = to_json(&value).map_err(|error| error.to_string())?;
+    if text == expected { Ok(value) } else { Err("it is not as the program wrote it".to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::columns::{Column, Getter, Table};
+    use crate::table::file::{Footer, TableWriter};
+    use crate::table::storage::Disk;
+    use std::collections::BTreeMap;
+    use std::fs;
+
+    #[test]
+    fn every_changed_bit_and_every_cut_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        let columns = vec![Column::new("number", "", "a number", Getter::Count(|row: &u64| *row))];
+        let table = Table { name: "numbers", meaning: "One row per number", columns };
+        let mut writer = TableWriter::create(&Disk, &path, table, &Footer::default()).unwrap();
+        (0..20).for_each(|number| writer.push(&number).unwrap());
+        let seal = writer.seal().unwrap();
+        assert_eq!(check(&Disk, &path).unwrap(), seal);
+        let bytes = fs::read(&path).unwrap();
+        for bit in 0..8 * bytes.len() {
+            let mut changed = bytes.clone();
+            changed[bit / 8] ^= 1 << (bit % 8);
+            assert!(compare(io::Cursor::new(&changed)).unwrap().is_err(), "bit {bit}");
+        }
+        for length in 0..bytes.len() {
+            assert!(compare(io::Cursor::new(&bytes[..length])).unwrap().is_err(), "cut at {length}");
+        }
+    }
+
+    #[test]
+    fn every_changed_bit_of_a_sealed_text_is_found() {
+        let value = BTreeMap::from([("a".to_owned(), vec![1, 2]), ("b \"ü".to_owned(), vec![])]);
+        let text = to_json(&value).unwrap();
+        assert_eq!(from_json::<BTreeMap<String, Vec<u32>>>(&text), Ok(value));
+        for bit in 0..8 * text.len() {
+            let mut changed = text.clone().into_bytes();
+            changed[bit / 8] ^= 1 << (bit % 8);
+            if let Ok(changed) = String::from_utf8(changed) {
+                assert!(from_json::<BTreeMap<String, Vec<u32>>>(&changed).is_err(), "{changed}");
+            }
+        }
+    }
+}

@@ -1,0 +1,522 @@
+//! Datasets: a table as Parquet files, written with the same bytes for the same rows, and read file by file.
+//!
+//! zstd; doubles as byte streams, which saved 8 to 17 % against plain ones, other columns with dictionaries. The footer tells
+//! program, model and sweep, sorted, and a seal, but no clock, host or thread count. Row groups are cut by row count alone, so bytes do
+//! not depend on how the rows came in.
+
+use crate::model::{MODEL_VERSION, RNG_SCHEME};
+use crate::results::layout::EXTENSION;
+use crate::sweep::Sweep;
+use crate::table::checksum;
+use crate::table::columns::{DESCRIPTION, RowBuffer, Table, UNIT};
+use crate::table::storage::{Storage, StorageError, StoredFile};
+use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{DataType, Field, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::io;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The program's name and version, as files tell it.
+pub const PROGRAM: &str = concat!("stickslip ", env!("CARGO_PKG_VERSION"));
+
+/// Rows of a group: readers slow down on groups below 5,000 rows, and a writer holds one group, some 50 MB.
+const GROUP_ROWS: usize = 1 << 17;
+/// Rows that a reader gets at once.
+const BATCH_ROWS: usize = 1 << 14;
+/// zstd's level: higher ones gain little on random doubles.
+const ZSTD_LEVEL: i32 = 3;
+/// What the text of an error of the operating system holds.
+const OS_ERROR: &str = "(os error ";
+
+/// A table file that cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// A file operation failed.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// Writing failed.
+    #[error("{}: cannot be written: {source}; all that was committed before is kept", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: ParquetError,
+    },
+    /// A file is cut off, changed or no table.
+    #[error(
+        "{}: damaged: {problem}; `stickslip verify` on its results directory tells how to repair it",
+        .path.display()
+    )]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Something else lies among the files of a table.
+    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", .path.display())]
+    Stray {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl DatasetError {
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Storage(StorageError { path, .. })
+            | Self::Write { path, .. }
+            | Self::Damaged { path, .. }
+            | Self::Stray { path } => path,
+        }
+    }
+
+    /// For `map_err`: what was found in a file.
+    pub fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
+        move |problem| Self::Damaged { path: path.to_owned(), problem: problem.to_string() }
+    }
+}
+
+/// What the footer of a file tells beside the columns: sorted texts under keys.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Footer(BTreeMap<String, String>);
+
+impl Default for Footer {
+    /// Program, model version and scheme of random numbers.
+    fn default() -> Self {
+        let texts = [("program", PROGRAM), ("model_version", &MODEL_VERSION.to_string()), ("rng_scheme", RNG_SCHEME)];
+        Self(texts.into_iter().map(|(key, text)| (key.to_owned(), text.to_owned())).collect())
+    }
+}
+
+impl Footer {
+    /// The same, with the name and the text of a sweep.
+    #[must_use]
+    pub fn with_sweep(self, sweep: &Sweep) -> Self {
+        self.with("sweep_name", sweep.name()).with("sweep", sweep.text())
+    }
+
+    /// The same, with one more text.
+    #[must_use]
+    pub fn with(mut self, key: &str, text: &str) -> Self {
+        self.0.insert(key.to_owned(), text.to_owned());
+        self
+    }
+
+    fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
+        let (units, meaning) = (by_name(schema, UNIT), by_name(schema, DESCRIPTION));
+        let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
+        let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("stickslip version ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_compression(Compression::ZSTD(ZstdLevel::try_new(ZSTD_LEVEL)?))
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_max_row_group_row_count(Some(GROUP_ROWS))
+            .set_key_value_metadata(Some(footer.0.into_iter().map(|(key, text)| KeyValue::new(key, text)).collect()));
+        for field in schema.fields().iter().filter(|field| field.data_type() == &DataType::Float64) {
+            let path = ColumnPath::from(field.name().as_str());
+            properties = properties
+                .set_column_dictionary_enabled(path.clone(), false)
+                .set_column_encoding(path, Encoding::BYTE_STREAM_SPLIT);
+        }
+        Ok(properties.build())
+    }
+}
+
+/// The footer's key of the units.
+const UNITS: &str = "units";
+
+/// What the metadata of all fields tell under a key, as JSON.
+fn by_name(schema: &Schema, key: &str) -> String {
+    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
+    let entries = schema.fields().iter().map(|field| (field.name().clone(), text(field).into()));
+    serde_json::Value::Object(entries.collect()).to_string()
+}
+
+/// Whether a footer is that of a file with these columns.
+#[must_use]
+pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
+    footer.get(UNITS).is_some_and(|units| *units == by_name(schema, UNIT))
+}
+
+/// Writes one file of a table. A file that was not finished is unreadable.
+pub struct TableWriter<Row> {
+    table: Table<Row>,
+    path: PathBuf,
+    buffer: RowBuffer,
+    /// Encodes into memory, one row group at a time.
+    writer: ArrowWriter<Vec<u8>>,
+    file: Box<dyn StoredFile>,
+    hasher: Sha256,
+}
+
+impl<Row> TableWriter<Row> {
+    /// Creates the file, over another if there is one.
+    ///
+    /// # Errors
+    /// When that fails.
+    pub fn create(
+        storage: &dyn Storage,
+        path: &Path,
+        table: Table<Row>,
+        footer: &Footer,
+    ) -> Result<Self, DatasetError> {
+        let buffer = table.buffer();
+        let file = storage.create(path).map_err(StorageError::at("create", path))?;
+        let writer = footer
+            .properties(buffer.schema())
+            .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))
+            .map_err(|source| DatasetError::Write { path: path.to_owned(), source })?;
+        Ok(Self { table, path: path.to_owned(), buffer, writer, file, hasher: Sha256::new() })
+    }
+
+    /// Appends a row.
+    ///
+    /// # Errors
+    /// When a full row group cannot be written.
+    pub fn push(&mut self, row: &Row) -> Result<(), DatasetError> {
+        self.table.push(&mut self.buffer, row);
+        if self.buffer.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
+    }
+
+    /// Appends rows that were read from a file of the same table.
+    ///
+    /// # Errors
+    /// When the rows have other columns, or a full row group cannot be written.
+    pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), DatasetError> {
+        while !rows.is_empty() {
+            let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
+            self.buffer.copy(&batch.rows, rows.start..next).map_err(DatasetError::damaged(&batch.path))?;
+            rows.start = next;
+            if self.buffer.len() == GROUP_ROWS {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the buffered rows as a row group.
+    fn flush(&mut self) -> Result<(), DatasetError> {
+        let written = self.buffer.take().map_err(ParquetError::from).and_then(|batch| self.writer.write(&batch));
+        let written = written.and_then(|()| self.writer.flush()).and_then(|()| Ok(self.writer.sync()?));
+        written.map_err(|source| DatasetError::Write { path: self.path.clone(), source })?;
+        let bytes = std::mem::take(self.writer.inner_mut());
+        self.hasher.update(&bytes);
+        Ok(self.file.write_all(&bytes).map_err(StorageError::at("write", &self.path))?)
+    }
+
+    /// Writes what is left and the footer, and brings the file to the disk.
+    ///
+    /// # Errors
+    /// When that fails; the file is then unreadable.
+    pub fn finish(self) -> Result<(), DatasetError> {
+        self.seal().map(|_| ())
+    }
+
+    /// Finishes the file and gives its [seal].
+    ///
+    /// # Errors
+    /// As [`TableWriter::finish`].
+    pub fn seal(mut self) -> Result<String, DatasetError> {
+        if !self.buffer.is_empty() {
+            self.flush()?;
+        }
+        let (path, mut file) = (self.path, self.file);
+        let footer = self.writer.into_inner().and_then(|mut footer| {
+            let sealed = checksum::close(self.hasher, &mut footer);
+            sealed.map(|seal| (seal, footer)).ok_or_else(|| ParquetError::General("the footer has no seal".to_owned()))
+        });
+        let (seal, footer) = footer.map_err(|source| DatasetError::Write { path: path.clone(), source })?;
+        let written = file.write_all(&footer).and_then(|()| file.sync());
+        written.map_err(StorageError::at("write", &path))?;
+        Ok(seal)
+    }
+}
+
+/// Some rows of a file.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// The file.
+    pub path: Arc<Path>,
+    /// The rows.
+    pub rows: RecordBatch,
+}
+
+impl Batch {
+    /// A column of doubles.
+    ///
+    /// # Errors
+    /// When the file has no such column.
+    pub fn reals(&self, name: &str) -> Result<&Float64Array, DatasetError> {
+        self.column(name, "doubles")
+    }
+
+    /// A column of whole numbers.
+    ///
+    /// # Errors
+    /// When the file has no such column.
+    pub fn counts(&self, name: &str) -> Result<&Int64Array, DatasetError> {
+        self.column(name, "whole numbers")
+    }
+
+    /// A column of texts.
+    ///
+    /// # Errors
+    /// When the file has no such column.
+    pub fn texts(&self, name: &str) -> Result<&StringArray, DatasetError> {
+        self.column(name, "texts")
+    }
+
+    /// A column of flags.
+    ///
+    /// # Errors
+    /// When the file has no such column.
+    pub fn flags(&self, name: &str) -> Result<&BooleanArray, DatasetError> {
+        self.column(name, "flags")
+    }
+
+    fn column<A: Array + 'static>(&self, name: &str, kind: &str) -> Result<&A, DatasetError> {
+        let array = self.rows.column_by_name(name).and_then(|array| array.as_any().downcast_ref());
+        array.ok_or_else(|| DatasetError::damaged(&self.path)(format!("there is no column {name} of {kind}")))
+    }
+}
+
+/// The files of a table folder, in order of their names; none if there is no such folder.
+///
+/// # Errors
+/// When the folder cannot be read or holds anything else.
+pub fn files(storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+    let names = storage.list(folder).map_err(StorageError::at("list", folder))?;
+    let paths = names.into_iter().map(|name| folder.join(name));
+    let checked = |path: PathBuf| {
+        if path.extension().is_some_and(|extension| extension == EXTENSION) {
+            Ok(path)
+        } else {
+            Err(DatasetError::Stray { path })
+        }
+    };
+    paths.map(checked).collect()
+}
+
+/// The texts under keys in the footer of a file.
+///
+/// # Errors
+/// When the file cannot be read or is damaged.
+pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
+    let file = storage.open(path).map_err(StorageError::at("read", path))?;
+    let metadata = decode(path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
+    let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
+}
+
+/// Decodes bytes of a file. A disk that does not read says nothing about the file, so its errors are no damage; what panics
+/// the decoder, as some damaged files do, is.
+fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result<T, E>) -> Result<T, DatasetError> {
+    let problem = match catch_unwind(AssertUnwindSafe(decoder)) {
+        Ok(Ok(decoded)) => return Ok(decoded),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "its content makes no sense".to_owned(),
+    };
+    // Of the operating system's errors the decoder keeps the text alone.
+    if problem.contains(OS_ERROR) {
+        return Err(StorageError::at("read", path)(io::Error::other(problem)).into());
+    }
+    Err(DatasetError::damaged(path)(problem))
+}
+
+/// Reads the rows of files, one batch after the other, holding one of them; an error ends it. Each file is held against its
+/// seal first.
+pub struct Reader<'a> {
+    storage: &'a dyn Storage,
+    files: std::vec::IntoIter<PathBuf>,
+    columns: Option<&'a [&'a str]>,
+    current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads these files: the named columns, or all.
+    #[must_use]
+    pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>, columns: Option<&'a [&'a str]>) -> Self {
+        Self { storage, files: files.into_iter(), columns, current: None }
+    }
+
+    /// Reads all files of a table folder.
+    ///
+    /// # Errors
+    /// As [`files`].
+    pub fn of_folder(
+        storage: &'a dyn Storage,
+        folder: &Path,
+        columns: Option<&'a [&'a str]>,
+    ) -> Result<Self, DatasetError> {
+        Ok(Self::new(storage, files(storage, folder)?, columns))
+    }
+
+    /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
+    fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
+        checksum::check(self.storage, path)?;
+        let file = self.storage.open(path).map_err(StorageError::at("read", path))?;
+        decode(path, || {
+            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
+            if let Some(columns) = self.columns {
+                let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
+                builder = builder.with_projection(mask);
+            }
+            builder.build()
+        })
+    }
+
+    fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
+        loop {
+            if let Some((path, reader)) = &mut self.current {
+                match decode(path, || reader.next().transpose())? {
+                    Some(rows) => {
+                        return Ok(Some(Batch { path: Arc::clone(path), rows }));
+                    }
+                    None => self.current = None,
+                }
+            }
+            let Some(path) = self.files.next() else { return Ok(None) };
+            let reader = self.open(&path)?;
+            self.current = Some((path.into(), reader));
+        }
+    }
+}
+
+impl Iterator for Reader<'_> {
+    type Item = Result<Batch, DatasetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let batch = self.advance();
+        if batch.is_err() {
+            self.current = None;
+            self.files = Vec::new().into_iter();
+        }
+        batch.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::columns::{Column, Getter};
+    use crate::table::storage::Disk;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use std::fs::{self, File};
+
+    fn table() -> Table<u64> {
+        Table {
+            name: "numbers",
+            meaning: "One row per number",
+            columns: vec![
+                Column::new("number", "", "a number", Getter::Count(|row| *row)),
+                Column::new("root", "m", "its root", Getter::Real(|row| (*row as f64).sqrt())),
+                Column::new("odd", "", "whether it is odd", Getter::Flag(|row| row % 2 == 1)),
+                Column::new("text", "", "in words", Getter::Text(|row| format!("number {}", row % 10))),
+            ],
+        }
+    }
+
+    fn write(path: &Path, numbers: Range<u64>) {
+        let mut writer = TableWriter::create(&Disk, path, table(), &Footer::default().with("note", "test")).unwrap();
+        numbers.for_each(|number| writer.push(&number).unwrap());
+        writer.finish().unwrap();
+    }
+
+    fn numbers(reader: Reader<'_>) -> Result<Vec<i64>, DatasetError> {
+        let mut numbers = Vec::new();
+        for batch in reader {
+            numbers.extend(batch?.counts("number")?.values());
+        }
+        Ok(numbers)
+    }
+
+    #[test]
+    fn a_folder_reads_back_in_order_of_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        write(&folder.path().join("b.parquet"), 5..9);
+        write(&folder.path().join("a.parquet"), 0..5);
+        write(&folder.path().join("c.parquet"), 0..0);
+        for columns in [None, Some(&["number"][..])] {
+            let reader = Reader::of_folder(&Disk, folder.path(), columns).unwrap();
+            assert_eq!(numbers(reader).unwrap(), (0..9).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn bytes_do_not_depend_on_how_rows_came_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let (whole, copied) = (folder.path().join("whole.parquet"), folder.path().join("copied.parquet"));
+        let rows = GROUP_ROWS as u64 + 1000;
+        write(&whole, 0..rows);
+        let mut writer = TableWriter::create(&Disk, &copied, table(), &Footer::default().with("note", "test")).unwrap();
+        for batch in Reader::new(&Disk, vec![whole.clone()], None) {
+            let batch = batch.unwrap();
+            let middle = batch.rows.num_rows() / 3;
+            writer.copy(&batch, 0..middle).unwrap();
+            writer.copy(&batch, middle..batch.rows.num_rows()).unwrap();
+        }
+        writer.finish().unwrap();
+        assert!(fs::read(&whole).unwrap() == fs::read(&copied).unwrap());
+        let groups = SerializedFileReader::new(File::open(&whole).unwrap()).unwrap().num_row_groups();
+        assert_eq!(groups, 2);
+    }
+
+    #[test]
+    fn the_footer_is_sorted_and_holds_units() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        write(&path, 0..3);
+        let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
+        let metadata = reader.metadata().file_metadata();
+        let entries = metadata.key_value_metadata().unwrap();
+        let keys: Vec<_> = entries.iter().map(|entry| entry.key.as_str()).collect();
+        // The Arrow schema is appended by the format's library.
+        let expected = ["meaning", "model_version", "note", "program", "rng_scheme", "seal", "units", "ARROW:schema"];
+        assert_eq!(keys, expected);
+        assert!(entries[6].value.as_ref().unwrap().contains(r#""root":"m""#));
+    }
+
+    #[test]
+    fn a_cut_or_changed_file_is_named_and_never_panics() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.parquet");
+        write(&path, 0..500);
+        let bytes = fs::read(&path).unwrap();
+        let step = bytes.len() / 97;
+        for cut in (0..bytes.len()).step_by(step) {
+            fs::write(&path, &bytes[..cut]).unwrap();
+            let error = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()).unwrap_err();
+            assert!(error.to_string().contains("a.parquet: damaged"), "cut at {cut}: {error}");
+        }
+        for changed in (0..bytes.len()).step_by(7) {
+            let mut changed_bytes = bytes.clone();
+            changed_bytes[changed] ^= 0x55;
+            fs::write(&path, &changed_bytes).unwrap();
+            let error = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()).unwrap_err();
+            assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_stray_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        let error = files(&Disk, folder.path()).unwrap_err();
+        assert!(error.to_string().contains("notes.txt"), "{error}");
+    }
+}

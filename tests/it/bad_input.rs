@@ -1,0 +1,223 @@
+//! Bad input, as sweep files and as flags of every command: exit code 2, a message with the key and the way out, and
+//! nothing written.
+
+use crate::program::Folder;
+
+/// A small sweep that is right.
+const GOOD: &str = "name = \"good\"\n[model]\nN = 3\nNs = 4\n[record]\nslips = 2\n";
+
+/// Runs a command that must be refused with these words, and leave the folder as it is.
+#[track_caller]
+fn assert_refused(folder: &Folder, arguments: &str, words: &[&str]) {
+    let before = folder.contents("");
+    let ended = folder.ends(2, arguments);
+    assert!(ended.stdout.is_empty(), "{arguments}: {}", ended.stdout);
+    for word in words {
+        assert!(ended.stderr.contains(word), "{arguments}: {word:?} is missing in\n{}", ended.stderr);
+    }
+    assert!(folder.contents("") == before, "{arguments}: something was written");
+}
+
+#[test]
+fn bad_sweep_files_are_refused_by_plan_and_run_and_nothing_is_written() {
+    // (text below `name = "bad"`, line, words of the message)
+    let table: &[(&str, usize, &[&str])] = &[
+        // No TOML, unknown keys, wrong types.
+        ("[model\nN = 3", 2, &["[model", "TOML"]),
+        ("[modle]\nN = 3", 2, &["modle", "did you mean model?"]),
+        ("V0 = 1e-4", 2, &["V0", "parameters belong in [model] or [axes]"]),
+        ("[model]\ngama = 3", 3, &["gama = 3", "did you mean gamma?"]),
+        ("[model]\nN = \"70\"", 3, &["N = \"70\"", "must be a whole number from 1 to 100000"]),
+        ("[model]\nNs = 2.5", 3, &["Ns = 2.5", "must be a whole number"]),
+        ("[model]\nbreak_on = \"force\"", 3, &["break_on = \"force\"", "\"magnitude\"", "\"tension\""]),
+        ("[record]\nprecursors = 1", 3, &["precursors = 1", "must be true or false"]),
+        // Impossible values.
+        ("[model]\nV0 = nan", 3, &["V0 = nan", "must be a finite number > 0"]),
+        ("[model]\nfs = inf", 3, &["fs = inf", "must be a finite number > 0"]),
+        ("[model]\nM = -11.5", 3, &["M = -11.5", "must be a finite number > 0"]),
+        ("[model]\ntau_r = 0", 3, &["tau_r = 0", "must be a finite number > 0"]),
+        ("[model]\nseed = -1", 3, &["seed = -1", "must be a whole number from 0 to 2^53 - 1"]),
+        ("[model]\nN = 0", 3, &["N = 0", "must be a whole number from 1"]),
+        ("[model]\ndfs = 2", 3, &["dfs = 2", "dfs <= fs"]),
+        ("[record]\nslips = 0", 3, &["slips = 0", "must be a whole number from 1"]),
+        ("[record]\nmax_time = -3", 3, &["max_time = -3", "must be a finite number > 0, in s"]),
+        // Modulation without period, period without modulation, two periods.
+        ("[model]\nDelta = 1e-6", 3, &["Delta > 0", "needs a period; set T"]),
+        ("[model]\nDelta = 1e-6\nT = -0.01", 4, &["T = -0.01", "must be a finite number > 0"]),
+        ("[axes]\neta = [1, 2]", 3, &["eta: has no effect while Delta = 0", "set Delta > 0"]),
+        (
+            "[model]\nDelta = 1e-6\nT = 1\n[axes]\nfrequency = [3]",
+            6,
+            &["frequency", "T in [model] (line 4)", "keep one"],
+        ),
+        // Axes and conditions.
+        ("[axes]\nV0 = []", 3, &["V0 = []", "at least one value"]),
+        ("[axes]\nV0 = [1e-4, 1e-4]", 3, &["V0 = 1e-4", "repeats value 1", "keep one"]),
+        ("[axes]\nV0 = { log = [0, 1], points = 3 }", 3, &["log", "> 0"]),
+        ("[axes]\nV0 = { log = [1e-5, 1e-4] }", 3, &["points is missing"]),
+        ("[axes]\nfrequenzy = [3]", 3, &["frequenzy", "did you mean frequency?"]),
+        ("[axes.zip]\nV0 = [1, 2]\nK = [1]", 4, &["K = [1]", "equal length"]),
+        ("where = \"V0 > 1\"\n[axes]\nN = [3, 4]", 2, &["where: drops every point; relax it"]),
+        ("where = \"v < 1\"", 2, &["where", "\"v < 1\"", "not a known quantity"]),
+        // The solver.
+        ("[solver]\nmethod = \"leapfrog\"", 3, &["method = \"leapfrog\"", "event-driven", "fixed-step"]),
+        ("[solver]\ntolerance = 0.5", 3, &["tolerance = 0.5", "must be a number from 1e-12 to 1e-2"]),
+        ("[solver]\nmethod = \"fixed-step\"", 2, &["dt is missing", "such as dt = 1e-6"]),
+        (
+            "[solver]\nmethod = \"fixed-step\"\ndt = 5e-6",
+            4,
+            &["dt = 5e-6 s", "must be below", "limit", "= 4.8719e-6 s"],
+        ),
+    ];
+    assert!(table.len() >= 25);
+    let folder = Folder::new();
+    for (text, line, words) in table {
+        folder.write("bad.toml", &format!("name = \"bad\"\n{text}\n"));
+        let place = format!("bad.toml:{line}: ");
+        let words: Vec<&str> = std::iter::once(place.as_str()).chain(words.iter().copied()).collect();
+        assert_refused(&folder, "plan bad.toml", &words);
+        assert_refused(&folder, "run bad.toml", &words);
+    }
+    for (name, text, word) in [("none.toml", "", "name is missing"), ("name.toml", "name = \"a/b\"", "letters, digits")]
+    {
+        folder.write(name, text);
+        assert_refused(&folder, &format!("run {name}"), &[&format!("{name}:1: "), word]);
+    }
+}
+
+#[test]
+fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
+    let folder = Folder::new();
+    folder.write("good.toml", GOOD);
+    folder.write("plain.txt", "no TOML, no directory");
+    std::fs::write(folder.path("binary.toml"), [0xff, 0xfe]).unwrap();
+    std::fs::create_dir_all(folder.path("theirs/data")).unwrap();
+    std::fs::create_dir(folder.path("empty")).unwrap();
+    folder.ends(0, "run good.toml --out good");
+    folder.write("other-model.toml", &GOOD.replace("N = 3", "N = 4"));
+    folder.write("other-recording.toml", &GOOD.replace("slips = 2", "slips = 3"));
+    folder.write("other-solver.toml", &format!("{GOOD}[solver]\ntolerance = 1e-7\n"));
+
+    let table: &[(&str, &[&str])] = &[
+        ("", &["Usage"]),
+        ("frobnicate", &["frobnicate", "Usage"]),
+        ("--frobnicate", &["--frobnicate", "Usage"]),
+        // Files that cannot be read.
+        ("plan", &["<SWEEP.toml>"]),
+        ("plan missing.toml", &["missing.toml: cannot be read", "check the path"]),
+        ("plan empty", &["empty: cannot be read", "check the path"]),
+        ("plan binary.toml", &["binary.toml: cannot be read", "UTF-8"]),
+        ("plan good.toml --out x", &["--out"]),
+        ("run", &["<SWEEP.toml>"]),
+        ("run missing.toml", &["missing.toml: cannot be read", "check the path"]),
+        ("run plain.txt", &["plain.txt:1: ", "TOML"]),
+        // Flags of a run.
+        ("run good.toml --threads 0", &["--threads", "must be a whole number >= 1"]),
+        ("run good.toml --threads many", &["--threads", "must be a whole number >= 1"]),
+        ("run good.toml --shard 3/2", &["--shard", "1 <= K <= N, such as 2/8"]),
+        ("run good.toml --shard 0/2", &["--shard", "1 <= K <= N, such as 2/8"]),
+        ("run good.toml --shard half", &["--shard", "1 <= K <= N, such as 2/8"]),
+        ("run good.toml --fast", &["--fast"]),
+        // Directories that belong to something else.
+        ("run good.toml --out theirs", &["theirs: is not empty and no results directory", "choose another with --out"]),
+        ("run good.toml --out plain.txt", &["plain.txt: is not empty and no results directory", "--out"]),
+        ("run other-model.toml --out good", &["good: holds other results", "model.N: 3 -> 4", "undo the change"]),
+        ("run other-recording.toml --out good", &["record.slips: 2 -> 3", "choose another directory with --out"]),
+        ("run other-solver.toml --out good", &["solver.tolerance: 0.001 -> 1e-7", "--out"]),
+        ("status", &["<DIR>"]),
+        ("status missing", &["missing: is no results directory", "such as results/"]),
+        ("status theirs", &["theirs: is no results directory", "such as results/"]),
+        ("status plain.txt", &["plain.txt: is no results directory", "such as results/"]),
+        ("status good --yaml", &["--yaml"]),
+        ("reduce empty", &["empty: is no results directory", "such as results/"]),
+        ("reduce good extra", &["extra"]),
+        ("plot theirs", &["theirs: is no results directory", "such as results/"]),
+        ("plot good --from 3", &["--from"]),
+        ("completions", &["<SHELL>"]),
+        ("completions tcsh", &["tcsh", "bash", "fish", "zsh"]),
+    ];
+    assert!(table.len() >= 25);
+    for (arguments, words) in table {
+        assert_refused(&folder, arguments, words);
+    }
+}
+
+#[test]
+fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
+    let folder = Folder::new();
+    folder.write("good.toml", GOOD);
+    folder.write("grid.toml", "name = \"grid\"\n[axes]\nV0 = [1e-5, 1e-4]\nseed = { count = 3 }\n");
+    folder.write("plain.txt", "no TOML, no directory");
+    std::fs::create_dir(folder.path("empty")).unwrap();
+
+    let table: &[(&str, &[&str])] = &[
+        // Parameters of a simulation.
+        ("simulate --set V0", &["--set V0: must be KEY=VALUE, such as --set V0=1e-5"]),
+        ("simulate --set velocity=3", &["--set velocity: no such key", "V0", "eta"]),
+        ("simulate --set V0=fast", &["V0 = \"fast\"", "must be a finite number > 0"]),
+        ("simulate --set V0=", &["V0", "must be a finite number > 0"]),
+        ("simulate --set V0=infinity", &["V0 = inf", "must be a finite number > 0"]),
+        ("simulate --set N=1.5", &["N = 1.5", "must be a whole number"]),
+        ("simulate --set seed=-1", &["seed = -1", "must be a whole number from 0"]),
+        ("simulate --set V0=1e-4 --set V0=2e-4", &["--set V0=2e-4", "is set before; keep one"]),
+        ("simulate --set Delta=1e-6", &["Delta > 0", "needs a period; set T"]),
+        ("simulate --set eta=2", &["eta: has no effect while Delta = 0", "set Delta > 0"]),
+        ("simulate --set break_on=force", &["break_on = \"force\"", "\"tension\""]),
+        // Its length and its solver.
+        ("simulate --slips 0", &["slips = 0", "must be a whole number from 1"]),
+        ("simulate --slips -3", &["slips = -3", "must be a whole number from 1"]),
+        ("simulate --slips few", &["--slips", "must be a number"]),
+        ("simulate --discard -1", &["discard = -1", "must be a whole number from 0"]),
+        ("simulate --time nan", &["max_time = nan", "must be a finite number > 0, in s"]),
+        ("simulate --time -1", &["max_time = -1", "must be a finite number > 0, in s"]),
+        ("simulate --time soon", &["--time", "must be a number"]),
+        ("simulate --solver leapfrog", &["--solver", "event-driven, fixed-step"]),
+        ("simulate --dt 1e-6", &["--dt: goes with --solver fixed-step"]),
+        ("simulate --solver fixed-step --tolerance 1e-6", &["--tolerance: goes with --solver event-driven; use --dt"]),
+        ("simulate --solver fixed-step --dt 5e-6", &["dt = 5e-6 s", "must be below", "= 4.8719e-6 s"]),
+        ("simulate --solver fixed-step --dt 0", &["dt = 0", "must be a finite number > 0, in s"]),
+        ("simulate --tolerance 1", &["tolerance = 1", "must be a number from 1e-12 to 1e-2"]),
+        // Its files.
+        ("simulate --trace missing/trace.parquet", &["--trace missing/trace.parquet", "its folder must exist"]),
+        ("simulate --map empty", &["--map empty", "it must be a file"]),
+        ("simulate --contacts plain.txt/c.parquet", &["--contacts plain.txt/c.parquet", "its folder must exist"]),
+        ("simulate --trace a.parquet --slip-table a.parquet", &["--slip-table a.parquet", "give each its own"]),
+        ("simulate --plot picture.pdf", &["--plot picture.pdf: must end in .svg or .png"]),
+        ("simulate --plot picture", &["--plot picture: must end in .svg or .png"]),
+        ("simulate --plot a.png --time 1 --from 2", &["--from 2: must lie before the end, 1 s"]),
+        ("simulate --plot a.png --from -1", &["--from -1: must be a finite number >= 0, in s"]),
+        ("simulate --trace a.parquet --sample 0", &["--sample 0: must be a finite number > 0, in s"]),
+        ("simulate --trace a.parquet --sample 1e-12", &["--sample", "more than 1e8 samples", "take a longer one"]),
+        ("simulate --plot a.png --until 0", &["--until 0: must be a finite number > 0, the first instant, in s"]),
+        ("simulate --plot a.png --from 1 --until 1", &["--until 1: must be a finite number > 1, the first instant"]),
+        ("simulate --plot a.png --plot a.png", &["--plot a.png", "give each its own"]),
+        ("simulate --plot a.png --plot b.pdf", &["--plot b.pdf: must end in .svg or .png"]),
+        ("simulate --plot a.png --panel drop", &["--panel", "force, map, both"]),
+        ("simulate --panel map", &["--plot"]),
+        ("simulate --until 1", &["--plot"]),
+        // Its sweep file.
+        ("simulate fast", &["fast: cannot be read", "check the path"]),
+        ("simulate grid.toml", &["sweep grid: has 6 jobs", "give each axis one value, or use `stickslip run`"]),
+        ("simulate good.toml --set N=4", &["'[SWEEP.toml]'", "--set"]),
+        ("simulate good.toml --slips 4", &["'[SWEEP.toml]'", "--slips"]),
+        ("simulate good.toml --time 1", &["'[SWEEP.toml]'", "--time"]),
+        ("simulate good.toml --discard 5", &["'[SWEEP.toml]'", "--discard"]),
+        ("simulate good.toml --max-events 5", &["'[SWEEP.toml]'", "--max-events"]),
+        ("simulate good.toml --precursor-size 5", &["'[SWEEP.toml]'", "--precursor-size"]),
+        ("simulate good.toml --solver event-driven", &["'[SWEEP.toml]'", "--solver"]),
+        ("simulate good.toml --tolerance 1e-4", &["'[SWEEP.toml]'", "--tolerance"]),
+        ("simulate good.toml --dt 1e-6", &["'[SWEEP.toml]'", "--dt"]),
+    ];
+    assert!(table.len() >= 25);
+    for (arguments, words) in table {
+        assert_refused(&folder, arguments, words);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_not_replaced_by_one() {
+    let folder = Folder::new();
+    let _socket = std::os::unix::net::UnixListener::bind(folder.path("socket")).unwrap();
+    assert_refused(&folder, "simulate --trace socket", &["--trace socket", "it must be a file"]);
+}

@@ -1,0 +1,247 @@
+//! Compaction by the built program: the same bytes whatever the history, every row once for readers at any time and after
+//! any kill, and a directory that goes on working.
+
+use crate::program::Folder;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Cheap jobs in several parts; the plan goes through them in another order than compacted tables.
+fn sweep(seeds: u64) -> String {
+    format!(
+        "name = \"cheap\"\n[model]\nN = 1\nNs = 1\n[axes]\nseed = {{ count = {seeds} }}\nV0 = [2e-4, 1e-4]\n\
+         Delta = [1e-6, 0]\nfrequency = [29]\n[record]\nslips = 1\ndiscard = 0\n"
+    )
+}
+
+/// Four jobs for each seed: parts of 4096 jobs, that is 3 of them.
+const SEEDS: u64 = 2300;
+const JOBS: u64 = 4 * SEEDS;
+/// Before the extension: 2 parts.
+const FEWER_SEEDS: u64 = 1100;
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A hash of the names and the bytes of all table files.
+fn hash(folder: &Folder, directory: &str) -> String {
+    let mut hasher = Sha256::new();
+    for (path, bytes) in folder.contents(&format!("{directory}/tables")) {
+        if let Some(bytes) = bytes {
+            hasher.update(path.to_str().unwrap());
+            hasher.update(bytes);
+        }
+    }
+    format!("{:x?}", hasher.finalize())
+}
+
+/// Kills a command when a table has another part, or lets it end if it is quicker.
+fn kill_after_a_part(folder: &Folder, directory: &str, command: &str) {
+    let parts = folder.parts(directory, "jobs").len();
+    let mut child = folder.start(command);
+    let begin = Instant::now();
+    while folder.parts(directory, "jobs").len() == parts && child.try_wait().unwrap().is_none() {
+        assert!(begin.elapsed() < Duration::from_mins(1), "{command} hangs");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn compacted_tables_have_one_hash_whatever_the_history() {
+    let folder = Folder::new();
+    folder.write("cheap.toml", &sweep(SEEDS));
+    folder.write("fewer.toml", &sweep(FEWER_SEEDS));
+    let (mut hashes, mut histories) = (BTreeSet::new(), 0);
+    for threads in [1, 2] {
+        for shards in [1, 3] {
+            for killed in [false, true] {
+                for extended in [false, true] {
+                    let directory = format!("r-{threads}-{shards}-{killed}-{extended}");
+                    let run = |sweep: &str| {
+                        for shard in 1..=shards {
+                            let command = format!(
+                                "run {sweep} --out {directory} --threads {threads} --shard {shard}/{shards} --no-reduce"
+                            );
+                            if killed {
+                                kill_after_a_part(&folder, &directory, &command);
+                            }
+                            folder.ends(0, &command);
+                        }
+                    };
+                    if extended {
+                        run("fewer.toml");
+                        // Whether it was compacted in between must make no difference, either.
+                        if killed {
+                            folder.ends(0, &format!("compact {directory}"));
+                        }
+                    }
+                    run("cheap.toml");
+                    let report = json(&folder.ends(0, &format!("compact {directory} --json")).stdout);
+                    assert_eq!((report["jobs"].as_u64(), report["changed"].as_bool()), (Some(JOBS), Some(true)));
+                    hashes.insert(hash(&folder, &directory));
+                    histories += 1;
+                    if hashes.len() > 1 || histories < 16 {
+                        fs::remove_dir_all(folder.path(&directory)).unwrap();
+                    }
+                    assert_eq!(hashes.len(), 1, "{directory}");
+                }
+            }
+        }
+    }
+    assert_eq!(histories, 16);
+}
+
+#[test]
+fn compacted_tables_are_few_and_sorted_and_the_directory_goes_on_working() {
+    let folder = Folder::new();
+    folder.write("cheap.toml", &sweep(SEEDS));
+    folder.write("fewer.toml", &sweep(FEWER_SEEDS));
+    folder.ends(0, "run fewer.toml --out r");
+    let rows = |table| folder.table("r", table).sorted_by(&["job_id"]);
+    let (slips, jobs) = (rows("slips"), rows("jobs"));
+    let reduced = json(&folder.ends(0, "reduce r --json").stdout);
+    let status = folder.ends(0, "status r").stdout;
+    folder.ends(0, "compact r");
+    assert_eq!((folder.parts("r", "slips").len(), folder.parts("r", "jobs").len()), (1, 1));
+    assert!(rows("slips") == slips && rows("jobs") == jobs);
+    let table = folder.table("r", "jobs");
+    let keys: Vec<_> = table.reals("V0").into_iter().zip(table.reals("Delta")).collect();
+    assert!(keys.is_sorted(), "rows are sorted by V0, Delta, ...");
+
+    assert_eq!(folder.ends(0, "status r").stdout, status);
+    let after = json(&folder.ends(0, "reduce r --json").stdout);
+    for key in ["jobs", "failed_jobs", "sets", "locked_sets", "slips", "points"] {
+        assert_eq!(after[key], reduced[key], "{key}");
+    }
+    let again = json(&folder.ends(0, "compact r --json").stdout);
+    assert_eq!(again["changed"], false);
+    let run = |sweep: &str| json(&folder.ends(0, &format!("run {sweep} --out r --json --no-reduce")).stdout);
+    assert_eq!(run("fewer.toml")["jobs_run"].as_u64(), Some(0));
+    assert_eq!(run("cheap.toml")["jobs_run"].as_u64(), Some(4 * (SEEDS - FEWER_SEEDS)));
+    assert_eq!(json(&folder.ends(0, "verify r --json").stdout)["jobs"].as_u64(), Some(JOBS));
+    assert_eq!(folder.parts("r", "jobs").len(), 3, "a compacted file and two parts");
+    assert_eq!(folder.table("r", "jobs").sorted_by(&["job_id"]).len() as u64, JOBS);
+    assert_eq!(json(&folder.ends(0, "reduce r --json").stdout)["jobs"].as_u64(), Some(JOBS));
+    folder.ends(0, "compact r");
+    assert_eq!(folder.parts("r", "jobs").len(), 1);
+    // Another sweep that was run here already: other footers, the same rows.
+    assert_eq!(run("fewer.toml")["jobs_run"].as_u64(), Some(0));
+    assert_eq!(json(&folder.ends(0, "compact r --json").stdout)["changed"], true);
+    assert_eq!(folder.table("r", "jobs").sorted_by(&["job_id"]).len() as u64, JOBS);
+}
+
+#[test]
+fn failed_jobs_in_compacted_tables_are_shown_and_run_again() {
+    let folder = Folder::new();
+    folder.write(
+        "failing.toml",
+        "name = \"failing\"\n[model]\nNs = 2\n[axes]\nN = [1, 2, 30]\nseed = { count = 2 }\n\
+         [record]\nslips = 2\ndiscard = 0\nmax_events = 300\n",
+    );
+    folder.ends(1, "run failing.toml --out r --no-reduce");
+    folder.ends(0, "compact r");
+    let before = hash(&folder, "r");
+    let status = json(&folder.ends(1, "status r --json").stdout);
+    assert_eq!((status["jobs_done"].as_u64(), status["jobs_failed"].as_u64()), (Some(4), Some(2)));
+    let again = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json").stdout);
+    assert_eq!((again["jobs_run"].as_u64(), again["jobs_failed"].as_u64()), (Some(0), Some(2)));
+    let retried = json(&folder.ends(1, "run failing.toml --out r --no-reduce --json --retry-failed").stdout);
+    // Their part, as a whole.
+    assert_eq!((retried["jobs_run"].as_u64(), retried["jobs_failed"].as_u64()), (Some(6), Some(2)));
+    folder.ends(0, "verify r");
+    folder.ends(0, "compact r");
+    assert_eq!(hash(&folder, "r"), before);
+}
+
+/// What a reader gets who lists a table folder and reads its files: their rows, or that one is not there any more.
+fn read(folder: &Path) -> Option<u64> {
+    // The folder itself is there at every instant.
+    let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    let mut rows = 0;
+    for name in names {
+        match File::open(folder.join(name)) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return None,
+            file => rows += SerializedFileReader::new(file.unwrap()).unwrap().metadata().file_metadata().num_rows(),
+        }
+    }
+    Some(rows.cast_unsigned())
+}
+
+#[test]
+fn readers_get_every_row_once_or_are_told_while_tables_are_compacted_and_after_kills() {
+    let folder = Folder::new();
+    folder.write("cheap.toml", &sweep(SEEDS));
+    folder.write("fewer.toml", &sweep(FEWER_SEEDS));
+    folder.ends(0, "run fewer.toml --out r --no-reduce");
+    folder.ends(0, "compact r");
+    folder.ends(0, "run cheap.toml --out r --no-reduce");
+    let (mut complete, mut told, mut kills, mut finished) = (0_u64, 0_u64, 0, 0);
+    let before = hash(&folder, "r");
+    let kept = folder.contents("r");
+    let begin = Instant::now();
+    let mut round = 0;
+    while finished < 2 {
+        // From at once to after the end.
+        let delay = Duration::from_millis(12 * round);
+        round += 1;
+        let mut child = folder.start("compact r");
+        let started = Instant::now();
+        let exit = loop {
+            for table in ["slips", "jobs"] {
+                match read(&folder.path("r/tables").join(table)) {
+                    Some(rows) => {
+                        assert_eq!(rows, JOBS, "{table}");
+                        complete += 1;
+                    }
+                    None => told += 1,
+                }
+            }
+            if let Some(exit) = child.try_wait().unwrap() {
+                break Some(exit);
+            }
+            if started.elapsed() >= delay {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                break None;
+            }
+        };
+        assert!(begin.elapsed() < Duration::from_mins(2), "it does not come to an end");
+        kills += u64::from(exit.is_none());
+        folder.ends(0, "verify r");
+        assert_eq!(read(&folder.path("r/tables/slips")), Some(JOBS));
+        if let Some(exit) = exit {
+            let mut stderr = String::new();
+            child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+            assert!(exit.success(), "{stderr}");
+            finished += 1;
+        }
+        if hash(&folder, "r") != before && finished < 2 {
+            // The exchange took place: once more, from the beginning.
+            fs::remove_dir_all(folder.path("r")).unwrap();
+            for (path, bytes) in &kept {
+                let path = folder.path("r").join(path);
+                match bytes {
+                    None => fs::create_dir_all(path).unwrap(),
+                    Some(bytes) => {
+                        fs::create_dir_all(path.parent().unwrap()).unwrap();
+                        fs::write(path, bytes).unwrap();
+                    }
+                }
+            }
+        }
+    }
+    println!("{kills} kills, {complete} complete reads, {told} told that a file is gone");
+    assert!(kills > 3 && complete > 100, "{kills} {complete}");
+    folder.ends(0, "compact r");
+    assert_eq!(folder.parts("r", "jobs").len(), 1);
+    assert!(!folder.path("r/run/staging/compact").exists(), "a full copy of the tables would stay");
+}

@@ -1,0 +1,63 @@
+//! The energy ledger balances: an error certificate of every solver, on the model of Fig. 1.
+
+use stickslip::model::Parameters;
+use stickslip::observe::ContactLog;
+use stickslip::solver::{Limits, Solver, simulate, simulate_audited};
+
+const LIMITS: Limits<'static> = Limits { end_time: 0.25, events: 1_000_000, interrupt: None };
+
+fn residual(parameters: &Parameters, solver: Solver) -> f64 {
+    let (summary, ledger) =
+        simulate_audited(parameters, solver, LIMITS, &mut ContactLog::default()).expect("the simulation must go on");
+    assert!(summary.breaks > 3000, "no slip to audit");
+    assert!(ledger.work > 0.0 && ledger.damping > 0.0 && ledger.broken > 0.0 && ledger.elastic > 0.0, "{ledger:?}");
+    assert!(ledger.left_out.abs() < 1e-4 * ledger.damping, "{ledger:?}");
+    ledger.residual().abs()
+}
+
+fn drives() -> [Parameters; 3] {
+    let modulated =
+        Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
+    let ramped = Parameters {
+        turning_period: Some(1.0 / 80.0),
+        turning_amplitude: Some(5e-7),
+        ramp_time: 0.1,
+        ..modulated.clone()
+    };
+    [Parameters::default(), modulated, ramped]
+}
+
+#[test]
+fn the_event_driven_ledger_balances_within_its_tolerance() {
+    for parameters in drives() {
+        // Far better than the tolerance of one displacement: seen 1e-7, 1e-8, 3e-10, 2e-13, 1e-13.
+        for (tolerance, allowed) in [(1e-3, 1e-5), (1e-4, 1e-6), (1e-6, 1e-8), (1e-8, 1e-11), (1e-10, 1e-11)] {
+            let residual = residual(&parameters, Solver::EventDriven { tolerance });
+            assert!(residual < allowed, "{tolerance:e}: {residual:e}");
+        }
+    }
+}
+
+#[test]
+fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
+    for parameters in drives() {
+        // Contacts break up to a step late, past their thresholds: seen 6e-3 at 4e-6 s and proportional to the step.
+        for time_step in [4e-6, 2e-6, 1e-6] {
+            let residual = residual(&parameters, Solver::FixedStep { time_step });
+            assert!((500.0..2500.0).contains(&(residual / time_step)), "{time_step:e}: {residual:e}");
+        }
+    }
+}
+
+#[test]
+fn an_audit_does_not_change_the_simulation() {
+    for parameters in drives() {
+        for solver in [Solver::default(), Solver::FixedStep { time_step: 2e-6 }] {
+            let (mut plain, mut audited) = (ContactLog::default(), ContactLog::default());
+            let summary = simulate(&parameters, solver, LIMITS, &mut plain).unwrap();
+            let (audited_summary, _) = simulate_audited(&parameters, solver, LIMITS, &mut audited).unwrap();
+            assert_eq!(summary, audited_summary);
+            assert_eq!(plain.events, audited.events);
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Both solvers follow the equation of motion, as a plain integration of its plain form shows.
+
+use stickslip::model::equation::{ContactSums, acceleration};
+use stickslip::model::{Change, ContactEvent, Drive, Parameters};
+use stickslip::solver::{Limits, Observer, Segment, Solver, simulate};
+
+/// Keeps the stiffness of the attached contacts of each block at the start, the number of breaks, and the displacements at
+/// the end.
+#[derive(Default)]
+struct Contacts {
+    sums: Vec<ContactSums>,
+    breaks: usize,
+    displacement: Vec<f64>,
+}
+
+impl Observer for Contacts {
+    fn advance(&mut self, _segment: &Segment<'_>) {}
+
+    fn contact(&mut self, event: &ContactEvent) {
+        self.breaks += usize::from(event.change == Change::Break);
+        self.sums[event.block].stiffness += event.stiffness;
+    }
+
+    fn is_satisfied(&self) -> bool {
+        false
+    }
+
+    fn end(&mut self, _time: f64, displacement: &[f64]) {
+        self.displacement = displacement.to_vec();
+    }
+}
+
+/// Displacements in m after `steps` classical Runge-Kutta steps of `step` s from rest.
+fn integrated(parameters: &Parameters, contacts: &[ContactSums], step: f64, steps: u32) -> Vec<f64> {
+    let (drive, blocks) = (Drive::new(parameters), parameters.blocks);
+    // State: displacements, then velocities.
+    let rate = |time: f64, state: &[f64]| -> Vec<f64> {
+        let (x, v) = state.split_at(blocks);
+        [v.to_vec(), acceleration(parameters, &drive, time, x, v, contacts)].concat()
+    };
+    let moved = |state: &[f64], rate: &[f64], step: f64| -> Vec<f64> {
+        state.iter().zip(rate).map(|(value, rate)| value + step * rate).collect()
+    };
+    let mut state = vec![0.0; 2 * blocks];
+    for number in 0..steps {
+        let time = f64::from(number) * step;
+        let first = rate(time, &state);
+        let second = rate(time + 0.5 * step, &moved(&state, &first, 0.5 * step));
+        let third = rate(time + 0.5 * step, &moved(&state, &second, 0.5 * step));
+        let fourth = rate(time + step, &moved(&state, &third, step));
+        for (i, value) in state.iter_mut().enumerate() {
+            *value += step / 6.0 * (first[i] + 2.0 * second[i] + 2.0 * third[i] + fourth[i]);
+        }
+    }
+    state.truncate(blocks);
+    state
+}
+
+#[test]
+fn both_solvers_follow_the_equation_of_motion_up_to_the_first_break() {
+    for blocks in [1, 2, 9, 70] {
+        // A fast modulation: the slider does not follow it quasi-statically.
+        let parameters = Parameters {
+            blocks,
+            modulation_amplitude: 2e-7,
+            modulation_period: Some(4e-4),
+            seed: 3,
+            ..Parameters::default()
+        };
+        let (step, steps) = (1e-6, 1500);
+        let end_time = step * f64::from(steps);
+        let followed = |solver| {
+            let mut contacts = Contacts { sums: vec![ContactSums::default(); blocks], ..Contacts::default() };
+            let limits = Limits { end_time, events: 1_000_000, interrupt: None };
+            let summary = simulate(&parameters, solver, limits, &mut contacts).unwrap();
+            assert!(contacts.breaks == 0 && (summary.end_time / end_time - 1.0).abs() < 1e-12, "{summary:?}");
+            contacts
+        };
+        let exact = followed(Solver::EventDriven { tolerance: 1e-12 });
+        let reference = integrated(&parameters, &exact.sums, step, steps);
+        // Runge-Kutta leaves some (ω_max h)^4 of the fastest modes; a fixed step some (ω h)² of the modulation.
+        for (solver, tolerance) in [(exact, 1e-6), (followed(Solver::FixedStep { time_step: 1e-7 }), 1e-4)] {
+            let scale = reference[0].abs();
+            assert!(scale > 1e-9, "the slider hardly moved: {scale} m");
+            for (block, (found, expected)) in solver.displacement.iter().zip(&reference).enumerate() {
+                let error = (found - expected).abs() / scale;
+                assert!(error < tolerance, "block {block} of {blocks}: {error:e}");
+            }
+        }
+    }
+}

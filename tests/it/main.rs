@@ -1,0 +1,23 @@
+//! Tests of the library from outside and of the built program, in one binary: `cargo test --release --test it NAME`.
+#![allow(clippy::tests_outside_test_module, clippy::unwrap_used, reason = "integration tests")]
+
+mod accuracy;
+mod bad_input;
+mod compaction;
+mod damage;
+mod deterministic_rows;
+mod drops;
+mod energy_ledger;
+mod equation_of_motion;
+mod failures;
+mod figures;
+mod fuzz;
+mod golden;
+mod hard_cases;
+mod kills;
+mod program;
+mod ramp;
+mod runs;
+mod shards;
+mod simulate;
+mod statistics;

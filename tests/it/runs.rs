@@ -1,0 +1,302 @@
+//! Whole runs of the built program: where results lie, that interruptions, threads, shards and extensions leave no trace in
+//! them, and what exit codes say.
+
+use crate::program::{Cell, FAILING, Folder, MANY, MANY_PARTS, json, wait};
+use std::fs;
+use std::path::PathBuf;
+
+/// Modulated and not, two velocities, two seeds, with precursors: 12 jobs, which differ in everything that is measured.
+const TINY: &str = "\
+name = \"tiny\"
+[model]
+N = 9
+[axes]
+V0 = [1e-4, 2e-4]
+Delta = [0, 1e-6]
+frequency = [29, 58]
+seed = { count = 2 }
+[record]
+slips = 4
+precursors = true
+";
+/// Jobs of [`TINY`]: without modulation one frequency stands for both.
+const TINY_JOBS: u64 = 12;
+
+/// Every row of every table, all columns, by job and slip.
+fn sorted_rows(folder: &Folder, directory: &str) -> Vec<Vec<Vec<Cell>>> {
+    vec![
+        folder.table(directory, "slips").sorted_by(&["job_id", "slip"]),
+        folder.table(directory, "precursors").sorted_by(&["job_id", "slip", "precursor"]),
+        folder.table(directory, "jobs").sorted_by(&["job_id"]),
+    ]
+}
+
+/// The words before the values of a report.
+fn labels(report: &str) -> Vec<&str> {
+    report.lines().map(|line| line.split("  ").next().unwrap_or_default()).collect()
+}
+
+#[test]
+fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_nothing() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    let plan = json(&folder.ends(0, "plan tiny.toml --json").stdout);
+    assert_eq!((plan["jobs"].as_u64(), plan["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
+
+    let first = folder.ends(0, "run tiny.toml");
+    let expected = ["jobs run", "parts committed", "time in jobs", "wall time", "jobs", "parameter sets", "slips"];
+    assert_eq!(labels(&first.stdout)[..7], expected);
+    let after = &labels(&first.stdout)[7..];
+    assert!(after.iter().all(|label| ["reduced data", "figure"].contains(label)), "{}", first.stdout);
+    assert!(first.stdout.contains("jobs run         12, 0 failed\n"), "{}", first.stdout);
+    assert!(!first.stderr.contains('\u{1b}'), "no terminal, no colours: {:?}", first.stderr);
+
+    let before = folder.contents("results/tiny");
+    let there: Vec<&str> =
+        before.iter().filter(|(_, bytes)| bytes.is_some()).map(|(p, _)| p.to_str().unwrap()).collect();
+    for file in [
+        "tables/slips/part-000-000000.parquet",
+        "tables/precursors/part-000-000000.parquet",
+        "tables/jobs/part-000-000000.parquet",
+        "reduced/sets.parquet",
+        "reduced/histograms.parquet",
+        "reduced/startup.parquet",
+        "reduced/backbone.parquet",
+        "reduced/points.parquet",
+        "figures/phi-eta.svg",
+        "figures/phi-eta.png",
+        "figures/tau-T.svg",
+        "figures/tau-T.png",
+        "run/manifest.json",
+        "run/sweep-000.toml",
+    ] {
+        assert!(there.contains(&file), "{file} is not in {there:?}");
+    }
+    assert!(there.iter().filter(|file| !file.starts_with("run/")).count() == 12, "{there:?}");
+    assert!(!there.iter().any(|file| file.starts_with("run/staging")), "{there:?}");
+    assert_eq!(before[&PathBuf::from("run/sweep-000.toml")], Some(TINY.as_bytes().to_vec()));
+    assert_eq!(folder.table("results/tiny", "jobs").cells.len() as u64, TINY_JOBS);
+    assert_eq!(folder.table("results/tiny", "slips").cells.len() as u64, 4 * TINY_JOBS);
+
+    let second = folder.ends(0, "run tiny.toml");
+    assert!(second.stdout.starts_with("jobs run         0, 0 failed\n"), "{}", second.stdout);
+    assert!(folder.contents("results/tiny") == before);
+}
+
+#[test]
+fn tables_do_not_depend_on_threads() {
+    let folder = Folder::new();
+    for (name, text) in [("tiny", TINY), ("many", MANY)] {
+        folder.write("sweep.toml", text);
+        for threads in [1, 2] {
+            let out = format!("{name}-{threads}");
+            folder.ends(0, &format!("run sweep.toml --no-reduce --threads {threads} --out {out}"));
+        }
+        let [one, two] = [1, 2].map(|threads| format!("{name}-{threads}"));
+        // Every column of every row, bit by bit; and what is more, the files.
+        assert!(sorted_rows(&folder, &one) == sorted_rows(&folder, &two), "{name}");
+        assert!(folder.tables(&one) == folder.tables(&two), "{name}");
+    }
+    assert_eq!(folder.parts("many-1", "jobs").len(), MANY_PARTS);
+    assert!(!folder.table("tiny-1", "precursors").cells.is_empty());
+}
+
+#[test]
+fn an_extended_axis_runs_its_new_jobs_alone() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce --out grown");
+    let before = folder.tables("grown");
+    folder.write("tiny.toml", &TINY.replace("count = 2", "count = 3"));
+    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out grown --json").stdout);
+    assert_eq!(report["jobs_run"].as_u64(), Some(TINY_JOBS / 2));
+    let after = folder.tables("grown");
+    assert!(before.iter().all(|(path, bytes)| after.get(path) == Some(bytes)));
+    assert_eq!(json(&folder.ends(0, "status grown --json").stdout)["jobs_kept"].as_u64(), Some(0));
+    folder.ends(0, "run tiny.toml --no-reduce --out at-once");
+    assert!(sorted_rows(&folder, "grown") == sorted_rows(&folder, "at-once"));
+}
+
+#[test]
+fn values_that_a_sweep_no_longer_has_keep_their_data_and_the_status_says_so() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce --out r");
+    let before = folder.tables("r");
+    folder.write("tiny.toml", &TINY.replace("V0 = [1e-4, 2e-4]", "V0 = [2e-4]"));
+    let report = json(&folder.ends(0, "run tiny.toml --no-reduce --out r --json").stdout);
+    assert_eq!((report["jobs_run"].as_u64(), report["jobs_left"].as_u64()), (Some(0), Some(0)));
+    assert!(folder.tables("r") == before);
+    let status = json(&folder.ends(0, "status r --json").stdout);
+    assert_eq!((status["jobs_done"].as_u64(), status["jobs_kept"].as_u64()), (Some(TINY_JOBS), Some(TINY_JOBS / 2)));
+    let text = folder.ends(0, "status r").stdout;
+    assert!(text.contains("jobs done     12, 6 of them kept of values that the sweep no longer has\n"), "{text}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out whole");
+    let whole = folder.tables("whole");
+    for signal in ["INT", "TERM"] {
+        // One thread, so that on a machine with many cores there is a middle, too.
+        let command = format!("run many.toml --no-reduce --threads 1 --out {signal}");
+        let mut child = folder.start(&command);
+        folder.wait_for_parts(signal, 2, &mut child);
+        let sent = std::process::Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status();
+        assert!(sent.unwrap().success());
+        let (code, stdout, stderr) = wait(child);
+        assert_eq!(code, Some(3), "{signal}: {stderr}");
+        assert!(stderr.contains("The same command goes on."), "{stderr}");
+        assert!(stdout.starts_with("jobs run"), "{stdout}");
+
+        let kept = folder.tables(signal);
+        assert!((2..MANY_PARTS).contains(&folder.parts(signal, "jobs").len()), "it was to be stopped in the middle");
+        assert!(kept.iter().all(|(path, bytes)| whole.get(path) == Some(bytes)));
+        let times = folder.written(signal);
+        let status = json(&folder.ends(0, &format!("status {signal} --json")).stdout);
+        assert_eq!(status["parts_done"].as_u64(), Some(folder.parts(signal, "jobs").len() as u64));
+        assert!(status["jobs_missing"].as_u64() > Some(0));
+
+        folder.ends(0, &command);
+        assert!(folder.tables(signal) == whole, "{signal}");
+        let times_after = folder.written(signal);
+        assert!(times.iter().all(|(path, time)| times_after[path] == *time), "a committed part was written again");
+    }
+}
+
+#[test]
+fn the_status_counts_what_is_there_for_people_and_for_programs() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out r");
+    for table in ["jobs", "slips"] {
+        fs::remove_file(&folder.parts("r", table)[3]).unwrap();
+    }
+    let status = json(&folder.ends(0, "status r --json").stdout);
+    let count = |key: &str| status[key].as_u64().unwrap();
+    assert_eq!((status["name"].as_str(), count("format")), (Some("many"), 1));
+    assert_eq!((count("jobs_done"), count("jobs_failed"), count("jobs_missing")), (28_000 - 4096, 0, 4096));
+    assert_eq!((count("parts_done"), count("parts_missing")), (MANY_PARTS as u64 - 1, 1));
+    assert!(status["time_left"].as_f64() > Some(0.0) && status["running"].as_array().unwrap().is_empty());
+    let text = folder.ends(0, "status r").stdout;
+    assert_eq!(labels(&text), ["sweep", "jobs done", "jobs failed", "jobs missing", "parts", "running", "time left"]);
+    assert!(text.contains("jobs missing  4096\n"), "{text}");
+}
+
+#[test]
+fn reduced_data_and_figures_can_be_made_again() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --out r");
+    let before = folder.contents("r");
+    for gone in ["reduced", "figures"] {
+        fs::remove_dir_all(folder.path("r").join(gone)).unwrap();
+    }
+    let refused = folder.run("plot r");
+    assert_ne!(refused.code, Some(0), "there is nothing to plot");
+    assert!(refused.stderr.contains("reduced"), "{}", refused.stderr);
+    let summary = json(&folder.ends(0, "reduce r --json").stdout);
+    assert_eq!((summary["jobs"].as_u64(), summary["slips"].as_u64()), (Some(TINY_JOBS), Some(4 * TINY_JOBS)));
+    let drawn = folder.ends(0, "plot r").stdout;
+    assert_eq!(
+        drawn.lines().collect::<Vec<_>>(),
+        ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"].map(|name| format!("r/figures/{name}"))
+    );
+    assert!(folder.contents("r") == before);
+}
+
+#[test]
+fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
+    let folder = Folder::new();
+    folder.write("many.toml", MANY);
+    folder.ends(0, "run many.toml --no-reduce --out r");
+    let whole = folder.tables("r");
+    for (table, commands) in [
+        ("jobs", &["run many.toml --out r", "status r", "reduce r"][..]),
+        ("slips", &["run many.toml --out r", "reduce r"]),
+    ] {
+        let part = folder.parts("r", table)[1].clone();
+        let name = part.strip_prefix(folder.path("")).unwrap().display().to_string();
+        let bytes = fs::read(&part).unwrap();
+        fs::write(&part, &bytes[..bytes.len() / 2]).unwrap();
+        for command in commands {
+            let ended = folder.ends(4, command);
+            assert!(ended.stderr.contains(&format!("{name}: damaged")), "{command}: {}", ended.stderr);
+            assert!(ended.stderr.contains("stickslip verify"), "{}", ended.stderr);
+        }
+        // The way out that the message tells.
+        folder.ends(4, "verify r");
+        folder.ends(0, "verify r --repair");
+        let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);
+        assert_eq!(report["jobs_run"].as_u64(), Some(4096));
+        assert!(folder.tables("r") == whole, "{table}");
+    }
+    for (file, text) in [("run/manifest.json", "{"), ("run/sweep-000.toml", "name = \"other\"")] {
+        let kept = fs::read(folder.path("r").join(file)).unwrap();
+        folder.write(&format!("r/{file}"), text);
+        for command in ["run many.toml --out r", "status r", "reduce r", "plot r"] {
+            let ended = folder.ends(4, command);
+            assert!(ended.stderr.contains(&format!("r/{file}: damaged")), "{command}: {}", ended.stderr);
+        }
+        fs::write(folder.path("r").join(file), kept).unwrap();
+    }
+    assert!(folder.tables("r") == whole);
+}
+
+#[test]
+fn a_pipe_gets_the_report_and_nothing_else() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    let report = folder.ends(0, "run tiny.toml --json --out r").stdout;
+    assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    for command in [
+        "plan tiny.toml --json",
+        "status r --json",
+        "reduce r --json",
+        "verify r --json",
+        "compact r --json",
+        "simulate --set N=3 --slips 1 --json",
+    ] {
+        assert_eq!(json(&folder.ends(0, command).stdout)["format"].as_u64(), Some(1), "{command}");
+    }
+}
+
+#[test]
+fn a_reader_that_leaves_does_not_end_a_run() {
+    let folder = Folder::new();
+    folder.write("failing.toml", FAILING);
+    // Both ends of what it says are closed at once.
+    let mut child = folder.start("run failing.toml --out r");
+    drop((child.stdout.take(), child.stderr.take()));
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert_eq!(folder.table("r", "jobs").cells.len(), 6);
+    let mut child = folder.start("completions bash");
+    drop(child.stdout.take());
+    assert_eq!(wait(child), (Some(0), String::new(), String::new()));
+}
+
+#[test]
+fn completions_are_there_for_the_usual_shells() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = folder.ends(0, &format!("completions {shell}")).stdout;
+        for word in ["stickslip", "simulate", "retry-failed"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn the_help_of_every_command_holds_an_example() {
+    let folder = Folder::new();
+    assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
+    for command in ["", "plan", "run", "status", "reduce", "plot", "verify", "compact", "simulate", "completions"] {
+        let help = folder.ends(0, &format!("{command} --help")).stdout;
+        let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
+        assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");
+    }
+}
