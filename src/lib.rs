@@ -38,5 +38,4 @@ pub mod run;
 pub mod solver;
 #[cfg(feature = "sweeps")]
 pub mod sweep;
-#[cfg(feature = "sweeps")]
 pub mod table;

@@ -13,7 +13,7 @@ pub use drops::Drops;
 pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use rupture::{Rupture, advance_speed};
-pub use sample::{AttachedMap, ContactLog, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
+pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
 pub use slip::{Modulation, Precursor, Slip, SlipObserver};
 
 /// What a job records: how many slips, from where, and which tables.
