@@ -40,5 +40,4 @@ pub mod run;
 pub mod solver;
 #[cfg(feature = "sweeps")]
 pub mod sweep;
-#[cfg(feature = "sweeps")]
 pub mod table;

@@ -6,6 +6,7 @@
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::{Observer, Segment};
+use crate::table::columns::columns;
 use std::collections::HashMap;
 
 /// Trajectories are apart when a break differs by more than this part of the wave crossing time.
@@ -62,23 +63,19 @@ pub struct Comparison<'a> {
     now: f64,
 }
 
-/// What a comparison gives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BreakErrors {
-    /// Breaks compared.
-    pub breaks: u64,
-    /// Of these, breaks that were not made in time.
-    pub missing: u64,
-    /// Median error of the others, in s.
-    pub median: f64,
-    /// Largest error of the others, in s.
-    pub largest: f64,
-    /// Breaks of the reference before the trajectories are apart.
-    pub together: u64,
-    /// Model time until then, in s.
-    pub together_seconds: f64,
-    /// Whether they are together as far as the reference reaches.
-    pub together_throughout: bool,
+columns! {
+    /// What a comparison gives; nothing where none was made.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct BreakErrors {
+        breaks as "compared_breaks": Option<u64> = "",
+            "number K of first breaks whose times are compared with those at the tightest tolerance";
+        missing as "missing_breaks": Option<u64> = "", "of these, breaks that were not made";
+        median as "median_break_error": Option<f64> = "s", "median error of their times";
+        largest as "largest_break_error": Option<f64> = "s", "largest error of their times";
+        together as "together_breaks": Option<u64> = "", "breaks before the trajectories are apart";
+        together_seconds: Option<f64> = "s", "model time before the trajectories are apart";
+        together_throughout: bool = "", "whether they are not, as far as the reference reaches";
+    }
 }
 
 impl<'a> Comparison<'a> {
@@ -96,12 +93,12 @@ impl<'a> Comparison<'a> {
         let together = self.apart.unwrap_or(self.errors.len());
         let times = &self.reference.times;
         BreakErrors {
-            breaks: self.counted as u64,
-            missing: (self.counted - made.len()) as u64,
-            median: made.get(made.len() / 2).copied().unwrap_or(f64::NAN),
-            largest: made.last().copied().unwrap_or(f64::NAN),
-            together: together as u64,
-            together_seconds: times.get(together).or(times.last()).copied().unwrap_or(0.0),
+            breaks: Some(self.counted as u64),
+            missing: Some((self.counted - made.len()) as u64),
+            median: made.get(made.len() / 2).copied(),
+            largest: made.last().copied(),
+            together: Some(together as u64),
+            together_seconds: times.get(together).or(times.last()).copied().or(Some(0.0)),
             together_throughout: self.apart.is_none(),
         }
     }
@@ -175,15 +172,18 @@ mod tests {
     #[test]
     fn breaks_are_matched_by_contact_and_not_by_order() {
         let errors = compared(&[(0.2 + 2e-6, 1), (0.1 + 1e-6, 0), (0.3 + 3e-6, 2), (0.4, 3)]);
-        assert!((errors.median - 2e-6).abs() < 1e-12 && (errors.largest - 3e-6).abs() < 1e-12, "{errors:?}");
-        assert!(errors.together_throughout && errors.missing == 0 && errors.together == 4);
+        assert!(
+            (errors.median.unwrap() - 2e-6).abs() < 1e-12 && (errors.largest.unwrap() - 3e-6).abs() < 1e-12,
+            "{errors:?}"
+        );
+        assert!(errors.together_throughout && errors.missing == Some(0) && errors.together == Some(4));
     }
 
     #[test]
     fn a_late_or_missing_break_ends_the_time_together() {
         let late = compared(&[(0.1, 0), (0.21, 1), (0.3, 2), (0.4, 3)]);
-        assert_eq!((late.together, late.together_seconds, late.missing), (1, 0.2, 0));
+        assert_eq!((late.together, late.together_seconds, late.missing), (Some(1), Some(0.2), Some(0)));
         let missing = compared(&[(0.1, 0), (0.2, 1), (0.4, 3)]);
-        assert_eq!((missing.together, missing.missing, missing.together_throughout), (2, 1, false));
+        assert_eq!((missing.together, missing.missing, missing.together_throughout), (Some(2), Some(1), false));
     }
 }

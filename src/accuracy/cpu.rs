@@ -1,6 +1,7 @@
 //! CPU time of the calling thread, what it buys, and the processor that it runs on.
 
 use crate::solver::Summary;
+use crate::table::columns::columns;
 
 /// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
 #[must_use]
@@ -29,19 +30,18 @@ pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
     (thread_seconds() - begin, result)
 }
 
-/// What a solver costs, on one thread.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cost {
-    /// CPU seconds per simulated second.
-    pub per_simulated_second: f64,
-    /// CPU seconds per slip.
-    pub per_slip: f64,
-    /// Steps per slip.
-    pub steps_per_slip: f64,
-    /// CPU time per step, in s.
-    pub per_step: f64,
-    /// Slips that were timed; 0 if the cost per slip is extrapolated from that of a step.
-    pub timed_slips: u64,
+columns! {
+    /// What a solver costs, on one thread.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Cost {
+        per_simulated_second as "cpu_per_simulated_second": f64 = "",
+            "CPU seconds per simulated second, one thread";
+        per_slip as "cpu_per_slip": f64 = "s", "CPU time per slip";
+        per_step as "cpu_per_step": f64 = "s", "CPU time per step";
+        steps_per_slip: f64 = "", "steps per slip";
+        timed_slips: u64 = "",
+            "slips that were timed; 0 if the cost per slip is extrapolated from that of a step";
+    }
 }
 
 impl Cost {

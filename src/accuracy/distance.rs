@@ -5,6 +5,7 @@
 //! sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is keyed: the same
 //! samples give the same intervals.
 
+use crate::table::columns::{Cell, Column, Kind, Part, columns};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -17,42 +18,69 @@ const TAIL: f64 = 0.025;
 /// Quantile of the distances under the null hypothesis that makes the floor.
 const FLOOR: f64 = 0.95;
 
-/// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in 95 %
-/// of cases.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
-    /// Of the samples.
-    pub value: f64,
-    /// Lower end of the interval.
-    pub low: f64,
-    /// Upper end of the interval.
-    pub high: f64,
-    /// 95 % quantile for samples that differ by chance alone.
-    pub floor: f64,
+/// A value with further values about it: columns of their own, called after it.
+macro_rules! with_columns_about_it {
+    ($(#[$attribute:meta])* $name:ident { $($field:ident, $suffix:literal, $meaning:literal;)* }) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name {
+            /// Of the sample against the reference.
+            pub value: f64,
+            $(
+                #[doc = concat!($meaning, ".")]
+                pub $field: f64,
+            )*
+        }
+
+        impl Part for $name {
+            fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+                let column = |(suffix, meaning)| {
+                    Column { name: format!("{name}{suffix}").into(), unit, meaning, kind: Kind::Real, nullable: false }
+                };
+                [("", meaning), $(($suffix, $meaning)),*].map(column).to_vec()
+            }
+
+            fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
+                for value in [self.value, $(self.$field),*] {
+                    give(Cell::Real(value));
+                }
+            }
+
+            fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+                let mut read = || Part::take(name, next);
+                Ok(Self { value: read()?, $($field: read()?),* })
+            }
+        }
+    };
 }
 
-/// A difference with its 95 % interval. Zero outside of the interval: a bias that the samples show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bias {
-    /// Of the sample less the reference.
-    pub value: f64,
-    /// Lower end of the interval.
-    pub low: f64,
-    /// Upper end of the interval.
-    pub high: f64,
+with_columns_about_it! {
+    /// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in
+    /// 95 % of cases.
+    Distance {
+        low, "_low", "lower end of its 95 % interval";
+        high, "_high", "upper end";
+        floor, "_floor", "95 % quantile of the distance by chance alone";
+    }
 }
 
-/// What sets a sample apart from a reference.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distances {
-    /// ∫ |F - G|.
-    pub wasserstein: Distance,
-    /// max |F - G|.
-    pub kolmogorov: Distance,
-    /// Of the mean.
-    pub mean: Bias,
-    /// Of the standard deviation.
-    pub deviation: Bias,
+with_columns_about_it! {
+    /// A difference with its 95 % interval. Zero outside of the interval: a bias that the samples show.
+    Bias {
+        low, "_low", "lower end of its 95 % interval";
+        high, "_high", "upper end";
+    }
+}
+
+columns! {
+    /// What sets a sample apart from a reference.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Distances {
+        mean as "mean_bias": Bias = "", "mean less that of the reference";
+        deviation as "deviation_bias": Bias = "", "standard deviation less that of the reference";
+        wasserstein as "w1": Distance = "", "Wasserstein-1 distance";
+        kolmogorov as "ks": Distance = "", "Kolmogorov-Smirnov distance";
+    }
 }
 
 /// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. `key` keeps the random numbers

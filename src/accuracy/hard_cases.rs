@@ -8,6 +8,7 @@ use crate::model::equation::{StiffnessMatrix, stability_limit};
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
 use crate::solver::{Limits, SimulationError, Solver, Summary, simulate_audited};
+use crate::table::columns::{Table, columns};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -47,33 +48,28 @@ pub struct HardCase {
     expected: Expected,
 }
 
-/// How a case went.
-#[derive(Clone, Debug)]
-pub struct Stability {
-    /// What breaks a naive code.
-    pub threat: String,
-    /// What differs from the defaults.
-    pub case: String,
-    /// The method and its setting.
-    pub solver: String,
-    /// Whether it ended as it must.
-    pub passed: bool,
-    /// How it ended: in words, with time and cause if it could not go on.
-    pub outcome: String,
-    /// Model time, in s; `None` if it did not reach its end.
-    pub simulated_seconds: Option<f64>,
-    /// Slips.
-    pub slips: u64,
-    /// Steps of the solver.
-    pub steps: u64,
-    /// Of these, leaps.
-    pub leaps: u64,
-    /// Contacts broken.
-    pub breaks: u64,
-    /// Residual of the energy ledger, relative to the work of the drive; `None` if it did not reach its end.
-    pub ledger_residual: Option<f64>,
-    /// CPU time with the audit, in s.
-    pub cpu_seconds: f64,
+columns! {
+    /// How a hard case went.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Stability {
+        threat: String = "", "what breaks a naive code";
+        case: String = "", "what differs from the defaults";
+        solver: String = "", "method and setting";
+        passed: bool = "", "whether it ended as it must";
+        outcome: String = "", "how it ended";
+        simulated_seconds as "simulated_time": Option<f64> = "s", "model time";
+        slips: u64 = "", "slips";
+        steps: u64 = "", "steps of the solver";
+        leaps: u64 = "", "of these, leaps";
+        breaks: u64 = "", "contacts broken";
+        ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
+        cpu_seconds as "cpu_time": f64 = "s", "CPU time with the audit";
+    }
+}
+
+impl Table for Stability {
+    const NAME: &'static str = "hard-cases";
+    const MEANING: &'static str = "One row per hard case";
 }
 
 /// Why a case did not reach its end.

@@ -24,7 +24,6 @@ pub use distance::{Bias, Distance, Distances};
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
-pub use tables::{distances, exponents, markdown, methods, sizes, stability};
 pub use write::{as_json, scaling_json, stability_json, write, write_scaling, write_stability};
 
 use crate::figure::FigureError;

@@ -9,6 +9,7 @@ use super::{AccuracyError, NO_LIMITS, failed};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, SlipObserver};
 use crate::solver::{Solver, Summary, simulate};
+use crate::table::columns::{Selected, Selection, Table, columns};
 
 /// Slips of start-up, whose cost is taken off.
 const START_UP: u64 = 2;
@@ -31,40 +32,50 @@ pub struct Scaling {
 /// What grows: the number of blocks, and of contacts per block.
 pub const SIZES: [Symbol; 2] = [Symbol::N, Symbol::Ns];
 
-/// Cost at one size.
+/// What grows.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SizeRow {
-    /// The size, and all other parameters.
-    pub parameters: Parameters,
-    /// Tolerance of the event-driven solver.
-    pub tolerance: f64,
-    /// What it costs past start-up.
-    pub cost: Cost,
-    /// Of its steps, leaps over quiet time; per slip.
-    pub leaps_per_slip: f64,
-    /// Contacts broken per slip, those between slips included.
-    pub breaks_per_slip: f64,
-    /// Contacts reattached per slip.
-    pub reattachments_per_slip: f64,
+pub struct Size;
+
+impl Selection for Size {
+    const SYMBOLS: &'static [Symbol] = &SIZES;
 }
 
-/// Exponents of the powers of one size that fit best.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exponents {
-    /// What grows: one of [`SIZES`].
-    pub size: Symbol,
-    /// Tolerance of the event-driven solver.
-    pub tolerance: f64,
-    /// That of CPU time per slip.
-    pub cpu_per_slip: f64,
-    /// That of CPU time per simulated time.
-    pub cpu_per_simulated_second: f64,
-    /// That of CPU time per step.
-    pub cpu_per_step: f64,
-    /// That of steps per slip.
-    pub steps_per_slip: f64,
-    /// That of breaks per slip.
-    pub breaks_per_slip: f64,
+columns! {
+    /// The cost at one size and tolerance; start-up is left out.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct SizeRow {
+        parameters: Selected<Size>;
+        tolerance: f64 = "", "tolerance of the event-driven solver";
+        cost: Cost;
+        leaps_per_slip: f64 = "", "of the steps, leaps per slip";
+        breaks_per_slip: f64 = "", "contacts broken per slip, those between slips included";
+        reattachments_per_slip: f64 = "", "contacts reattached per slip";
+    }
+}
+
+impl Table for SizeRow {
+    const NAME: &'static str = "scaling";
+    const MEANING: &'static str = "One row per size of the slider and tolerance; start-up is left out";
+}
+
+columns! {
+    /// Exponents of the powers of one size that fit best.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Exponents {
+        size: Symbol = "", "what grows, N or Ns; the other is at its default";
+        tolerance: f64 = "", "tolerance of the event-driven solver";
+        cpu_per_slip: f64 = "", "exponent of CPU time per slip";
+        cpu_per_simulated_second: f64 = "", "exponent of CPU time per simulated time";
+        cpu_per_step: f64 = "", "exponent of CPU time per step";
+        steps_per_slip: f64 = "", "exponent of steps per slip";
+        breaks_per_slip: f64 = "", "exponent of breaks per slip";
+    }
+}
+
+impl Table for Exponents {
+    const NAME: &'static str = "scaling-exponents";
+    const MEANING: &'static str =
+        "One row per what grows and tolerance: exponents of the powers of it that fit the rows of `scaling` best";
 }
 
 /// All that is found.
@@ -157,7 +168,7 @@ fn timed(parameters: &Parameters, tolerance: f64, slips: u64) -> Result<SizeRow,
     };
     let per_slip = |count: u64| count as f64 / slips as f64;
     Ok(SizeRow {
-        parameters: parameters.clone(),
+        parameters: Selected::new(parameters.clone()),
         tolerance,
         cost: Cost::of(all_seconds - start_up_seconds, &past, slips),
         leaps_per_slip: per_slip(past.leaps),
@@ -264,7 +275,7 @@ mod tests {
     #[test]
     fn a_size_grows_over_its_own_rows_only() {
         let row = |blocks, contacts_per_block| SizeRow {
-            parameters: Parameters { blocks, contacts_per_block, ..Parameters::default() },
+            parameters: Selected::new(Parameters { blocks, contacts_per_block, ..Parameters::default() }),
             tolerance: 1e-6,
             cost: Cost::default(),
             leaps_per_slip: 0.0,

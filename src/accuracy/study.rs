@@ -10,9 +10,10 @@ use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cpu::{self, Cost};
 use super::distance::{Distances, deviation, distances, mean};
 use super::{AccuracyError, NO_LIMITS, drive_in_words, failed};
-use crate::model::Parameters;
+use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Solver, Summary, TOLERANCES, simulate, simulate_audited};
+use crate::table::columns::{Cell, Field, Kind, Selected, Selection, Table, columns, fields};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -104,21 +105,32 @@ fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
     fixed.chain(tolerances.iter().map(|&tolerance| Solver::EventDriven { tolerance })).collect()
 }
 
-/// One solver under one drive.
+/// The drive under which solvers run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MethodRow {
-    /// The drive, and all other parameters; seed 0.
-    pub parameters: Parameters,
-    /// Method and setting.
-    pub solver: Solver,
-    /// What it costs, by its cheapest realisation per step: other work on the machine can only add to that.
-    pub cost: Cost,
-    /// CPU time per step of the dearest realisation over that of the cheapest: how quiet the machine was.
-    pub cost_spread: f64,
-    /// Errors of the first break times; `None` if they would take too long.
-    pub break_times: Option<BreakErrors>,
-    /// Relative residual of the energy ledger over the first slips; `None` likewise.
-    pub ledger_residual: Option<f64>,
+pub struct Driven;
+
+impl Selection for Driven {
+    const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T];
+}
+
+columns! {
+    /// One solver under one drive. Costs are those of its cheapest realisation per step: other work on the machine can only
+    /// add to them. Errors of break times and the ledger are left out where they would take too long.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct MethodRow {
+        parameters: Selected<Driven>;
+        solver: Solver;
+        cost: Cost;
+        cost_spread as "cpu_spread": f64 = "",
+            "CPU time per step of the dearest realisation over that of the cheapest, which the costs are";
+        break_times: BreakErrors;
+        ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
+    }
+}
+
+impl Table for MethodRow {
+    const NAME: &'static str = "methods";
+    const MEANING: &'static str = "One row per drive and solver setting";
 }
 
 /// A quantity of slips.
@@ -168,23 +180,31 @@ impl Quantity {
     }
 }
 
-/// A distribution of one solver under one drive against that of the reference ensemble.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DistanceRow {
-    /// The drive, and all other parameters; seed 0.
-    pub parameters: Parameters,
-    /// Method and setting.
-    pub solver: Solver,
-    /// What is distributed.
-    pub quantity: Quantity,
-    /// Sizes of the sample and of the reference.
-    pub sizes: (u64, u64),
-    /// Means of the sample and of the reference.
-    pub means: (f64, f64),
-    /// Standard deviations of the sample and of the reference.
-    pub deviations: (f64, f64),
-    /// The distances.
-    pub distances: Distances,
+fields! {
+    Quantity: Text, |quantity| quantity.name(), |name| Quantity::ALL.into_iter().find(|quantity| quantity.name() == name);
+}
+
+columns! {
+    /// A distribution of one solver under one drive against that of the reference ensemble.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct DistanceRow {
+        parameters: Selected<Driven>;
+        solver: Solver;
+        quantity: Quantity = "", "interval, phase, drop, peak_force, duration or front_speed";
+        slips: u64 = "", "size of the sample";
+        reference_slips: u64 = "", "size of the reference sample";
+        mean: f64 = "", "mean";
+        reference_mean: f64 = "", "mean of the reference";
+        deviation: f64 = "", "standard deviation";
+        reference_deviation: f64 = "", "standard deviation of the reference";
+        distances: Distances;
+    }
+}
+
+impl Table for DistanceRow {
+    const NAME: &'static str = "distances";
+    const MEANING: &'static str = "One row per drive, solver setting and quantity; means, deviations, their biases and w1 are \
+                                   in its unit, that of the column of this name in `slips`";
 }
 
 /// All that a study finds.
@@ -286,7 +306,7 @@ impl Study {
             for ((&solver, ensemble), (break_times, ledger_residual)) in self.solvers.iter().zip(&ensembles).zip(checks)
             {
                 findings.methods.push(MethodRow {
-                    parameters: parameters.clone(),
+                    parameters: Selected::new(parameters.clone()),
                     solver,
                     cost: ensemble.cost(mean_interval),
                     cost_spread: ensemble.spread(),
@@ -329,14 +349,14 @@ impl Study {
         parameters: &Parameters,
         solver: Solver,
         reference: &Reference,
-    ) -> Result<Option<BreakErrors>, AccuracyError> {
+    ) -> Result<BreakErrors, AccuracyError> {
         let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
         if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
-            return Ok(None);
+            return Ok(BreakErrors::default());
         }
         let mut comparison = Comparison::new(reference, self.breaks);
         simulate(parameters, solver, NO_LIMITS, &mut comparison).map_err(failed(drive_in_words, parameters, solver))?;
-        Ok(Some(comparison.errors()))
+        Ok(comparison.errors())
     }
 
     fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>, AccuracyError> {
@@ -393,12 +413,15 @@ fn distance_rows(
         let (sample, reference) = (sample(slips, quantity), sample(reference, quantity));
         let key = key * Quantity::ALL.len() as u64 + place;
         Some(DistanceRow {
-            parameters: parameters.clone(),
+            parameters: Selected::new(parameters.clone()),
             solver,
             quantity,
-            sizes: (sample.len() as u64, reference.len() as u64),
-            means: (mean(&sample), mean(&reference)),
-            deviations: (deviation(&sample), deviation(&reference)),
+            slips: sample.len() as u64,
+            reference_slips: reference.len() as u64,
+            mean: mean(&sample),
+            reference_mean: mean(&reference),
+            deviation: deviation(&sample),
+            reference_deviation: deviation(&reference),
             distances: distances(&sample, &reference, key)?,
         })
     };
@@ -430,8 +453,11 @@ mod tests {
         assert_eq!(findings.methods.len(), 4);
         for pair in findings.methods.chunks(2) {
             let (coarse, tight) = (&pair[0], &pair[1]);
-            let (late, close) = (coarse.break_times.unwrap(), tight.break_times.unwrap());
-            assert!(late.median > 1e-7 && close.median < 1e-9 && close.missing == 0, "{late:?} {close:?}");
+            let (late, close) = (coarse.break_times, tight.break_times);
+            assert!(
+                late.median > Some(1e-7) && close.median < Some(1e-9) && close.missing == Some(0),
+                "{late:?} {close:?}"
+            );
             assert!(coarse.ledger_residual.unwrap().abs() > 1e-4 && tight.ledger_residual.unwrap().abs() < 1e-8);
             for row in pair {
                 assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
@@ -441,7 +467,7 @@ mod tests {
         assert_eq!(findings.distances.len(), 2 * 5 + 2 * 6);
         for row in &findings.distances {
             let seeds = if row.parameters.modulation_period.is_none() { 3 } else { 1 };
-            assert_eq!(row.sizes, (4 * seeds, 8 * seeds), "{row:?}");
+            assert_eq!((row.slips, row.reference_slips), (4 * seeds, 8 * seeds), "{row:?}");
         }
     }
 

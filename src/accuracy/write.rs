@@ -3,12 +3,13 @@
 use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{Findings, MethodRow, Quantity, Study};
-use super::tables::{distances, exponents, method, methods, sizes, stability};
+use super::tables::method;
 use super::{AccuracyError, Stability, cpu};
 use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
 use crate::results::commit::{Commit, create_folder};
-use crate::table::columns::Table;
+use crate::table::arrow;
+use crate::table::columns::{Row, Table};
 use crate::table::file::{Footer, PROGRAM, TableWriter};
 use crate::table::storage::Storage;
 use serde_json::{Value, json};
@@ -26,8 +27,8 @@ pub fn as_json(study: &Study, findings: &Findings) -> Value {
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
-        "methods": rows(&methods(), &findings.methods),
-        "distances": rows(&distances(), &findings.distances),
+        "methods": rows(&findings.methods),
+        "distances": rows(&findings.distances),
     }))
 }
 
@@ -35,15 +36,15 @@ pub fn as_json(study: &Study, findings: &Findings) -> Value {
 #[must_use]
 pub fn scaling_json(findings: &ScalingFindings) -> Value {
     document(json!({
-        "sizes": rows(&sizes(), &findings.sizes),
-        "exponents": rows(&exponents(), &findings.exponents),
+        "sizes": rows(&findings.sizes),
+        "exponents": rows(&findings.exponents),
     }))
 }
 
 /// The stability table as JSON.
 #[must_use]
 pub fn stability_json(cases: &[Stability]) -> Value {
-    document(json!({ "cases": rows(&stability(), cases) }))
+    document(json!({ "cases": rows(cases) }))
 }
 
 /// Adds what every document begins with.
@@ -54,8 +55,8 @@ fn document(mut fields: Value) -> Value {
     fields
 }
 
-fn rows<Row>(table: &Table<Row>, rows: &[Row]) -> Value {
-    rows.iter().map(|row| table.json(row)).collect()
+fn rows<R: Row>(rows: &[R]) -> Value {
+    rows.iter().map(arrow::json).collect()
 }
 
 /// Writes tables, JSON and figures into a folder, over those of an earlier study; returns the files.
@@ -69,8 +70,8 @@ pub fn write(
     findings: &Findings,
 ) -> Result<Vec<PathBuf>, AccuracyError> {
     let mut output = Output::begin(storage, folder)?;
-    output.table(methods(), &findings.methods)?;
-    output.table(distances(), &findings.distances)?;
+    output.table(&findings.methods)?;
+    output.table(&findings.distances)?;
     output.json("accuracy.json", &as_json(study, findings))?;
     for &velocity in &study.velocities {
         output.picture(&format!("work-precision-V0-{velocity:e}"), &figure(velocity, findings)?)?;
@@ -88,8 +89,8 @@ pub fn write_scaling(
     findings: &ScalingFindings,
 ) -> Result<Vec<PathBuf>, AccuracyError> {
     let mut output = Output::begin(storage, folder)?;
-    output.table(sizes(), &findings.sizes)?;
-    output.table(exponents(), &findings.exponents)?;
+    output.table(&findings.sizes)?;
+    output.table(&findings.exponents)?;
     output.json("scaling.json", &scaling_json(findings))?;
     output.picture("scaling", &scaling_figure(findings)?)?;
     output.publish()
@@ -105,7 +106,7 @@ pub fn write_stability(
     rows: &[Stability],
 ) -> Result<Vec<PathBuf>, AccuracyError> {
     let mut output = Output::begin(storage, folder)?;
-    output.table(stability(), rows)?;
+    output.table(rows)?;
     output.json("hard-cases.json", &stability_json(rows))?;
     output.publish()
 }
@@ -115,9 +116,8 @@ pub fn write_stability(
 fn figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
     let breaks = lines(&findings.methods, velocity, |row| {
-        let errors = row.break_times?;
-        let uncertainty = Some((errors.median, errors.largest));
-        Some(WorkPrecision { error: errors.median, uncertainty, work: row.cost.per_slip })
+        let (error, largest) = (row.break_times.median?, row.break_times.largest?);
+        Some(WorkPrecision { error, uncertainty: Some((error, largest)), work: row.cost.per_slip })
     });
     let label = "First break times, error (s)".to_owned();
     let mut panels = vec![ErrorPanel { label, by_chance: None, methods: breaks }];
@@ -197,10 +197,10 @@ impl<'a> Output<'a> {
         file
     }
 
-    fn table<Row>(&mut self, table: Table<Row>, rows: &[Row]) -> Result<(), AccuracyError> {
+    fn table<R: Table>(&mut self, rows: &[R]) -> Result<(), AccuracyError> {
         let footer = Footer::default().with("processor", &cpu::processor());
-        let file = self.place(&format!("{}.parquet", table.name));
-        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&file), table, &footer)?;
+        let file = self.place(&format!("{}.parquet", R::NAME));
+        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&file), &footer)?;
         for row in rows {
             writer.push(row)?;
         }
@@ -237,20 +237,21 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::solver::Solver;
+    use crate::table::columns::Selected;
     use crate::table::file::Reader;
     use crate::table::storage::Disk;
 
     fn findings() -> Findings {
         let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });
-        let break_times = Some(BreakErrors {
-            breaks: 100,
-            missing: 0,
-            median: 1e-7,
-            largest: 1e-6,
-            together: 140,
-            together_seconds: 0.06,
+        let break_times = BreakErrors {
+            breaks: Some(100),
+            missing: Some(0),
+            median: Some(1e-7),
+            largest: Some(1e-6),
+            together: Some(140),
+            together_seconds: Some(0.06),
             together_throughout: false,
-        });
+        };
         let cost = cpu::Cost {
             per_simulated_second: 0.2,
             per_slip: 0.02,
@@ -259,21 +260,24 @@ mod tests {
             timed_slips: 0,
         };
         let method = MethodRow {
-            parameters: parameters.clone(),
+            parameters: Selected::new(parameters.clone()),
             solver,
             cost,
             cost_spread: 1.0,
             break_times,
             ledger_residual: Some(-1e-3),
         };
-        let untested = MethodRow { break_times: None, ledger_residual: None, ..method.clone() };
+        let untested = MethodRow { break_times: BreakErrors::default(), ledger_residual: None, ..method.clone() };
         let distance = DistanceRow {
-            parameters,
+            parameters: Selected::new(parameters),
             solver,
             quantity: Quantity::Interval,
-            sizes: (3, 3),
-            means: (0.11, 0.11),
-            deviations: (0.01, 0.01),
+            slips: 3,
+            reference_slips: 3,
+            mean: 0.11,
+            reference_mean: 0.11,
+            deviation: 0.01,
+            reference_deviation: 0.01,
             distances: measured(&[0.1, 0.11, 0.12], &[0.1, 0.11, 0.13], 0).unwrap(),
         };
         Findings { methods: vec![method, untested], distances: vec![distance] }
@@ -296,8 +300,7 @@ mod tests {
             ]
         );
         assert!(files.iter().all(|file| file.is_file()));
-        let rows: usize =
-            Reader::new(&Disk, files[..1].to_vec(), None).map(|batch| batch.unwrap().rows.num_rows()).sum();
+        let rows: usize = Reader::new(&Disk, files[..1].to_vec()).map(|batch| batch.unwrap().rows.num_rows()).sum();
         assert_eq!(rows, 2);
         let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
         assert_eq!(json["methods"][0]["timed_slips"], 0);
@@ -326,7 +329,7 @@ mod tests {
     #[test]
     fn a_scaling_is_drawn_whatever_the_order_of_its_rows_and_not_without_any() {
         let row = |blocks, tolerance| SizeRow {
-            parameters: Parameters { blocks, ..Parameters::default() },
+            parameters: Selected::new(Parameters { blocks, ..Parameters::default() }),
             tolerance,
             cost: cpu::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cpu::Cost::default() },
             leaps_per_slip: 100.0,

@@ -155,10 +155,10 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
         };
         let costs = cells(study.velocities.iter().filter_map(same).map(cost));
         let errors = row.break_times;
-        let times = errors.map(|errors| format!("{:.0e} ({:.0e})", errors.median, errors.largest));
-        let together = errors.map(|errors| {
+        let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
+        let together = errors.together.zip(errors.together_seconds).map(|(breaks, seconds)| {
             let mark = if errors.together_throughout { ">" } else { "" };
-            format!("{mark}{} breaks, {:.3} s", errors.together, errors.together_seconds)
+            format!("{mark}{breaks} breaks, {seconds:.3} s")
         });
         lines.push(format!(
             "{:30}{costs} {:>8.0} {:>6.2} {:>18} {:>24} {:>9}",
@@ -187,7 +187,7 @@ fn distance_table(findings: &Findings) -> Vec<String> {
         if drive != Some(&row.parameters) {
             drive = Some(&row.parameters);
             let slips = findings.distances.iter().find(|other| other.parameters == row.parameters);
-            let slips = slips.map_or(0, |row| row.sizes.0);
+            let slips = slips.map_or(0, |row| row.slips);
             lines.push(format!("\n{}, about {slips} slips\n{:30}{heading}", drive_in_words(&row.parameters), "solver"));
         }
         let ratio = |found: Option<&Distances>| {

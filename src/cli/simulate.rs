@@ -22,7 +22,7 @@ use stickslip::observe::{
     AttachedMap, ContactLog, Measurements, Profile, Recording, RecordingKey, SlipObserver, Together, Trace,
 };
 use stickslip::results::tables;
-use stickslip::results::tables::{JobLabel, SlipRow};
+use stickslip::results::tables::{Drive, SlipRow};
 use stickslip::solver::{self, Observer};
 use stickslip::sweep::{Job, Sweep, SweepError};
 use stickslip::table::file::Footer;
@@ -235,17 +235,13 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
     let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
     write_records(arguments, &footer, recorded)?;
-    let label = JobLabel {
-        job_id: sweep.job_id(parameters).to_string(),
-        set_id: sweep.set_id(parameters).to_string(),
-        parameters: parameters.clone(),
-    };
+    let label = tables::label::<Drive>(&sweep, parameters);
     if let Some(path) = &arguments.slip_table {
-        let rows = result.slips.iter().map(|slip| SlipRow { job: &label, slip });
-        write_table(path, tables::slips(), &footer, rows)?;
+        let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
+        write_table(path, &footer, rows)?;
     }
     write_pictures(arguments, parameters, &trace.rows, &map.rows)?;
-    report(arguments.json, &label, &result, wall)?;
+    report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)
 }
 
@@ -332,13 +328,13 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(json: bool, label: &JobLabel, measured: &Measurements, wall: f64) -> Result<()> {
+fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
     let (slips, summary) = (&measured.slips, &measured.summary);
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
     let report = Report {
         format: FORMAT,
-        job_id: label.job_id.clone(),
+        job_id: job_id.to_owned(),
         simulated_seconds: summary.end_time,
         slips: slips.len(),
         mean_interval_seconds: mean,

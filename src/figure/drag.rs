@@ -4,13 +4,14 @@ use super::FigureError;
 use super::axis::{Axis, bounds};
 use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
 use super::picture::{Anchor, Dot, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
-use crate::reduce::{Point, Way, quantile};
+use crate::reduce::{Point, RampStage, quantile};
 
 const PANEL: (f64, f64) = (540.0, 330.0);
 const LOWER_HEIGHT: f64 = 230.0;
 const GAP: f64 = 42.0;
-/// What either way is called, and its ink.
-const WAYS: [(Way, &str, Ink); 2] = [(Way::There, "way there", INKS[0]), (Way::Back, "way back", INKS[1])];
+/// What either stage of the ramp is called, and its ink.
+const STAGES: [(RampStage, &str, Ink); 2] =
+    [(RampStage::Up, "way there", INKS[0]), (RampStage::Down, "way back", INKS[1])];
 const LINE: Stroke = Stroke::solid(LIGHT_GREY, 1.4);
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
@@ -23,7 +24,7 @@ const ASIDE: f64 = 0.12;
 /// A slip under a ramp, in SI.
 #[derive(Clone, Copy, Debug)]
 struct Slip {
-    way: Way,
+    stage: RampStage,
     /// T or Δ at the onset.
     modulation: f64,
     period: f64,
@@ -36,14 +37,14 @@ struct Slip {
 /// When no point lies on a ramp.
 pub fn drag(points: &[Point]) -> Result<Picture, FigureError> {
     const NAME: &str = "drag";
-    let on_ramp = || points.iter().filter(|point| matches!(point.way, Some(Way::There | Way::Back)));
+    let on_ramp = || points.iter().filter(|point| matches!(point.ramp_stage, Some(RampStage::Up | RampStage::Down)));
     let empty = FigureError::Empty { figure: NAME, what: "intervals on a ramp of the modulation" };
     let periods = bounds(on_ramp().filter_map(|point| point.period));
     let is_period = periods.is_some_and(|(low, high)| high > low);
     let slips: Vec<Slip> = on_ramp()
         .filter_map(|point| {
-            let (way, period, interval) = (point.way?, point.period?, point.interval?);
-            Some(Slip { way, modulation: if is_period { period } else { point.amplitude }, period, interval })
+            let (stage, period, interval) = (point.ramp_stage?, point.period?, point.interval?);
+            Some(Slip { stage, modulation: if is_period { period } else { point.amplitude }, period, interval })
         })
         .collect();
     let (Some((low, high)), Some((shortest, longest))) =
@@ -80,8 +81,8 @@ pub fn drag(points: &[Point]) -> Result<Picture, FigureError> {
     draw_intervals(&mut sheet, &upper, &slips, multiples(), is_period);
     draw_medians(&mut sheet, &lower, &slips, multiples(), (low, high));
     lower.x_label(&mut sheet);
-    let mut entries: Vec<_> = WAYS.map(|(_, name, ink)| (Mark::Dot(slip_dot(ink)), format!("slips, {name}"))).into();
-    entries.extend(WAYS.map(|(_, name, ink)| (Mark::Line(quartiles(ink)), format!("quartiles, {name}"))));
+    let mut entries: Vec<_> = STAGES.map(|(_, name, ink)| (Mark::Dot(slip_dot(ink)), format!("slips, {name}"))).into();
+    entries.extend(STAGES.map(|(_, name, ink)| (Mark::Line(quartiles(ink)), format!("quartiles, {name}"))));
     entries.push((Mark::Line(LINE), "τ = nT".to_owned()));
     lower.legend(&mut sheet, LegendPlace::Beside, &entries);
     Ok(sheet.finish())
@@ -114,7 +115,7 @@ fn draw_intervals(
         }
         // Slip by slip, so that neither way covers the other.
         for slip in slips {
-            for (_, _, ink) in WAYS.iter().filter(|(way, ..)| *way == slip.way) {
+            for (_, _, ink) in STAGES.iter().filter(|(stage, ..)| *stage == slip.stage) {
                 frame.points(sheet, [(slip.modulation, slip.interval)], slip_dot(ink));
             }
         }
@@ -147,12 +148,12 @@ fn draw_medians(
         for n in multiples {
             frame.curve(sheet, [(frame.x.low, n), (frame.x.high, n)], LINE);
         }
-        for ((way, _, ink), side) in WAYS.into_iter().zip([-ASIDE, ASIDE]) {
+        for ((stage, _, ink), side) in STAGES.into_iter().zip([-ASIDE, ASIDE]) {
             for bin in 0..BINS {
                 let start = low + f64::from(bin) * width;
                 let is_last = bin + 1 == BINS;
                 let within = |slip: &&Slip| {
-                    slip.way == way && slip.modulation >= start && (is_last || slip.modulation < start + width)
+                    slip.stage == stage && slip.modulation >= start && (is_last || slip.modulation < start + width)
                 };
                 let mut ratios: Vec<f64> =
                     slips.iter().filter(within).map(|slip| slip.interval / slip.period).collect();
@@ -176,13 +177,13 @@ fn draw_medians(
 mod tests {
     use super::*;
 
-    fn point(way: Option<Way>, period: f64, n: f64) -> Point {
+    fn point(ramp_stage: Option<RampStage>, period: f64, n: f64) -> Point {
         Point {
             drive_velocity: 1e-4,
             amplitude: 1e-6,
             period: Some(period),
             eta: 2.0,
-            way,
+            ramp_stage,
             onset: 1.0,
             interval: Some(n * period),
             periods: Some(4),
@@ -192,20 +193,20 @@ mod tests {
     }
 
     #[test]
-    fn every_way_is_drawn_and_what_comes_after_is_not() {
-        let on = |way, n| (0..200).map(move |step| point(Some(way), 0.03 + 5e-5 * f64::from(step), n));
-        let points: Vec<Point> = on(Way::There, 4.0).chain(on(Way::Back, 3.0)).collect();
+    fn both_stages_are_drawn_and_what_comes_after_is_not() {
+        let on = |stage, n| (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n));
+        let points: Vec<Point> = on(RampStage::Up, 4.0).chain(on(RampStage::Down, 3.0)).collect();
         let svg = drag(&points).unwrap().svg();
         for text in ["n = 3", "n = 4", "way there", "way back", "τ/T"] {
             assert!(svg.contains(text), "{text}");
         }
-        let after: Vec<Point> = on(Way::After, 4.0).chain([point(None, 0.03, 4.0)]).collect();
+        let after: Vec<Point> = on(RampStage::After, 4.0).chain([point(None, 0.03, 4.0)]).collect();
         assert!(matches!(drag(&after), Err(FigureError::Empty { .. })));
     }
 
     #[test]
     fn a_ramp_of_the_amplitude_alone_is_drawn_over_the_amplitude() {
-        let ramped = |step: u32| Point { amplitude: 1e-8 * f64::from(step), ..point(Some(Way::There), 0.03, 4.0) };
+        let ramped = |step: u32| Point { amplitude: 1e-8 * f64::from(step), ..point(Some(RampStage::Up), 0.03, 4.0) };
         let svg = drag(&(0..100).map(ramped).collect::<Vec<_>>()).unwrap().svg();
         assert!(svg.contains("Amplitude Δ at the onset"));
     }

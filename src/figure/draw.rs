@@ -4,7 +4,7 @@ use super::sets::{modulation, setting, swept};
 use super::{Bar, FigureError, HistogramPanel, MOST_PANELS, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, staircase};
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{HistogramBin, SetSummary, WRITER, read_backbone, read_histograms, read_points, read_sets};
+use crate::reduce::{HistogramBin, Point, SetSummary, WRITER, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone, create_folder};
 use crate::results::layout::Layout;
 use crate::table::storage::Storage;
@@ -23,15 +23,15 @@ const MOST_SETS: usize = 100_000;
 /// When the reduced data are not there, are damaged, or a figure cannot be written.
 pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, FigureError> {
     let _alone = alone(storage, layout, WRITER)?;
-    let points = read_points(storage, layout)?;
+    let points = read_reduced::<Point>(storage, layout)?;
     let mut pictures = Vec::new();
     if points.iter().any(|point| point.phase.is_some()) {
-        pictures.push(backbone(&points, &read_backbone(storage, layout)?)?);
+        pictures.push(backbone(&points, &read_reduced(storage, layout)?)?);
     }
     if points.iter().any(|point| point.period.is_some() && point.interval.is_some()) {
         pictures.push(intervals(&points)?);
     }
-    if points.iter().any(|point| point.way.is_some() && point.interval.is_some()) {
+    if points.iter().any(|point| point.ramp_stage.is_some() && point.interval.is_some()) {
         pictures.push(drag(&points)?);
     }
     let sets = read_sets(storage, layout, MOST_SETS)?;
@@ -43,7 +43,7 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
     }
     // Each panel may hold a second set, of identical contacts.
     let are_few = (1..=2 * MOST_PANELS).contains(&sets.len());
-    let panels = if are_few { panels(&sets, &read_histograms(storage, layout)?) } else { Vec::new() };
+    let panels = if are_few { panels(&sets, &read_reduced(storage, layout)?) } else { Vec::new() };
     if (1..=MOST_PANELS).contains(&panels.len()) {
         pictures.push(histograms(&panels)?);
     }
@@ -104,6 +104,7 @@ fn title(parameters: &Parameters, swept: &[Symbol]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reduce::SetRow;
     use crate::reduce::{BackboneBin, Point, reduced_file};
     use crate::table::file::{Footer, TableWriter};
     use crate::table::storage::Disk;
@@ -145,20 +146,14 @@ mod tests {
         fs::create_dir_all(layout.reduced()).unwrap();
         let footer = Footer::default();
         let path = |name: &str| reduced_file(&layout, name);
-        let mut writer = TableWriter::create(&Disk, &path("points"), crate::reduce::points(), &footer).unwrap();
+        let mut writer = TableWriter::<Point>::create(&Disk, &path("points"), &footer).unwrap();
         for point in points {
             writer.push(point).unwrap();
         }
         writer.finish().unwrap();
-        TableWriter::<BackboneBin>::create(&Disk, &path("backbone"), crate::reduce::backbone(), &footer)
-            .unwrap()
-            .finish()
-            .unwrap();
-        TableWriter::create(&Disk, &path("sets"), crate::reduce::sets(), &footer).unwrap().finish().unwrap();
-        TableWriter::create(&Disk, &path("histograms"), crate::reduce::histograms(), &footer)
-            .unwrap()
-            .finish()
-            .unwrap();
+        TableWriter::<BackboneBin>::create(&Disk, &path("backbone"), &footer).unwrap().finish().unwrap();
+        TableWriter::<SetRow>::create(&Disk, &path("sets"), &footer).unwrap().finish().unwrap();
+        TableWriter::<HistogramBin>::create(&Disk, &path("histograms"), &footer).unwrap().finish().unwrap();
         (root, layout)
     }
 
@@ -169,7 +164,7 @@ mod tests {
             amplitude: 1e-6,
             period: Some(period),
             eta: 0.5 + f64::from(step),
-            way: None,
+            ramp_stage: None,
             onset: 1.0,
             interval: Some(4.0 * period),
             periods: Some(4),

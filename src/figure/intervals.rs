@@ -95,7 +95,7 @@ mod tests {
             amplitude: 1e-6,
             period: Some(0.01),
             eta: 20.0,
-            way: None,
+            ramp_stage: None,
             onset: 1.0,
             interval: Some(n as f64 * 0.01),
             periods: Some(n),

@@ -176,7 +176,7 @@ impl Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_documented;
+    use crate::documented::assert_table_documented;
 
     #[test]
     fn keys_are_distinct_and_read_back() {
@@ -206,7 +206,7 @@ mod tests {
     fn documented_parameters_are_those_of_the_model() {
         let defaults = Parameters::default();
         let rows = Symbol::ALL.map(|symbol| (symbol.description(), defaults.get(symbol)));
-        assert_documented("model.md", "## Parameters", &rows);
+        assert_table_documented("model.md", "## Parameters", &rows);
     }
 
     #[test]

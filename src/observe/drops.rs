@@ -7,16 +7,18 @@
 
 use crate::model::{Drive, Parameters};
 use crate::solver::Segment;
+use crate::table::columns::columns;
 
-/// Drops before and during a slip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drops {
-    /// Drops since the previous slip: those under way during neither rupture.
-    pub before: u64,
-    /// The largest of them, in N; `None` without any.
-    pub largest_before: Option<f64>,
-    /// The largest drop under way during the slip's rupture, in N; `None` if the slip is not seen.
-    pub during: Option<f64>,
+columns! {
+    /// Drops before and during a slip; none of the values where drops are not recorded.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Drops {
+        before as "drops_before": Option<u64> = "",
+            "drops of the shear force since the previous slip; null unless the sweep records drops, as what follows";
+        largest_before as "largest_drop_before": Option<f64> = "N", "the largest of them; null without any";
+        during as "drop_during": Option<f64> = "N",
+            "the largest drop under way during the slip; null if the slip is not seen as a drop";
+    }
 }
 
 /// The shear force, in N, and the displacement of the driven end, in m, at a time in s.
@@ -100,7 +102,7 @@ impl DropDetector {
             let (before, others) = drops.split_at(drops.partition_point(|drop| drop.end < first_break));
             let (during, later) = others.split_at(others.partition_point(|drop| drop.start <= last_break));
             drops = later;
-            Drops { before: before.len() as u64, largest_before: largest(before), during: largest(during) }
+            Drops { before: Some(before.len() as u64), largest_before: largest(before), during: largest(during) }
         };
         slips.iter().map(of_slip).collect()
     }
@@ -125,10 +127,10 @@ mod tests {
     #[test]
     fn a_fall_counts_from_the_top_to_the_bottom_and_smaller_rises_do_not_cut_it() {
         let forces = [0.0, 100.0, 60.0, 64.0, 20.0, 80.0];
-        let whole = Drops { before: 0, largest_before: None, during: Some(80.0) };
+        let whole = Drops { before: Some(0), largest_before: None, during: Some(80.0) };
         assert_eq!(drops(10.0, &forces, &[(2e-3, 3e-3)]), [whole]);
         // With a least drop of 4 N the rise by 4 N cuts it.
-        let cut = Drops { before: 1, largest_before: Some(40.0), during: Some(44.0) };
+        let cut = Drops { before: Some(1), largest_before: Some(40.0), during: Some(44.0) };
         assert_eq!(drops(4.0, &forces, &[(3.5e-3, 4e-3)]), [cut]);
         assert_eq!(drops(80.1, &forces, &[(2e-3, 3e-3)]), [Drops { during: None, ..whole }]);
     }
@@ -137,8 +139,8 @@ mod tests {
     fn each_drop_belongs_to_one_slip_and_a_fall_under_way_at_the_end_counts() {
         // Drops of 5, 50, 7, 6 and 60 N, the second and the last during slips.
         let forces = [0.0, 20.0, 15.0, 60.0, 10.0, 30.0, 23.0, 40.0, 34.0, 70.0, 10.0];
-        let first = Drops { before: 1, largest_before: Some(5.0), during: Some(50.0) };
-        let second = Drops { before: 2, largest_before: Some(7.0), during: Some(60.0) };
+        let first = Drops { before: Some(1), largest_before: Some(5.0), during: Some(50.0) };
+        let second = Drops { before: Some(2), largest_before: Some(7.0), during: Some(60.0) };
         assert_eq!(drops(5.0, &forces, &[(3.1e-3, 4.2e-3), (9.2e-3, 9.9e-3)]), [first, second]);
     }
 
@@ -164,7 +166,7 @@ mod tests {
         detector.advance(&swing(0.0, 0.065, 0.0));
         detector.advance(&swing(0.065, 0.06, 3e-7));
         let [drops] = detector.of_slips(&[(1.0, 1.0)])[..] else { panic!("one slip") };
-        assert_eq!((drops.before, drops.during), (1, None));
+        assert_eq!((drops.before, drops.during), (Some(1), None));
         assert!((drops.largest_before.unwrap() - 12.0).abs() < 1e-9, "{drops:?}");
     }
 }

@@ -48,11 +48,11 @@ impl RecordingKey {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_documented;
+    use crate::documented::assert_table_documented;
 
     #[test]
     fn documented_keys_are_those_of_a_recording() {
         let rows = RecordingKey::ALL.map(|key| (key.description(), Recording::default().get(key)));
-        assert_documented("sweeps.md", "## [record]", &rows);
+        assert_table_documented("sweeps.md", "## [record]", &rows);
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
+use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
 /// Several observers in step; the first decides when it is enough.
 pub struct Together<'a> {
@@ -53,17 +54,15 @@ impl Sampling {
     }
 }
 
-/// One sample of a trace.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TraceRow {
-    /// Time, in s.
-    pub time: f64,
-    /// Shear force F_S, in N.
-    pub force: f64,
-    /// Displacement of the trailing edge, in m.
-    pub displacement: f64,
-    /// Attached contacts over all contacts.
-    pub attached_fraction: f64,
+columns! {
+    /// One sample of a trace.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct TraceRow {
+        time: f64 = "s", "time";
+        force: f64 = "N", "shear force F_S";
+        displacement: f64 = "m", "displacement of the trailing edge";
+        attached_fraction: f64 = "", "attached contacts over all contacts";
+    }
 }
 
 /// An observer that samples the shear force at regular instants.
@@ -113,15 +112,14 @@ impl Observer for Trace {
     }
 }
 
-/// One cell of a space-time map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MapRow {
-    /// Time, in s.
-    pub time: f64,
-    /// Block, counted from 1 at the trailing edge.
-    pub block: u64,
-    /// Attached contacts over the contacts of the block.
-    pub attached_fraction: f64,
+columns! {
+    /// One cell of a space-time map.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MapRow {
+        time: f64 = "s", "time";
+        block: u64 = "", "block, counted from 1 at the trailing edge";
+        attached_fraction: f64 = "", "attached contacts over the contacts of the block";
+    }
 }
 
 /// An observer that samples the attached fraction of every block at regular instants (Fig. 4).
@@ -170,17 +168,15 @@ impl Observer for AttachedMap {
     }
 }
 
-/// The displacement of one block at the end of a run (Eq. 1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProfileRow {
-    /// Time of the end, in s.
-    pub time: f64,
-    /// Block, counted from 1 at the trailing edge.
-    pub block: u64,
-    /// Its position j L/N, in m.
-    pub position: f64,
-    /// Its displacement since the start, in m.
-    pub displacement: f64,
+columns! {
+    /// The displacement of one block at the end of a run (Eq. 1).
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ProfileRow {
+        time: f64 = "s", "time of the end";
+        block: u64 = "", "block, counted from 1 at the trailing edge";
+        position: f64 = "m", "position j L/N of the block";
+        displacement: f64 = "m", "displacement of the block since the start";
+    }
 }
 
 /// An observer that keeps where the blocks are at the end.
@@ -219,6 +215,68 @@ impl Observer for Profile {
             })
             .collect();
     }
+}
+
+columns! {
+    /// A contact event as a row of the contact log.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ContactRow {
+        time: f64 = "s", "time of the event";
+        block: u64 = "", "block, counted from 1 at the trailing edge";
+        contact: u64 = "", "contact within its block, counted from 1";
+        generation: u64 = "", "life of the contact, 0 is the initial attachment";
+        change as "event": Change = "", "attach or break";
+        displacement: f64 = "m", "displacement of the block";
+        force: f64 = "N", "force of the contact at the event, positive when it pulls the block back";
+        threshold: f64 = "N", "threshold of this life";
+        stiffness: f64 = "N/m", "stiffness of this life";
+    }
+}
+
+fields! {
+    Change: Text, |change| match change {
+        Change::Attach => "attach",
+        Change::Break => "break",
+    }, |word| match word {
+        "attach" => Some(Change::Attach),
+        "break" => Some(Change::Break),
+        _ => None,
+    };
+}
+
+impl From<&ContactEvent> for ContactRow {
+    fn from(event: &ContactEvent) -> Self {
+        let ContactEvent { time, block, contact, generation, change, displacement, force, threshold, stiffness } =
+            *event;
+        Self {
+            time,
+            block: block as u64 + 1,
+            contact: contact as u64 + 1,
+            generation: u64::from(generation),
+            change,
+            displacement,
+            force,
+            threshold,
+            stiffness,
+        }
+    }
+}
+
+/// The tables that one simulation writes on request.
+macro_rules! tables {
+    ($($row:ty = $name:literal, $meaning:literal;)*) => {
+        $(impl Table for $row {
+            const NAME: &'static str = $name;
+            const MEANING: &'static str = $meaning;
+        })*
+    };
+}
+
+tables! {
+    TraceRow = "trace", "One row per sample of a simulation";
+    MapRow = "map", "One row per sample and block";
+    ProfileRow = "profile", "One row per block, at the end of a simulation";
+    ContactRow = "contacts", "One row per contact event, in order; with the initial attachment";
 }
 
 /// An observer that keeps every contact event in order.

@@ -8,21 +8,32 @@ use super::Recording;
 use super::drops::{DropDetector, Drops};
 use super::phase::phase;
 use super::rupture::{Rupture, advance_speed};
+use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
+use crate::table::columns::columns;
+use std::f64::consts::TAU;
 
-/// The cycle of the modulation in force at an onset.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Modulation {
-    /// Its period, in s; `None` without modulation.
-    pub period: Option<f64>,
-    /// Its amplitude, in m; 0 without modulation.
-    pub amplitude: f64,
+columns! {
+    /// The cycle of the modulation in force at an onset.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Modulation {
+        period as "T_onset": Option<f64> = "s",
+            "period of the modulation at the onset, T unless ramped; null without modulation";
+        amplitude as "Delta_onset": f64 = "m",
+            "amplitude of the modulation at the onset, Delta unless ramped; 0 without modulation";
+    }
 }
 
 impl Modulation {
     fn of(drive: &Drive) -> Self {
         Self { period: (drive.period > 0.0).then_some(drive.period), amplitude: drive.amplitude }
+    }
+
+    /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
+    #[must_use]
+    pub fn eta(&self, drive_velocity: f64) -> f64 {
+        self.period.map_or(0.0, |period| eta(TAU / period, self.amplitude, drive_velocity))
     }
 
     /// Number n of periods nearest to an interval in s; `None` without modulation.
@@ -33,68 +44,47 @@ impl Modulation {
     }
 }
 
-/// One slip: a rupture that breaks contacts at every block.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slip {
-    /// Number of the slip within its job, 0 for the first after start-up.
-    pub number: u64,
-    /// Onset: time of the largest shear force since the previous slip's end, in s.
-    pub onset: f64,
-    /// Interval τ since the onset of the previous slip, in s; `None` if there was none.
-    pub interval: Option<f64>,
-    /// Phase φ of the onset against the modulation, in rad; `None` without modulation.
-    pub phase: Option<f64>,
-    /// The modulation at the onset.
-    pub modulation: Modulation,
-    /// Shear force `F_S` at the onset, in N.
-    pub peak_force: f64,
-    /// Stress drop: peak force minus the least shear force during the slip, in N.
-    pub drop: f64,
-    /// Time of the rupture's first break, in s.
-    pub nucleation: f64,
-    /// Block of the first break, counted from 1 at the trailing edge.
-    pub nucleation_block: u64,
-    /// From the first to the last break, in s.
-    pub duration: f64,
-    /// Breaks in the rupture.
-    pub size: u64,
-    /// Speed of the rupture front, in m/s; `None` if fewer than three blocks lie on it.
-    pub front_speed: Option<f64>,
-    /// Precursors since the previous slip.
-    pub precursors: u64,
-    /// Speed of the slow front: advance of the reach through these precursors, in m/s; `None` for fewer than two.
-    pub slow_front_speed: Option<f64>,
-    /// Drops of the shear force; `None` if they are not recorded.
-    pub drops: Option<Drops>,
+columns! {
+    /// One slip: a rupture that breaks contacts at every block.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Slip {
+        number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up";
+        onset: f64 = "s", "time of the largest shear force since the previous slip's end";
+        interval: Option<f64> = "s", "time since the previous onset";
+        modulation: Modulation;
+        periods as "n": Option<u64> = "", "interval in periods T_onset, rounded; null without modulation";
+        phase: Option<f64> = "rad", "phase of the onset against the modulation";
+        peak_force: f64 = "N", "shear force at the onset";
+        drop: f64 = "N", "peak force minus the least shear force during the slip";
+        nucleation: f64 = "s", "time of the first break";
+        nucleation_block: u64 = "", "block of the first break, from 1 at the trailing edge";
+        duration: f64 = "s", "from the first to the last break";
+        size: u64 = "", "breaks in the rupture";
+        front_speed: Option<f64> = "m/s", "speed of the rupture front";
+        precursors: u64 = "", "precursors since the previous slip";
+        slow_front_speed: Option<f64> = "m/s",
+            "advance of the reach through these precursors; null for fewer than two";
+        drops: Drops;
+    }
 }
 
-/// One precursor: a rupture of at least the precursor size that does not break contacts at every block.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Precursor {
-    /// Number of the slip that it precedes.
-    pub slip: u64,
-    /// Number of the precursor before that slip, from 0.
-    pub precursor: u64,
-    /// Onset: time of the largest shear force since the previous rupture of at least this size, in s.
-    pub onset: f64,
-    /// Interval since the onset of the previous precursor of the same slip, in s; `None` for the first.
-    pub interval: Option<f64>,
-    /// The modulation at the onset.
-    pub modulation: Modulation,
-    /// Time of the first break, in s.
-    pub nucleation: f64,
-    /// Block of the first break, counted from 1.
-    pub nucleation_block: u64,
-    /// From the first to the last break, in s.
-    pub duration: f64,
-    /// Breaks.
-    pub size: u64,
-    /// Distinct blocks with a break.
-    pub extent: u64,
-    /// The furthest of them, counted from 1.
-    pub reach: u64,
-    /// Speed of its front, in m/s; `None` if fewer than three blocks lie on it.
-    pub front_speed: Option<f64>,
+columns! {
+    /// One precursor: a rupture of at least the precursor size that does not break contacts at every block.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Precursor {
+        slip: u64 = "", "number of the slip that it precedes";
+        precursor: u64 = "", "number of the precursor before that slip, from 0";
+        onset: f64 = "s", "time of the largest shear force since the previous rupture of at least this size";
+        interval: Option<f64> = "s", "time since the onset of the previous precursor of the same slip";
+        modulation: Modulation;
+        nucleation: f64 = "s", "time of the first break";
+        nucleation_block: u64 = "", "block of the first break, from 1 at the trailing edge";
+        duration: f64 = "s", "from the first to the last break";
+        size: u64 = "", "breaks in the rupture";
+        extent: u64 = "", "distinct blocks with a break";
+        reach: u64 = "", "the furthest of them, from 1";
+        front_speed: Option<f64> = "m/s", "speed of the rupture front";
+    }
 }
 
 /// A largest shear force, in N, and its time, in s.
@@ -208,7 +198,7 @@ impl SlipObserver {
         if let Some(drops) = self.drops {
             let discarded = self.spans.len() - self.slips.len();
             let of_slips = drops.of_slips(&self.spans).into_iter().skip(discarded);
-            self.slips.iter_mut().zip(of_slips).for_each(|(slip, drops)| slip.drops = Some(drops));
+            self.slips.iter_mut().zip(of_slips).for_each(|(slip, drops)| slip.drops = drops);
         }
         (self.slips, self.precursors)
     }
@@ -273,12 +263,14 @@ impl SlipObserver {
         if self.slips_seen >= discard {
             let drive = &self.at_slip;
             let modulation = Modulation::of(drive);
+            let interval = self.last_onset.map(|last| onset.time - last);
             self.slips.push(Slip {
                 number: self.slips_seen - discard,
                 onset: onset.time,
-                interval: self.last_onset.map(|last| onset.time - last),
-                phase: modulation.period.map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
+                interval,
                 modulation,
+                periods: interval.and_then(|interval| modulation.periods(interval)),
+                phase: modulation.period.map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
                 peak_force: onset.force,
                 drop: onset.force - active.least_at_last_break,
                 nucleation: rupture.first_time,
@@ -288,7 +280,7 @@ impl SlipObserver {
                 front_speed: rupture.front_speed(&self.parameters),
                 precursors: self.pending,
                 slow_front_speed: advance_speed(self.advances.iter().copied()),
-                drops: None,
+                drops: Drops::default(),
             });
         }
         if self.drops.is_some() {

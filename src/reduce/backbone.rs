@@ -5,37 +5,46 @@ use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use super::set::FinishedSet;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::table::columns::{Column, Getter, Table};
+use crate::table::columns::{Table, columns};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Bins per decade. Their edges are 10^(k/4), so that one lies on η = 1, where locking begins.
 pub const BINS_PER_DECADE: i32 = 4;
 
-/// A bin of η that holds at least one slip. `None` where there is nothing to average.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "each is described in `backbone`, the table of these rows")]
-pub struct BackboneBin {
-    pub eta_low: f64,
-    pub eta_high: f64,
-    pub eta_centre: f64,
-    pub sets: u64,
-    pub locked_sets: u64,
-    pub slips: u64,
-    pub effective_slips: Option<f64>,
-    pub phase_mean: Option<f64>,
-    pub phase_mean_low: Option<f64>,
-    pub phase_mean_high: Option<f64>,
-    pub resultant_length: Option<f64>,
-    pub expected_resultant: Option<f64>,
-    pub rayleigh_p: Option<f64>,
-    pub load_rayleigh_p: Option<f64>,
-    pub share_below: Option<f64>,
-    pub locked_phase_mean: Option<f64>,
-    pub locked_phase_mean_low: Option<f64>,
-    pub locked_phase_mean_high: Option<f64>,
-    pub phase_minimum: Option<f64>,
-    pub asymptote: f64,
+columns! {
+    /// A bin of η that holds at least one slip. `None` where there is nothing to average.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct BackboneBin {
+        eta_low: f64 = "", "lower edge of the bin, included";
+        eta_high: f64 = "", "upper edge, excluded";
+        eta_centre: f64 = "", "geometric centre";
+        sets: u64 = "", "parameter sets";
+        locked_sets: u64 = "", "locked parameter sets";
+        slips: u64 = "", "slips of all sets";
+        effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
+        phase_mean: Option<f64> = "rad", "circular mean of the phase of all slips";
+        phase_mean_low: Option<f64> = "rad",
+            "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded";
+        phase_mean_high: Option<f64> = "rad", "upper end";
+        resultant_length: Option<f64> = "", "|<exp(i phi)>| of all slips";
+        expected_resultant: Option<f64> = "",
+            "the same of slips at random loads, eta/2 averaged over the slips; null for eta >= 1";
+        rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test of all slips, with effective_slips";
+        load_rayleigh_p: Option<f64> = "",
+            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1";
+        share_below: Option<f64> = "", "share of slips under phi_min(eta of their set) - 0.15 rad; null for eta < 1";
+        locked_phase_mean: Option<f64> = "rad", "circular mean over locked sets of their mean phase";
+        locked_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, of sets as units";
+        locked_phase_mean_high: Option<f64> = "rad", "upper end";
+        phase_minimum as "phi_min": Option<f64> = "rad", "least phase of Eq. 2 at the centre; null for eta < 1";
+        asymptote: f64 = "rad", "-2 sqrt(pi / eta) at the centre";
+    }
+}
+
+impl Table for BackboneBin {
+    const NAME: &'static str = "backbone";
+    const MEANING: &'static str = "One row per bin of eta that holds slips, four bins per decade";
 }
 
 /// Pools the sets of each bin.
@@ -77,7 +86,7 @@ fn bin_of(eta: f64) -> i32 {
 impl Backbone {
     /// Adds a set. One without modulation has no phase and is left out, one with a ramp no single η.
     pub(super) fn push(&mut self, set: &FinishedSet) {
-        if set.row.jobs.parameters.ramp_time > 0.0 {
+        if set.row.parameters.ramp_time > 0.0 {
             return;
         }
         let Some(phase) = set.row.phase_mean else { return };
@@ -132,80 +141,6 @@ impl Backbone {
 /// 1/2 in every direction, which is the largest.
 fn pooled(phases: &Estimate<2>) -> Estimate<2> {
     if phases.count() == 1 { phases.with_known_variance(0.5) } else { *phases }
-}
-
-/// The table of bins.
-#[must_use]
-pub fn backbone() -> Table<BackboneBin> {
-    use Getter::{Count, OptionalReal, Real};
-    let columns = vec![
-        Column::new("eta_low", "", "lower edge of the bin, included", Real(|row: &BackboneBin| row.eta_low)),
-        Column::new("eta_high", "", "upper edge, excluded", Real(|row| row.eta_high)),
-        Column::new("eta_centre", "", "geometric centre", Real(|row| row.eta_centre)),
-        Column::new("sets", "", "parameter sets", Count(|row| row.sets)),
-        Column::new("locked_sets", "", "locked parameter sets", Count(|row| row.locked_sets)),
-        Column::new("slips", "", "slips of all sets", Count(|row| row.slips)),
-        Column::new(
-            "effective_slips",
-            "",
-            "independent phases that tell as much as the correlated ones",
-            OptionalReal(|row| row.effective_slips),
-        ),
-        Column::new("phase_mean", "rad", "circular mean of the phase of all slips", OptionalReal(|row| row.phase_mean)),
-        Column::new(
-            "phase_mean_low",
-            "rad",
-            "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded",
-            OptionalReal(|row| row.phase_mean_low),
-        ),
-        Column::new("phase_mean_high", "rad", "upper end", OptionalReal(|row| row.phase_mean_high)),
-        Column::new("resultant_length", "", "|<exp(i phi)>| of all slips", OptionalReal(|row| row.resultant_length)),
-        Column::new(
-            "expected_resultant",
-            "",
-            "the same of slips at random loads, eta/2 averaged over the slips; null for eta >= 1",
-            OptionalReal(|row| row.expected_resultant),
-        ),
-        Column::new(
-            "rayleigh_p",
-            "",
-            "p-value of the Rayleigh test of all slips, with effective_slips",
-            OptionalReal(|row| row.rayleigh_p),
-        ),
-        Column::new(
-            "load_rayleigh_p",
-            "",
-            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1",
-            OptionalReal(|row| row.load_rayleigh_p),
-        ),
-        Column::new(
-            "share_below",
-            "",
-            "share of slips under phi_min(eta of their set) - 0.15 rad; null for eta < 1",
-            OptionalReal(|row| row.share_below),
-        ),
-        Column::new(
-            "locked_phase_mean",
-            "rad",
-            "circular mean over locked sets of their mean phase",
-            OptionalReal(|row| row.locked_phase_mean),
-        ),
-        Column::new(
-            "locked_phase_mean_low",
-            "rad",
-            "lower end of its 95 % confidence interval, of sets as units",
-            OptionalReal(|row| row.locked_phase_mean_low),
-        ),
-        Column::new("locked_phase_mean_high", "rad", "upper end", OptionalReal(|row| row.locked_phase_mean_high)),
-        Column::new(
-            "phi_min",
-            "rad",
-            "least phase of Eq. 2 at the centre; null for eta < 1",
-            OptionalReal(|row| row.phase_minimum),
-        ),
-        Column::new("asymptote", "rad", "-2 sqrt(pi / eta) at the centre", Real(|row| row.asymptote)),
-    ];
-    Table { name: "backbone", meaning: "One row per bin of eta that holds slips, four bins per decade", columns }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::moments::Moments;
 use super::sequence::Estimate;
+use crate::table::columns::{Cell, Column, Kind, Part};
 use std::f64::consts::PI;
 
 /// Share of repetitions in which an interval holds the true value.
@@ -14,6 +15,34 @@ pub struct Interval {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+/// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
+impl Part for Option<Interval> {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        [("_low", meaning), ("_high", "upper end")]
+            .map(|(end, meaning)| Column {
+                name: format!("{name}{end}").into(),
+                unit,
+                meaning,
+                kind: Kind::Real,
+                nullable: true,
+            })
+            .to_vec()
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
+        give(self.map_or(Cell::Null, |interval| Cell::Real(interval.low)));
+        give(self.map_or(Cell::Null, |interval| Cell::Real(interval.high)));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+        match (next(), next()) {
+            (Cell::Real(low), Cell::Real(high)) => Ok(Some(Interval { low, high })),
+            (Cell::Null, Cell::Null) => Ok(None),
+            _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
+        }
+    }
 }
 
 impl Interval {

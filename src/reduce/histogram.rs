@@ -1,24 +1,27 @@
 //! Histograms of the interval τ, one per parameter set (Fig. 2).
 
 use super::SetRow;
-use crate::table::columns::{Column, Getter, Table};
+use crate::table::columns::{Table, columns};
 
 /// Bins per mean interval: 1.9 ms at the paper's standard case, where the peaks are 5 ms wide and 50 ms apart.
 pub const BINS_PER_MEAN: f64 = 60.0;
 
-/// A bin of a histogram that holds at least one interval.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HistogramBin {
-    /// Id of the set.
-    pub set_id: String,
-    /// Lower edge, in s; included.
-    pub low: f64,
-    /// Upper edge, in s; excluded.
-    pub high: f64,
-    /// Intervals.
-    pub count: u64,
-    /// Share of the set's intervals per second, in 1/s.
-    pub density: f64,
+columns! {
+    /// A bin of a histogram that holds at least one interval.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct HistogramBin {
+        set_id: String = "", "the set, a row of the sets table";
+        low: f64 = "s", "lower edge, included";
+        high: f64 = "s", "upper edge, excluded";
+        count: u64 = "", "intervals between slips";
+        density: f64 = "1/s", "share of the set's intervals per second";
+    }
+}
+
+impl Table for HistogramBin {
+    const NAME: &'static str = "histograms";
+    const MEANING: &'static str =
+        "One row per bin of the intervals of a set, of a width of mean tau / 60; empty bins are left out";
 }
 
 /// The histogram of a set: bins of a width of mean τ/60, with an edge at 0; empty bins are left out.
@@ -32,7 +35,7 @@ pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
         .map(|members| {
             let bin = bin_of(members[0]);
             HistogramBin {
-                set_id: set.jobs.set_id.clone(),
+                set_id: set.set_id.clone(),
                 low: bin * width,
                 high: (bin + 1.0) * width,
                 count: members.len() as u64,
@@ -40,24 +43,6 @@ pub(super) fn histogram(set: &SetRow, sorted: &[f64]) -> Vec<HistogramBin> {
             }
         })
         .collect()
-}
-
-/// The table of histograms.
-#[must_use]
-pub fn histograms() -> Table<HistogramBin> {
-    use Getter::{Count, Real, Text};
-    let columns = vec![
-        Column::new("set_id", "", "the set, a row of the sets table", Text(|row: &HistogramBin| row.set_id.clone())),
-        Column::new("low", "s", "lower edge, included", Real(|row| row.low)),
-        Column::new("high", "s", "upper edge, excluded", Real(|row| row.high)),
-        Column::new("count", "", "intervals between slips", Count(|row| row.count)),
-        Column::new("density", "1/s", "share of the set's intervals per second", Real(|row| row.density)),
-    ];
-    Table {
-        name: "histograms",
-        meaning: "One row per bin of the intervals of a set, of a width of mean tau / 60; empty bins are left out",
-        columns,
-    }
 }
 
 #[cfg(test)]

@@ -10,57 +10,29 @@ mod point;
 mod rank;
 mod read;
 mod reduction;
-mod rows;
 mod sequence;
 mod set;
 mod set_row;
 mod startup;
 
-pub use backbone::{BINS_PER_DECADE, BackboneBin, backbone};
+pub use backbone::{BINS_PER_DECADE, BackboneBin};
 pub use confidence::{CONFIDENCE, Interval};
-pub use histogram::{BINS_PER_MEAN, HistogramBin, histograms};
+pub use histogram::{BINS_PER_MEAN, HistogramBin};
 pub use moments::{Moments, quantile};
-pub use point::{MOST_POINTS, Point, Way, points};
-pub use read::{SetSummary, Statistic, read_backbone, read_histograms, read_points, read_sets};
+pub use point::{MAX_POINTS, Point, RampStage};
+pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
 pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
-pub use set_row::{SetJobs, SetRow, sets};
-pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow, startup};
+pub use set_row::{AllButSeed, SetJobs, SetRow};
+pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
 
-use crate::model::theory::{eta, load_maximum_phase, minimum_phase};
+use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
 /// How far under φ_min a phase must lie to count as under the back-bone, in rad. Inertia and the finite duration of the
 /// rupture shift onsets by some hundredths of a radian; this is well past them and well inside the empty region.
 pub const BELOW_MARGIN: f64 = 0.15;
-
-/// What a reduction takes from a row of the slips table, in the table's units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct SlipSample {
-    /// Within its job, from 0.
-    number: u64,
-    onset: f64,
-    interval: Option<f64>,
-    /// The modulation at the onset: period in s, amplitude in m.
-    period: Option<f64>,
-    amplitude: f64,
-    periods: Option<u64>,
-    phase: Option<f64>,
-    peak_force: f64,
-    drop: f64,
-    duration: f64,
-    precursors: f64,
-    front_speed: Option<f64>,
-    slow_front_speed: Option<f64>,
-}
-
-impl SlipSample {
-    /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
-    fn eta(&self, drive_velocity: f64) -> f64 {
-        self.period.map_or(0.0, |period| eta(TAU / period, self.amplitude, drive_velocity))
-    }
-}
 
 /// Where phases can lie at some η.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,5 +60,29 @@ impl PhaseLimits {
 
     fn is_below(&self, phase: f64) -> bool {
         self.minimum.is_some_and(|minimum| phase < minimum - BELOW_MARGIN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::documented::assert_documented;
+    use crate::table::columns::markdown;
+
+    #[test]
+    fn documented_reduced_tables_are_those_written() {
+        let tables = [
+            markdown::<SetRow>(),
+            markdown::<HistogramBin>(),
+            markdown::<StartupRow>(),
+            markdown::<BackboneBin>(),
+            markdown::<Point>(),
+        ];
+        let text = format!(
+            "# Reduced tables\n\nUnits are SI. How they follow from the [tables](tables.md) of a sweep is described in \
+             [results.md](results.md#reduced-data).\n\n{}",
+            tables.join("\n")
+        );
+        assert_documented("reduced-tables.md", &text);
     }
 }

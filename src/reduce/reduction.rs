@@ -1,23 +1,25 @@
 //! The reduction of a results directory: jobs once, slips as often as memory asks for, five files committed together.
 //!
 //! Sets are told in the order of their parameters and rows are summed in table order (file names, then rows), so the same
-//! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MOST_SLIPS`] slips, and as
+//! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as
 //! much again for those of the set at hand; where the tables hold more, the slips are read again for the next sets.
 
+use super::Moments;
 use super::PhaseLimits;
-use super::backbone::{Backbone, BackboneBin, backbone};
-use super::histogram::{histogram, histograms};
-use super::point::{Point, Way, points, spacing};
-use super::rows::{SLIP_COLUMNS, for_each_slip, gather_jobs};
+use super::backbone::{Backbone, BackboneBin};
+use super::histogram::{HistogramBin, histogram};
+use super::point::{Point, RampStage, spacing};
 use super::set::SetSlips;
-use super::set_row::{SetJobs, sets};
-use super::startup::startup;
+use super::set_row::{SetJobs, SetRow};
+use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
+use crate::observe::Slip;
 use crate::results::commit::{Commit, alone, create_folder};
 use crate::results::layout::Layout;
 use crate::results::part::committed_files;
-use crate::results::tables::{jobs, slips};
-use crate::table::file::{DatasetError, Footer, Reader, TableWriter, files};
+use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
+use crate::table::columns::{Selected, Table, columns};
+use crate::table::file::{DatasetError, Footer, TableWriter, files, read_rows};
 use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use std::cmp::Ordering;
@@ -25,7 +27,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 /// Slips that are held at once: 170 MB.
-const MOST_SLIPS: u64 = 1 << 22;
+const MAX_SLIPS: u64 = 1 << 22;
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
@@ -75,19 +77,19 @@ pub struct ReductionSummary {
 /// # Errors
 /// When there is no job, a table is damaged, or the reduced data cannot be written; earlier reduced files stay whole.
 pub fn reduce(storage: &dyn Storage, layout: &Layout, footer: &Footer) -> Result<ReductionSummary, ReduceError> {
-    reduce_by(storage, layout, footer, MOST_SLIPS)
+    reduce_by(storage, layout, footer, MAX_SLIPS)
 }
 
 fn reduce_by(
     storage: &dyn Storage,
     layout: &Layout,
     footer: &Footer,
-    most_slips: u64,
+    max_slips: u64,
 ) -> Result<ReductionSummary, ReduceError> {
     let _alone = alone(storage, layout, WRITER)?;
     // Listed once: what other runs commit meanwhile is left out as a whole.
-    let job_files = files(storage, &layout.table(jobs().name))?;
-    let slip_files = committed_files(storage, layout, slips().name, &job_files)?;
+    let job_files = files(storage, &layout.table(JOBS))?;
+    let slip_files = committed_files(storage, layout, SLIPS, &job_files)?;
     let all_jobs = read_jobs(storage, layout, job_files)?;
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
@@ -104,16 +106,14 @@ fn reduce_by(
     create_folder(storage, &layout.reduced())?;
     let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
-    let (sets, histograms, startup) = (sets(), histograms(), startup());
-    let (backbone, points) = (backbone(), points());
-    let mut set_writer = TableWriter::create(storage, &stage(sets.name), sets, footer)?;
-    let mut histogram_writer = TableWriter::create(storage, &stage(histograms.name), histograms, footer)?;
-    let mut startup_writer = TableWriter::create(storage, &stage(startup.name), startup, footer)?;
-    let mut backbone_writer = TableWriter::create(storage, &stage(backbone.name), backbone, footer)?;
-    let mut point_writer = TableWriter::create(storage, &stage(points.name), points, footer)?;
+    let mut set_writer = TableWriter::<SetRow>::create(storage, &stage(SetRow::NAME), footer)?;
+    let mut histogram_writer = TableWriter::create(storage, &stage(HistogramBin::NAME), footer)?;
+    let mut startup_writer = TableWriter::create(storage, &stage(StartupRow::NAME), footer)?;
+    let mut backbone_writer = TableWriter::create(storage, &stage(BackboneBin::NAME), footer)?;
+    let mut point_writer = TableWriter::create(storage, &stage(Point::NAME), footer)?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
-    for chunk in chunks(all_jobs, most_slips) {
+    for chunk in chunks(all_jobs, max_slips) {
         let gathered = gather(storage, &slip_files, chunk, spacing(total))?;
         for (jobs, slips, set_points) in gathered {
             let set = slips.finish(jobs);
@@ -157,14 +157,47 @@ pub fn reduced_file(layout: &Layout, table: &str) -> PathBuf {
     layout.reduced().join(format!("{table}.parquet"))
 }
 
+columns! {
+    /// What a reduction takes from the jobs table beside the parameters.
+    struct JobOfSet {
+        set_id: String;
+        outcome: JobOutcome;
+        slips: Option<u64>;
+        mean_friction: Option<f64>;
+    }
+}
+
+columns! {
+    /// The set of a slip.
+    struct SetOfSlip {
+        set_id: String;
+    }
+}
+
 /// The sets of all jobs, in the order of their parameters.
 fn read_jobs(storage: &dyn Storage, layout: &Layout, files: Vec<PathBuf>) -> Result<Vec<SetJobs>, ReduceError> {
-    let mut sets = BTreeMap::new();
-    for batch in Reader::new(storage, files, None) {
-        gather_jobs(&batch?, &mut sets)?;
+    let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
+    for batch in read_rows::<(JobOfSet, Selected<All>)>(storage, files) {
+        for (job, parameters) in batch? {
+            let set = sets.entry(job.set_id).or_insert_with_key(|set_id| SetJobs {
+                set_id: set_id.clone(),
+                parameters: parameters.parameters,
+                finished: 0,
+                failed: 0,
+                slips: 0,
+                friction: Moments::default(),
+            });
+            if job.outcome == JobOutcome::Failed {
+                set.failed += 1;
+            } else {
+                set.finished += 1;
+                set.slips += job.slips.unwrap_or(0);
+                set.friction.extend(job.mean_friction);
+            }
+        }
     }
     if sets.is_empty() {
-        return Err(ReduceError::NoJobs { tables: layout.table(jobs().name) });
+        return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     sets.sort_by(by_parameters);
@@ -184,13 +217,13 @@ fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
 }
 
 /// Cuts the sets where their slips would exceed the most.
-fn chunks(sets: Vec<SetJobs>, most_slips: u64) -> Vec<Vec<SetJobs>> {
+fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
     let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
     let mut slips = 0;
     for set in sets {
         slips += set.slips;
         match chunks.last_mut() {
-            Some(chunk) if slips <= most_slips => chunk.push(set),
+            Some(chunk) if slips <= max_slips => chunk.push(set),
             _ => {
                 slips = set.slips;
                 chunks.push(vec![set]);
@@ -215,27 +248,27 @@ fn gather(
     let limits: Vec<PhaseLimits> = sets.iter().map(|set| PhaseLimits::at(set.parameters.eta())).collect();
     let mut gathered: Vec<Gathered> = sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
     let mut place = 0;
-    for batch in Reader::new(storage, slip_files.to_vec(), Some(&SLIP_COLUMNS)) {
-        for_each_slip(&batch?, |set_id, slip| {
+    for batch in read_rows::<(SetOfSlip, Slip)>(storage, slip_files.to_vec()) {
+        for (SetOfSlip { set_id }, slip) in batch? {
             let here = place;
             place += 1;
-            let Some(&index) = index.get(set_id) else { return };
+            let Some(&index) = index.get(&set_id) else { continue };
             let (set, slips, points) = &mut gathered[index];
             let parameters = &set.parameters;
             let is_ramped = parameters.ramp_time > 0.0;
-            let eta = slip.eta(parameters.drive_velocity);
+            let eta = slip.modulation.eta(parameters.drive_velocity);
             if is_ramped {
-                slips.push(slip, &PhaseLimits::at(eta));
+                slips.push(&slip, &PhaseLimits::at(eta));
             } else {
-                slips.push(slip, &limits[index]);
+                slips.push(&slip, &limits[index]);
             }
             if here % spacing == 0 {
                 let point = Point {
                     drive_velocity: parameters.drive_velocity,
-                    amplitude: slip.amplitude,
-                    period: slip.period,
+                    amplitude: slip.modulation.amplitude,
+                    period: slip.modulation.period,
                     eta,
-                    way: is_ramped.then(|| Way::at(slip.onset, parameters.ramp_time)),
+                    ramp_stage: is_ramped.then(|| RampStage::at(slip.onset, parameters.ramp_time)),
                     onset: slip.onset,
                     interval: slip.interval,
                     periods: slip.periods,
@@ -244,7 +277,7 @@ fn gather(
                 };
                 points.push((here, point));
             }
-        })?;
+        }
     }
     Ok(gathered)
 }
@@ -253,39 +286,37 @@ fn gather(
 mod tests {
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::{Measurements, Modulation, Slip};
-    use crate::results::tables::{JobLabel, JobRow, SlipRow};
+    use crate::observe::{Drops, Measurements, Modulation};
+    use crate::results::tables::{Drive, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
+    use crate::table::file::Reader;
     use crate::table::storage::Disk;
     use std::fs;
 
     const PERIOD: f64 = 0.01;
 
-    fn label(set: u32, seed: u64, amplitude: f64) -> JobLabel {
+    fn label(set: u32, seed: u64, amplitude: f64) -> Label<Drive> {
         let parameters = Parameters {
             seed,
             modulation_amplitude: amplitude,
             modulation_period: Some(PERIOD),
             ..Parameters::default()
         };
-        JobLabel {
-            job_id: format!("{set:016x}{seed:016x}"),
-            // Not in the order of the parameters.
-            set_id: format!("{:032x}", 100 - set),
-            parameters: parameters.validated().unwrap(),
-        }
+        // Names not in the order of the parameters.
+        let names = Names { job_id: format!("{set:016x}{seed:016x}"), set_id: format!("{:032x}", 100 - set) };
+        let parameters = parameters.validated().unwrap();
+        let eta = parameters.eta();
+        (names, Selected::new(parameters), Loading { eta })
     }
 
-    fn job_result(job: &JobLabel, slips: u32) -> Measurements {
+    fn job_result((_, parameters, _): &Label<Drive>, slips: u32) -> Measurements {
         let slip = |number: u32| Slip {
             number: u64::from(number),
             onset: f64::from(number) * 12.0 * PERIOD,
             interval: (number > 0).then_some(12.0 * PERIOD + 1e-5 * f64::from(number % 3)),
-            phase: job.parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
-            modulation: Modulation {
-                period: job.parameters.modulation_period,
-                amplitude: job.parameters.modulation_amplitude,
-            },
+            phase: parameters.modulation_period.map(|_| -0.9 - 0.01 * f64::from(number % 7)),
+            modulation: Modulation { period: parameters.modulation_period, amplitude: parameters.modulation_amplitude },
+            periods: (number > 0).then_some(12),
             peak_force: 480.0,
             drop: 100.0 + f64::from(number),
             nucleation: 0.0,
@@ -295,7 +326,7 @@ mod tests {
             front_speed: None,
             precursors: 2,
             slow_front_speed: None,
-            drops: None,
+            drops: Drops::default(),
         };
         let summary = Summary { satisfied: true, ..Summary::default() };
         Measurements {
@@ -315,23 +346,22 @@ mod tests {
         for part in 0..3 {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
-            let mut slip_writer =
-                TableWriter::create(&Disk, &path, crate::results::tables::slips(), &Footer::default()).unwrap();
-            let labels: Vec<JobLabel> = (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
+            let mut slip_writer = TableWriter::<SlipRow<'_>>::create(&Disk, &path, &Footer::default()).unwrap();
+            let labels: Vec<Label<Drive>> =
+                (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
             let results: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
             for (job, result) in labels.iter().zip(&results) {
-                result.slips.iter().for_each(|slip| slip_writer.push(&SlipRow { job, slip }).unwrap());
+                result.slips.iter().for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
             }
             slip_writer.finish().unwrap();
             if part < 2 {
                 let path = layout.table("jobs").join(&name);
-                let mut job_writer =
-                    TableWriter::create(&Disk, &path, crate::results::tables::jobs(), &Footer::default()).unwrap();
+                let mut job_writer = TableWriter::<JobRow>::create(&Disk, &path, &Footer::default()).unwrap();
                 for (job, result) in labels.iter().zip(&results) {
-                    job_writer.push(&JobRow { job, result: Ok(result) }).unwrap();
+                    job_writer.push(&(relabel(job), JobRecord::new(Ok(result)))).unwrap();
                 }
                 let failed = label(2, 77, 2e-6);
-                job_writer.push(&JobRow { job: &failed, result: Err("out of budget") }).unwrap();
+                job_writer.push(&(relabel(&failed), JobRecord::new(Err("out of budget")))).unwrap();
                 job_writer.finish().unwrap();
             }
         }
@@ -353,7 +383,7 @@ mod tests {
         assert_eq!((summary.slips, summary.points, summary.locked_sets), (120, 120, 2));
         assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
         let path = reduced_file(&Layout::new(root.path()), "sets");
-        let batch = Reader::new(&Disk, vec![path], None).next().unwrap().unwrap();
+        let batch = Reader::new(&Disk, vec![path]).next().unwrap().unwrap();
         assert_eq!(batch.reals("Delta").unwrap().values().to_vec(), [0.0, 1e-6, 2e-6]);
         assert_eq!(batch.counts("intervals").unwrap().values().to_vec(), [38, 38, 38]);
         assert_eq!(batch.counts("failed_jobs").unwrap().values().to_vec(), [0, 0, 2]);

@@ -1,11 +1,13 @@
 //! One parameter set, all seeds together: intervals, locking and phase statistics.
 
+use super::PhaseLimits;
 use super::circular::unit;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::set_row::{SetJobs, SetRow};
 use super::startup::{StartupRow, startup_probability, startup_rows};
-use super::{PhaseLimits, SlipSample};
+use crate::observe::Slip;
+use crate::table::columns::Selected;
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
@@ -19,7 +21,7 @@ pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct KeptSlip {
+pub(super) struct SlipStats {
     interval: f64,
     /// The interval in periods of the modulation at its end.
     periods: f64,
@@ -29,12 +31,12 @@ pub(super) struct KeptSlip {
     pub(super) drop: f64,
 }
 
-impl KeptSlip {
-    pub(super) fn of(slip: &SlipSample, limits: &PhaseLimits) -> Self {
+impl SlipStats {
+    pub(super) fn of(slip: &Slip, limits: &PhaseLimits) -> Self {
         let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Self {
             interval: or_missing(slip.interval),
-            periods: or_missing(slip.interval.zip(slip.period).map(|(interval, period)| interval / period)),
+            periods: or_missing(slip.interval.zip(slip.modulation.period).map(|(interval, period)| interval / period)),
             phase: or_missing(slip.phase),
             load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
             drop: slip.drop,
@@ -43,19 +45,19 @@ impl KeptSlip {
 
     /// Interval before it, in s.
     pub(super) fn interval(&self) -> Option<f64> {
-        there(self.interval)
+        non_nan(self.interval)
     }
 }
 
 /// A value that is not missing.
-fn there(value: f64) -> Option<f64> {
+fn non_nan(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
 
 /// Gathers the slips of a set, job after job.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
-    slips: Vec<KeptSlip>,
+    slips: Vec<SlipStats>,
     /// Where jobs begin.
     starts: Vec<usize>,
     below: u64,
@@ -68,16 +70,16 @@ pub(super) struct SetSlips {
 }
 
 impl SetSlips {
-    pub(super) fn push(&mut self, slip: &SlipSample, limits: &PhaseLimits) {
+    pub(super) fn push(&mut self, slip: &Slip, limits: &PhaseLimits) {
         if slip.number == 0 || self.starts.is_empty() {
             self.starts.push(self.slips.len());
         }
-        self.slips.push(KeptSlip::of(slip, limits));
+        self.slips.push(SlipStats::of(slip, limits));
         self.below += u64::from(slip.phase.is_some_and(|phase| limits.is_below(phase)));
         self.drop.push(slip.drop);
         self.peak_force.push(slip.peak_force);
         self.duration.push(slip.duration);
-        self.precursors.push(slip.precursors);
+        self.precursors.push(slip.precursors as f64);
         self.front_speed.extend(slip.front_speed);
         self.slow_front_speed.extend(slip.slow_front_speed);
     }
@@ -90,20 +92,25 @@ impl SetSlips {
         let intervals = estimate(&by_job, |slip| slip.interval().map(|interval| [interval]));
         let drops = estimate(&by_job, |slip| Some([slip.drop]));
         // The whole turns go first: they would cost the sine its digits.
-        let locking = estimate(&by_job, |slip| there(slip.periods).map(|periods| unit(TAU * periods.fract())));
-        let phases = estimate(&by_job, |slip| there(slip.phase).map(unit));
-        let loads = estimate(&by_job, |slip| there(slip.load_phase).map(unit));
+        let locking = estimate(&by_job, |slip| non_nan(slip.periods).map(|periods| unit(TAU * periods.fract())));
+        let phases = estimate(&by_job, |slip| non_nan(slip.phase).map(unit));
+        let loads = estimate(&by_job, |slip| non_nan(slip.load_phase).map(unit));
 
-        let mut sorted: Vec<f64> = self.slips.iter().filter_map(KeptSlip::interval).collect();
+        let mut sorted: Vec<f64> = self.slips.iter().filter_map(SlipStats::interval).collect();
         let (mut tau, mut periods) = (Moments::default(), Moments::default());
         tau.extend(sorted.iter().copied());
-        periods.extend(self.slips.iter().filter_map(|slip| there(slip.periods)));
+        periods.extend(self.slips.iter().filter_map(|slip| non_nan(slip.periods)));
         sorted.sort_by(f64::total_cmp);
 
         let has_limit = limits.minimum.is_some() && phases.count() > 0;
         let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
+        let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| quantile(&sorted, share));
         let row = SetRow {
+            set_id: jobs.set_id,
+            parameters: Selected::new(jobs.parameters),
             eta,
+            finished_jobs: jobs.finished,
+            failed_jobs: jobs.failed,
             slips: self.slips.len() as u64,
             intervals: tau.count(),
             effective_slips: phases.effective(),
@@ -112,7 +119,11 @@ impl SetSlips {
             tau_mean: tau.mean(),
             tau_interval: intervals.interval(),
             tau_deviation: tau.deviation(),
-            tau_quantiles: QUANTILES.map(|share| quantile(&sorted, share)),
+            tau_05,
+            tau_25,
+            tau_50,
+            tau_75,
+            tau_95,
             periods_mean: periods.mean(),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
@@ -129,24 +140,25 @@ impl SetSlips {
             drop_interval: drops.interval(),
             drop_deviation: self.drop.deviation(),
             peak_force_mean: self.peak_force.mean(),
+            mean_friction: jobs.friction.mean(),
+            mean_friction_interval: jobs.friction.interval(),
             duration_mean: self.duration.mean(),
             precursors_mean: self.precursors.mean(),
             front_speed_mean: self.front_speed.mean(),
             slow_front_speed_mean: self.slow_front_speed.mean(),
-            jobs,
         };
-        let startup = startup_rows(&row.jobs.set_id, &by_job, [intervals.inflation(), drops.inflation()]);
+        let startup = startup_rows(&row.set_id, &by_job, [intervals.inflation(), drops.inflation()]);
         FinishedSet { row, intervals: sorted, phases, loads, below: self.below, startup }
     }
 
-    fn by_job(&self) -> Vec<&[KeptSlip]> {
+    fn by_job(&self) -> Vec<&[SlipStats]> {
         let ends = self.starts.iter().skip(1).copied().chain([self.slips.len()]);
         self.starts.iter().zip(ends).map(|(&start, end)| &self.slips[start..end]).collect()
     }
 }
 
 /// The mean of a quantity that some of the slips have.
-fn estimate<const D: usize>(jobs: &[&[KeptSlip]], quantity: impl Fn(&KeptSlip) -> Option<[f64; D]>) -> Estimate<D> {
+fn estimate<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> Option<[f64; D]>) -> Estimate<D> {
     Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity))).estimate()
 }
 
@@ -171,6 +183,7 @@ pub(super) struct FinishedSet {
 pub(super) mod tests {
     use super::*;
     use crate::model::Parameters;
+    use crate::observe::Modulation;
 
     pub(in crate::reduce) fn jobs(amplitude: f64, period: f64) -> SetJobs {
         let parameters =
@@ -187,25 +200,16 @@ pub(super) mod tests {
         }
     }
 
-    pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> SlipSample {
-        SlipSample {
-            number: 1,
-            onset: 1.0,
-            interval,
-            period: None,
-            amplitude: 1e-6,
-            phase,
-            periods: None,
-            drop: 100.0,
-            peak_force: 480.0,
-            duration: 0.005,
-            precursors: 2.0,
-            front_speed: Some(300.0),
-            slow_front_speed: None,
-        }
+    pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> Slip {
+        let modulation = Modulation { period: None, amplitude: 1e-6 };
+        Slip { number: 1, interval, modulation, phase, ..crate::results::tables::tests::slip(1) }
     }
 
-    fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = SlipSample>) -> SetRow {
+    fn modulated(period: f64) -> Modulation {
+        Modulation { period: Some(period), amplitude: 1e-6 }
+    }
+
+    fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
         let limits = PhaseLimits::at(jobs.parameters.eta());
         let mut set = SetSlips::default();
         slips.into_iter().for_each(|slip| set.push(&slip, &limits));
@@ -215,7 +219,7 @@ pub(super) mod tests {
     #[test]
     fn intervals_of_whole_periods_lock_whatever_their_number() {
         let period = 1.0 / 29.0;
-        let slip = |n: f64, period| SlipSample { period: Some(period), ..slip(Some(n * period), Some(-1.2)) };
+        let slip = |n: f64, period| Slip { modulation: modulated(period), ..slip(Some(n * period), Some(-1.2)) };
         let row = reduced(jobs(1e-6, period), [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)));
         assert!(row.locking_index.unwrap() > 1.0 - 1e-9);
         assert!((row.periods_mean.unwrap() - 83.2).abs() < 1e-9);
@@ -282,9 +286,9 @@ pub(super) mod tests {
         // Each job holds its own phase and interval: as many independent values as jobs.
         let of_job = |job: u32| {
             let own = 0.01 * f64::from(job * 7 % 20);
-            (0..10).map(move |number| SlipSample {
+            (0..10).map(move |number| Slip {
                 number,
-                period: Some(0.01),
+                modulation: modulated(0.01),
                 ..slip(Some(0.1 + 0.3 * own), Some(-1.0 - own))
             })
         };
@@ -296,6 +300,6 @@ pub(super) mod tests {
         assert!(interval.low < mean && mean < interval.high);
         assert!(row.tau_interval.unwrap().low < row.tau_mean.unwrap());
         assert!(row.locking_interval.unwrap().high > row.locking_index.unwrap());
-        assert_eq!(row.jobs.friction.interval(), None);
+        assert_eq!(row.mean_friction_interval, None);
     }
 }

@@ -11,7 +11,7 @@ use crate::results::layout::{Layout, part_file, part_name};
 use crate::results::manifest::Directory;
 use crate::results::merge::Merge;
 use crate::results::part::{failures, label};
-use crate::results::tables;
+use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::Plan;
 use crate::table::columns::Table;
 use crate::table::file::{DatasetError, Footer, footer};
@@ -107,14 +107,14 @@ pub fn compact(
     if compaction.part_count() > 0 {
         let mut build =
             Build { storage, directory, sources: &sources, without, new: &new, compaction: &mut compaction };
-        build.table(tables::slips)?;
+        build.table::<SlipRow<'_>>()?;
         if directory.records_precursors() {
-            build.table(tables::precursors)?;
+            build.table::<PrecursorRow<'_>>()?;
         }
-        let rows = build.table(tables::jobs)?;
+        let rows = build.table::<JobRow>()?;
         if rows != sources.jobs {
             let problem = format!("{rows} jobs were read where the plan has {}", sources.jobs);
-            return Err(DatasetError::damaged(&layout.table(tables::jobs().name))(problem).into());
+            return Err(DatasetError::damaged(&layout.table(tables::JOBS))(problem).into());
         }
     }
     for table in directory.tables() {
@@ -178,7 +178,7 @@ impl Sources {
         for part in Plan::new(directory.sweeps()).parts() {
             if without.parts.contains(&part_name(&part)) {
                 let sweep = &directory.sweeps()[part.epoch];
-                sources.dropped.extend((0..part.jobs.len()).map(|job| label(sweep, &part, job).job_id));
+                sources.dropped.extend((0..part.jobs.len()).map(|job| label(sweep, &part, job).0.job_id));
             }
             if let Some(failed) = failures(storage, directory, &part)? {
                 sources.jobs += part.jobs.len() as u64;
@@ -193,10 +193,10 @@ impl Sources {
 
     /// Whether nothing is left to be done: every part is compacted, under the sweep that was asked for last.
     fn is_compact(&self, storage: &dyn Storage, directory: &Directory) -> Result<bool, DatasetError> {
-        let Some(file) = directory.compaction().of_table(tables::jobs().name).first() else {
+        let Some(file) = directory.compaction().of_table(tables::JOBS).first() else {
             return Ok(self.parts.is_empty());
         };
-        let path = directory.layout().table(tables::jobs().name).join(file);
+        let path = directory.layout().table(tables::JOBS).join(file);
         let sweep = &directory.sweeps()[directory.current()];
         Ok(self.parts.is_empty() && footer(storage, &path)?.get("sweep").is_some_and(|text| text == sweep.text()))
     }
@@ -214,15 +214,15 @@ struct Build<'a> {
 
 impl Build<'_> {
     /// Writes one table; gives the number of its rows.
-    fn table<Row>(&mut self, table: fn() -> Table<Row>) -> Result<u64, CompactError> {
-        let (layout, name) = (self.directory.layout(), table().name);
+    fn table<R: Table>(&mut self) -> Result<u64, CompactError> {
+        let (layout, name) = (self.directory.layout(), R::NAME);
         let folder = self.new.table(name);
         create_folder(self.storage, &folder)?;
         let old = |file: &String| layout.table(name).join(file);
         let sorted = self.directory.compaction().of_table(name).iter().map(old);
         let merge = Merge {
             storage: self.storage,
-            table,
+            table: std::marker::PhantomData::<fn(&R)>,
             footer: &Footer::default().with_sweep(&self.directory.sweeps()[self.directory.current()]),
             scratch: self.new.root(),
             takes: &|job| !self.sources.dropped.contains(job),

@@ -54,7 +54,7 @@ impl Compaction {
     }
 
     fn read_once(storage: &dyn Storage, layout: &Layout) -> Result<Self, DatasetError> {
-        let there = compacted_files(storage, layout, tables::jobs().name)?;
+        let there = compacted_files(storage, layout, tables::JOBS)?;
         let Some(records) = Self::records(storage, layout)? else {
             return if there.is_empty() {
                 Ok(Self::default())
@@ -62,7 +62,7 @@ impl Compaction {
                 Err(DatasetError::damaged(&layout.compacted())("it is missing, though there are compacted files"))
             };
         };
-        let fits = |compaction: &Self| compaction.of_table(tables::jobs().name) == there;
+        let fits = |compaction: &Self| compaction.of_table(tables::JOBS) == there;
         records.into_iter().find(fits).ok_or_else(|| {
             DatasetError::damaged(&layout.compacted())("the files in tables/jobs are not those that it tells of")
         })

@@ -78,7 +78,7 @@ impl Layout {
     /// The folders in which names are results.
     #[must_use]
     pub fn result_folders(&self) -> Vec<PathBuf> {
-        let tables = [tables::slips().name, tables::precursors().name, tables::jobs().name];
+        let tables = [tables::SLIPS, tables::PRECURSORS, tables::JOBS];
         let folders = [self.root.clone(), self.run(), self.root.join(TABLES)];
         folders.into_iter().chain(tables.map(|table| self.table(table))).collect()
     }

@@ -11,8 +11,9 @@ use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::results::commit::{Commit, clear, create_folder};
 use crate::results::compaction::Compaction;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
-use crate::results::tables;
+use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::{Job, PLAN_VERSION, Part, Sweep, SweepError};
+use crate::table::arrow::schema;
 use crate::table::checksum;
 use crate::table::file::{DatasetError, PROGRAM};
 use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
@@ -61,12 +62,10 @@ struct Format {
 impl Manifest {
     pub(super) fn new(sweep: &Sweep) -> Self {
         let columns = |schema: &Schema| schema.fields().iter().map(|field| field.name().clone()).collect();
-        let mut recorded = vec![
-            (tables::slips().name, columns(&tables::slips().schema())),
-            (tables::jobs().name, columns(&tables::jobs().schema())),
-        ];
+        let mut recorded =
+            vec![(tables::SLIPS, columns(&schema::<SlipRow<'_>>())), (tables::JOBS, columns(&schema::<JobRow>()))];
         if sweep.recording().precursors {
-            recorded.push((tables::precursors().name, columns(&tables::precursors().schema())));
+            recorded.push((tables::PRECURSORS, columns(&schema::<PrecursorRow<'_>>())));
         }
         Self {
             format: FORMAT,
@@ -244,8 +243,8 @@ impl Directory {
 
     /// Names of the tables, that of the jobs last.
     pub fn tables(&self) -> impl Iterator<Item = &'static str> + use<> {
-        let precursors = self.records_precursors().then(|| tables::precursors().name);
-        [Some(tables::slips().name), precursors, Some(tables::jobs().name)].into_iter().flatten()
+        let precursors = self.records_precursors().then_some(tables::PRECURSORS);
+        [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
     }
 
     /// The same, with another notion of what is compacted.

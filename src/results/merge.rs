@@ -33,11 +33,11 @@ struct Sizes {
 const SIZES: Sizes = Sizes { run_rows: RUN_ROWS, fan_in: FAN_IN, file_rows: FILE_ROWS };
 
 /// A table that is put in order.
-pub struct Merge<'a, Row> {
+pub struct Merge<'a, R> {
     /// Where files lie.
     pub storage: &'a dyn Storage,
     /// The table.
-    pub table: fn() -> Table<Row>,
+    pub table: std::marker::PhantomData<fn(&R)>,
     /// What the footers of its files tell.
     pub footer: &'a Footer,
     /// Folder of runs on their way.
@@ -86,7 +86,7 @@ pub struct Merged {
     pub rows: u64,
 }
 
-impl<Row> Merge<'_, Row> {
+impl<R: Table> Merge<'_, R> {
     /// Writes the rows of files, and of others that are in order already, as files of a folder, in order. Of no
     /// rows there is one empty file.
     ///
@@ -105,14 +105,14 @@ impl<Row> Merge<'_, Row> {
     ) -> Result<Merged, DatasetError> {
         let mut sources = Vec::new();
         for blocks in self.runs(files, sizes.run_rows) {
-            let path = self.scratch.join(format!("{}-run-{:06}", (self.table)().name, sources.len()));
+            let path = self.scratch.join(format!("{}-run-{:06}", R::NAME, sources.len()));
             sources.push(Sorted::run(self.write_run(&path, blocks?.into_iter().map(Ok))?));
         }
         sources.push(Sorted { files: sorted, is_run: false });
         let mut merged = 0;
         while sources.len() > sizes.fan_in {
             let rest = sources.split_off(sizes.fan_in);
-            let path = self.scratch.join(format!("{}-merged-{merged:06}", (self.table)().name));
+            let path = self.scratch.join(format!("{}-merged-{merged:06}", R::NAME));
             let run = self.write_run(&path, self.merged(&sources)?)?;
             let runs = sources.iter().filter(|source| source.is_run).flat_map(|source| &source.files);
             for path in runs {
@@ -157,7 +157,7 @@ impl<Row> Merge<'_, Row> {
     /// The blocks of files in their order: all, or those that are taken.
     fn blocks(&self, files: Vec<PathBuf>, all: bool) -> impl Iterator<Item = Result<Block, DatasetError>> {
         let takes = move |job: &str| all || (self.takes)(job);
-        Reader::new(self.storage, files, None).flat_map(move |batch| {
+        Reader::new(self.storage, files).flat_map(move |batch| {
             match batch.and_then(|batch| cut(&Arc::new(batch), &takes)) {
                 Ok(blocks) => blocks.into_iter().map(Ok).collect::<Vec<_>>(),
                 Err(error) => vec![Err(error)],
@@ -170,7 +170,7 @@ impl<Row> Merge<'_, Row> {
         path: &Path,
         blocks: impl Iterator<Item = Result<Block, DatasetError>>,
     ) -> Result<PathBuf, DatasetError> {
-        let mut writer = TableWriter::create(self.storage, path, (self.table)(), self.footer)?;
+        let mut writer = TableWriter::<R>::create(self.storage, path, self.footer)?;
         for block in blocks {
             let Block { batch, rows, .. } = block?;
             writer.copy(&batch, rows)?;
@@ -247,25 +247,25 @@ fn cut(batch: &Arc<Batch>, takes: &dyn Fn(&str) -> bool) -> Result<Vec<Block>, D
 }
 
 /// The files of a table in order, cut at fixed numbers of rows.
-struct Target<'a, Row> {
-    merge: &'a Merge<'a, Row>,
+struct Target<'a, R> {
+    merge: &'a Merge<'a, R>,
     folder: &'a Path,
     rows_left: usize,
     names: Vec<String>,
-    writer: Option<TableWriter<Row>>,
+    writer: Option<TableWriter<R>>,
 }
 
-impl<Row> Target<'_, Row> {
+impl<R: Table> Target<'_, R> {
     fn path(&self) -> PathBuf {
         self.folder.join(self.names.len().to_string())
     }
 
-    fn writer(&mut self) -> Result<&mut TableWriter<Row>, DatasetError> {
+    fn writer(&mut self) -> Result<&mut TableWriter<R>, DatasetError> {
         let writer = if let Some(writer) = self.writer.take() {
             writer
         } else {
-            let Merge { storage, table, footer, .. } = self.merge;
-            TableWriter::create(*storage, &self.path(), table(), footer)?
+            let Merge { storage, footer, .. } = self.merge;
+            TableWriter::create(*storage, &self.path(), footer)?
         };
         Ok(self.writer.insert(writer))
     }
@@ -306,113 +306,5 @@ impl<Row> Target<'_, Row> {
         }
         self.close()?;
         Ok(self.names)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::{Parameters, Symbol};
-    use crate::table::columns::{Column, Getter};
-    use crate::table::storage::Disk;
-    use std::fs;
-
-    /// A row: its job's parameters and its number within the job.
-    type Entry = (Parameters, u64);
-
-    fn table() -> Table<Entry> {
-        let id = |row: &Entry| format!("{}-{}", row.0.seed, row.0.drive_velocity);
-        let mut columns = vec![
-            Column::new("job_id", "", "id of the job", Getter::Text(id)),
-            Column::new("set_id", "", "id of its set", Getter::Text(|row| row.0.drive_velocity.to_string())),
-        ];
-        let symbols = [Symbol::V0, Symbol::Delta, Symbol::T, Symbol::Seed];
-        columns.extend(symbols.map(|symbol| Column::parameter(symbol, |row: &Entry| &row.0)));
-        columns.push(Column::new("number", "", "its number", Getter::Count(|row| row.1)));
-        Table { name: "entries", meaning: "One row per entry", columns }
-    }
-
-    fn job(velocity: u32, seed: u64) -> Parameters {
-        Parameters { drive_velocity: f64::from(velocity), seed, ..Parameters::default() }
-    }
-
-    /// Writes jobs of three rows each.
-    fn write(path: &Path, jobs: &[Parameters]) {
-        let mut writer = TableWriter::create(&Disk, path, table(), &Footer::default()).unwrap();
-        for job in jobs {
-            (0..3).for_each(|number| writer.push(&(job.clone(), number)).unwrap());
-        }
-        writer.finish().unwrap();
-    }
-
-    const SMALL: Sizes = Sizes { run_rows: 4, fan_in: 2, file_rows: 10 };
-
-    fn merged(folder: &Path, files: Vec<PathBuf>, sorted: Vec<PathBuf>, takes: &dyn Fn(&str) -> bool) -> Merged {
-        let merge = Merge { storage: &Disk, table, footer: &Footer::default(), scratch: folder, takes };
-        merge.write_by(SMALL, files, sorted, folder).unwrap()
-    }
-
-    fn rows(folder: &Path, merged: &Merged) -> Vec<(f64, i64, i64)> {
-        let files = merged.names.iter().map(|name| folder.join(name)).collect();
-        let mut rows = Vec::new();
-        for batch in Reader::new(&Disk, files, None) {
-            let batch = batch.unwrap();
-            let (velocity, seed) = (batch.reals("V0").unwrap(), batch.counts("seed").unwrap());
-            let number = batch.counts("number").unwrap();
-            rows.extend(
-                (0..batch.rows.num_rows()).map(|row| (velocity.value(row), seed.value(row), number.value(row))),
-            );
-        }
-        rows
-    }
-
-    #[test]
-    fn rows_come_out_sorted_each_once_in_the_same_files_however_they_came() {
-        let root = tempfile::tempdir().unwrap();
-        // In no order, and in two ways.
-        let jobs: Vec<Parameters> = (0..35).map(|k| job(1 + (k * 13) % 7, u64::from((k * 29) % 35))).collect();
-        let mut expected: Vec<(f64, i64, i64)> = Vec::new();
-        for job in &jobs {
-            expected.extend((0..3).map(|number| (job.drive_velocity, job.seed.cast_signed(), number)));
-        }
-        expected.sort_by(|left, right| left.partial_cmp(right).unwrap());
-        let mut bytes = Vec::new();
-        for (name, sizes) in [("one", &[35][..]), ("many", &[1, 4, 20, 3, 7])] {
-            let folder = root.path().join(name);
-            fs::create_dir(&folder).unwrap();
-            let (mut begin, mut files) = (0, Vec::new());
-            for (number, size) in sizes.iter().enumerate() {
-                files.push(folder.join(format!("in-{number}")));
-                write(&files[number], &jobs[begin..begin + size]);
-                begin += size;
-            }
-            // The second time, half of it is compact already.
-            let half = if sizes.len() > 1 {
-                let half = merged(&folder, files.split_off(3), Vec::new(), &|_| true);
-                half.names.iter().map(|name| folder.join(name)).collect()
-            } else {
-                Vec::new()
-            };
-            let all = merged(&folder, files, half, &|_| true);
-            assert_eq!((all.rows, all.names.len()), (105, 11));
-            assert!(rows(&folder, &all) == expected, "{name}");
-            bytes.push(all.names.iter().map(|name| fs::read(folder.join(name)).unwrap()).collect::<Vec<_>>());
-        }
-        assert!(bytes[0] == bytes[1]);
-    }
-
-    #[test]
-    fn jobs_are_left_out_of_what_was_sorted_and_no_rows_are_an_empty_file() {
-        let root = tempfile::tempdir().unwrap();
-        let (sorted, new) = (root.path().join("sorted"), root.path().join("new"));
-        write(&sorted, &[job(1, 1), job(1, 2), job(1, 3)]);
-        write(&new, &[job(1, 2)]);
-        let takes = |id: &str| id != "2-1" && id != "3-1";
-        let merge = merged(root.path(), vec![new], vec![sorted.clone()], &takes);
-        let seeds: Vec<i64> = rows(root.path(), &merge).iter().map(|row| row.1).collect();
-        assert_eq!(seeds, [1, 1, 1, 2, 2, 2]);
-        let none = merged(root.path(), Vec::new(), vec![sorted], &|_| false);
-        assert_eq!((none.rows, none.names.len()), (0, 1));
-        assert!(rows(root.path(), &none).is_empty());
     }
 }

@@ -1,7 +1,7 @@
 //! A results directory: which sweeps it belongs to, and tables that hold whole files only, whatever happens.
 //!
 //! ```text
-//! tables.rs, records.rs       what is written: slips, precursors, jobs; and what one simulation writes on request
+//! tables.rs                   what is written: slips, precursors, jobs
 //! commit.rs                   files that appear whole or not at all
 //! layout.rs, manifest.rs      a directory, and which sweeps it belongs to
 //! part.rs                     the rows of some jobs, in all tables at once
@@ -16,6 +16,5 @@ pub mod layout;
 pub mod manifest;
 pub mod merge;
 pub mod part;
-pub mod records;
 pub mod tables;
 pub mod verify;

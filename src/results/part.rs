@@ -7,10 +7,10 @@ use crate::observe::Measurements;
 use crate::results::commit::{Commit, create_folder};
 use crate::results::layout::{Layout, is_compacted, part_file};
 use crate::results::manifest::Directory;
-use crate::results::tables::{self, FAILED, JobLabel, JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{self, Drive, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, SlipRow, relabel};
 use crate::sweep::{Part, Sweep};
-use crate::table::columns::Table;
-use crate::table::file::{Batch, DatasetError, Footer, Reader, TableWriter, files};
+use crate::table::columns::{Table, columns};
+use crate::table::file::{Batch, DatasetError, Footer, Reader, TableWriter, files, read_rows};
 use crate::table::storage::{Storage, StorageError};
 use arrow_array::Array;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -22,13 +22,8 @@ pub type Outcome = Result<Measurements, String>;
 
 /// What every row says about job number `position` of a part.
 #[must_use]
-pub fn label(sweep: &Sweep, part: &Part, position: usize) -> JobLabel {
-    let parameters = &part.jobs[position].parameters;
-    JobLabel {
-        job_id: sweep.job_id(parameters).to_string(),
-        set_id: sweep.set_id(parameters).to_string(),
-        parameters: parameters.clone(),
-    }
+pub fn label(sweep: &Sweep, part: &Part, position: usize) -> Label<Drive> {
+    tables::label(sweep, &part.jobs[position].parameters)
 }
 
 /// Positions of the jobs of a part that failed; `None` if the part is not done.
@@ -61,20 +56,26 @@ pub fn failures(
     }
     let path = jobs_file(directory.layout(), part);
     let (mut failed, mut rows) = (BTreeMap::new(), 0);
-    for batch in Reader::new(storage, vec![path.clone()], Some(&["outcome", "reason"])) {
-        let batch = batch?;
-        let cells = batch.texts("outcome")?.iter().zip(batch.texts("reason")?).enumerate();
-        failed.extend(
-            cells
-                .filter(|(_, (outcome, _))| *outcome == Some(FAILED))
-                .map(|(row, (_, reason))| (rows + row, reason.unwrap_or_default().to_owned())),
-        );
-        rows += batch.rows.num_rows();
+    for batch in read_rows::<OutcomeRow>(storage, vec![path.clone()]) {
+        for row in batch? {
+            if row.outcome == JobOutcome::Failed {
+                failed.insert(rows, row.reason.unwrap_or_default());
+            }
+            rows += 1;
+        }
     }
     if rows == part.jobs.len() {
         Ok(Some(failed))
     } else {
         Err(DatasetError::damaged(&path)(format!("{rows} jobs where the plan has {}", part.jobs.len())))
+    }
+}
+
+columns! {
+    /// How a job ended, as a row of the jobs table says.
+    struct OutcomeRow {
+        outcome: JobOutcome;
+        reason: Option<String>;
     }
 }
 
@@ -109,7 +110,7 @@ pub fn committed_files(
 }
 
 fn jobs_file(layout: &Layout, part: &Part) -> PathBuf {
-    layout.table(tables::jobs().name).join(part_file(part))
+    layout.table(tables::JOBS).join(part_file(part))
 }
 
 /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have.
@@ -125,7 +126,7 @@ pub fn commit(
     outcomes: &BTreeMap<usize, Outcome>,
 ) -> Result<(), DatasetError> {
     let sweep = &directory.sweeps()[part.epoch];
-    let labels: Vec<JobLabel> = (0..part.jobs.len()).map(|position| label(sweep, part, position)).collect();
+    let labels: Vec<Label<Drive>> = (0..part.jobs.len()).map(|position| label(sweep, part, position)).collect();
     let mut stage = Stage {
         storage,
         layout: directory.layout(),
@@ -134,17 +135,17 @@ pub fn commit(
         jobs: labels.iter().enumerate().map(|(position, job)| (job, outcomes.get(&position))).collect(),
         commit: Commit::begin(storage, staging)?,
     };
-    stage.table(tables::slips(), |writer, job, outcome| {
-        outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&SlipRow { job, slip }))
+    stage.table::<SlipRow<'_>>(|writer, job, outcome| {
+        outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
     })?;
     if sweep.recording().precursors {
-        stage.table(tables::precursors(), |writer, job, outcome| {
+        stage.table::<PrecursorRow<'_>>(|writer, job, outcome| {
             let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
-            precursors.try_for_each(|precursor| writer.push(&PrecursorRow { job, precursor }))
+            precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
         })?;
     }
-    stage.table(tables::jobs(), |writer, job, outcome| {
-        writer.push(&JobRow { job, result: outcome.as_ref().map_err(String::as_str) })
+    stage.table::<JobRow>(|writer, job, outcome| {
+        writer.push(&(relabel(job), JobRecord::new(outcome.as_ref().map_err(String::as_str))))
     })?;
     Ok(stage.commit.publish()?)
 }
@@ -155,27 +156,26 @@ struct Stage<'a> {
     layout: &'a Layout,
     file: String,
     footer: Footer,
-    jobs: Vec<(&'a JobLabel, Option<&'a Outcome>)>,
+    jobs: Vec<(&'a Label<Drive>, Option<&'a Outcome>)>,
     commit: Commit<'a>,
 }
 
 impl<'a> Stage<'a> {
     /// Writes the part's file of one table: new rows of jobs with an outcome, the old ones of the others.
-    fn table<Row>(
+    fn table<R: Table>(
         &mut self,
-        table: Table<Row>,
-        write: impl Fn(&mut TableWriter<Row>, &'a JobLabel, &'a Outcome) -> Result<(), DatasetError>,
+        write: impl Fn(&mut TableWriter<R>, &'a Label<Drive>, &'a Outcome) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
-        let folder = self.layout.table(table.name);
+        let folder = self.layout.table(R::NAME);
         create_folder(self.storage, &folder)?;
         let target = folder.join(&self.file);
         let keeps = self.jobs.iter().any(|(_, outcome)| outcome.is_none());
         let kept = if keeps { KeptRows::read(self.storage, &target)? } else { KeptRows::default() };
-        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&target), table, &self.footer)?;
+        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&target), &self.footer)?;
         for &(job, outcome) in &self.jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,
-                None => kept.copy(&mut writer, &job.job_id)?,
+                None => kept.copy(&mut writer, &job.0.job_id)?,
             }
         }
         writer.finish()
@@ -192,7 +192,7 @@ struct KeptRows {
 impl KeptRows {
     fn read(storage: &dyn Storage, path: &Path) -> Result<Self, DatasetError> {
         let mut kept = Self::default();
-        for batch in Reader::new(storage, vec![path.to_owned()], None) {
+        for batch in Reader::new(storage, vec![path.to_owned()]) {
             let batch = batch?;
             let jobs = batch.texts("job_id")?;
             let mut begin = 0;
@@ -207,7 +207,7 @@ impl KeptRows {
         Ok(kept)
     }
 
-    fn copy<Row>(&self, writer: &mut TableWriter<Row>, job: &str) -> Result<(), DatasetError> {
+    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), DatasetError> {
         let rows = self.by_job.get(job).into_iter().flatten();
         rows.cloned().try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
     }

@@ -133,7 +133,7 @@ pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::columns::{Column, Getter, Table};
+    use crate::table::columns::tests::{Reading, readings};
     use crate::table::file::{Footer, TableWriter};
     use crate::table::storage::Disk;
     use std::collections::BTreeMap;
@@ -143,10 +143,10 @@ mod tests {
     fn every_changed_bit_and_every_cut_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parquet");
-        let columns = vec![Column::new("number", "", "a number", Getter::Count(|row: &u64| *row))];
-        let table = Table { name: "numbers", meaning: "One row per number", columns };
-        let mut writer = TableWriter::create(&Disk, &path, table, &Footer::default()).unwrap();
-        (0..20).for_each(|number| writer.push(&number).unwrap());
+        let mut writer = TableWriter::<Reading>::create(&Disk, &path, &Footer::default()).unwrap();
+        for (reading, _) in &readings() {
+            writer.push(reading).unwrap();
+        }
         let seal = writer.seal().unwrap();
         assert_eq!(check(&Disk, &path).unwrap(), seal);
         let bytes = fs::read(&path).unwrap();

@@ -1,319 +1,389 @@
-//! Columns: name, unit, meaning and value described once, giving Arrow schema, units in metadata, arrays and documentation.
+//! Columns: name, unit, meaning and value of each written once, in the row type that holds them.
 //!
-//! Units stand in the metadata of every Arrow field (`unit`, `description`) and, as JSON under `PANDAS_ATTRS`, in that of the
-//! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
-//! around in every reader.
+//! ```ignore
+//! columns! {
+//!     /// What one row is.
+//!     #[derive(Clone, Copy, Debug)]
+//!     pub struct Reading {
+//!         /// (docs of a field follow from its unit and meaning)
+//!         force: f64 = "N", "shear force";
+//!         phase: Option<f64> = "rad", "phase of the onset, null without modulation";
+//!         number as "slip": u64 = "", "number of the slip";
+//!     }
+//! }
+//! ```
+//!
+//! From this follow the struct and its documentation, the columns with their types, a writer and a reader. `name as "key"` is
+//! for a field that is called otherwise than its column. A field without unit and meaning holds the columns of another row
+//! type, or is a projection: it reads a column that another row type describes. Rows side by side are tuples. Nothing here
+//! knows Arrow, files or JSON.
 
-use crate::model::{Parameters, Symbol, Value};
-use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
-use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
-use serde_json::{Map, Value as Json, json};
-use std::collections::HashMap;
-use std::fmt::Write as _;
-use std::ops::Range;
-use std::sync::Arc;
+use crate::model::{BreakOn, Parameters, Symbol, Value};
+use std::borrow::Cow;
+use std::marker::PhantomData;
+use std::ops::Deref;
 
-/// Key of the unit in a field's metadata.
-pub const UNIT: &str = "unit";
-/// Key of the meaning in a field's metadata.
-pub const DESCRIPTION: &str = "description";
-/// Key under which pandas looks for `DataFrame.attrs` in the metadata of an Arrow schema.
-pub const PANDAS_ATTRS: &str = "PANDAS_ATTRS";
-
-/// How a column's value comes out of a row. The optional ones may be null.
-#[derive(Clone, Copy)]
-pub enum Getter<Row> {
-    /// A double.
-    Real(fn(&Row) -> f64),
-    /// A double that may be missing.
-    OptionalReal(fn(&Row) -> Option<f64>),
-    /// A whole number.
-    Count(fn(&Row) -> u64),
-    /// A whole number that may be missing.
-    OptionalCount(fn(&Row) -> Option<u64>),
-    /// A text.
-    Text(fn(&Row) -> String),
-    /// A text that may be missing.
-    OptionalText(fn(&Row) -> Option<String>),
+/// What the cells of a column hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Doubles.
+    Real,
+    /// Whole numbers.
+    Count,
     /// Yes or no.
-    Flag(fn(&Row) -> bool),
-    /// A parameter of the model; null for a period when the modulation is off.
-    Parameter(Symbol, fn(&Row) -> &Parameters),
+    Flag,
+    /// Texts.
+    Text,
 }
 
-impl<Row> Getter<Row> {
-    fn json(&self, row: &Row) -> Json {
-        match self {
-            Self::Real(get) => get(row).into(),
-            Self::OptionalReal(get) => get(row).into(),
-            Self::Count(get) => get(row).into(),
-            Self::OptionalCount(get) => get(row).into(),
-            Self::Text(get) => get(row).into(),
-            Self::OptionalText(get) => get(row).into(),
-            Self::Flag(get) => get(row).into(),
-            Self::Parameter(symbol, of) => match of(row).get(*symbol) {
-                Value::Real(real) => real.into(),
-                Value::Count(count) => count.into(),
-                Value::BreakOn(rule) => rule.word().into(),
-                Value::Flag(flag) => flag.into(),
-                Value::Absent => Json::Null,
-            },
-        }
-    }
+/// The value of a column in a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cell<'a> {
+    /// A value that is missing.
+    Null,
+    /// A double.
+    Real(f64),
+    /// A whole number.
+    Count(u64),
+    /// Yes or no.
+    Flag(bool),
+    /// A text.
+    Text(&'a str),
 }
 
-/// A column of a table whose rows are of type `Row`.
-#[derive(Clone, Copy)]
-pub struct Column<Row> {
+/// A column of a table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
     /// Name, fixed for readers.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// SI unit; empty for a pure number or a text.
     pub unit: &'static str,
     /// One line, without a full stop.
     pub meaning: &'static str,
-    /// The value.
-    pub value: Getter<Row>,
+    /// What its cells hold.
+    pub kind: Kind,
+    /// Whether cells may be null.
+    pub nullable: bool,
 }
 
-impl<Row> Column<Row> {
-    /// Describes a column.
-    #[must_use]
-    pub const fn new(name: &'static str, unit: &'static str, meaning: &'static str, value: Getter<Row>) -> Self {
-        Self { name, unit, meaning, value }
-    }
+/// A type that a cell can hold.
+pub trait Field: Sized {
+    /// What its cells hold.
+    const KIND: Kind;
+    /// Whether it may be null.
+    const NULLABLE: bool = false;
 
-    /// The column of a parameter, under its key and with its unit and meaning.
-    #[must_use]
-    pub const fn parameter(symbol: Symbol, of: fn(&Row) -> &Parameters) -> Self {
-        let described = symbol.description();
-        Self::new(described.key, described.unit, described.meaning, Getter::Parameter(symbol, of))
-    }
+    /// The value as a cell.
+    fn cell(&self) -> Cell<'_>;
 
-    fn field(&self) -> Field {
-        let (data_type, nullable) = match self.value {
-            Getter::Real(_) => (DataType::Float64, false),
-            Getter::OptionalReal(_) => (DataType::Float64, true),
-            Getter::Count(_) => (DataType::Int64, false),
-            Getter::OptionalCount(_) => (DataType::Int64, true),
-            Getter::Text(_) => (DataType::Utf8, false),
-            Getter::OptionalText(_) => (DataType::Utf8, true),
-            Getter::Flag(_) => (DataType::Boolean, false),
-            Getter::Parameter(symbol, _) => match Parameters::default().get(symbol) {
-                Value::Count(_) => (DataType::Int64, false),
-                Value::Real(_) => (DataType::Float64, false),
-                Value::BreakOn(_) | Value::Flag(_) => (DataType::Utf8, false),
-                Value::Absent => (DataType::Float64, true),
-            },
-        };
-        Field::new(self.name, data_type, nullable).with_metadata(HashMap::from([
-            (UNIT.to_owned(), self.unit.to_owned()),
-            (DESCRIPTION.to_owned(), self.meaning.to_owned()),
-        ]))
-    }
+    /// The value of a cell; `None` if the cell cannot be one.
+    fn from_cell(cell: Cell<'_>) -> Option<Self>;
 }
 
-/// A table: its name, its meaning and its columns in order.
-#[derive(Clone)]
-pub struct Table<Row> {
-    /// Name, which is also that of its folder.
-    pub name: &'static str,
+/// A type whose values are rows, or parts of rows.
+pub trait Row {
+    /// Its columns, in order.
+    fn columns() -> Vec<Column>;
+
+    /// Gives the cells of a row, in the order of the columns.
+    fn cells(&self, give: &mut dyn FnMut(Cell<'_>));
+}
+
+/// A row that can be read back.
+pub trait FromRow: Row + Sized {
+    /// The row with these cells, in the order of the columns.
+    ///
+    /// # Errors
+    /// What is wrong with a cell that cannot be one of this row's.
+    fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
+}
+
+/// A table whose rows are of this type.
+pub trait Table: Row {
+    /// Name, which is also that of its folder or file.
+    const NAME: &'static str;
     /// What a row is; one line, without a full stop.
-    pub meaning: &'static str,
-    /// Columns, in order.
-    pub columns: Vec<Column<Row>>,
+    const MEANING: &'static str;
 }
 
-impl<Row> Table<Row> {
-    /// Arrow schema with units and meanings in the metadata of its fields and, for pandas, of the schema.
-    #[must_use]
-    pub fn schema(&self) -> SchemaRef {
-        let by_name = |text: fn(&Column<Row>) -> &'static str| {
-            self.columns.iter().map(|column| (column.name.to_owned(), text(column).into())).collect::<Map<_, _>>()
+/// A field of a row type: one cell, several that belong together, or all the cells of another row. What the macro `columns` is built on.
+pub trait Part: Sized {
+    /// The columns of a field with this name, unit and meaning.
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column>;
+
+    /// Gives the cells.
+    fn give(&self, give: &mut dyn FnMut(Cell<'_>));
+
+    /// Reads the cells of a field with this name.
+    ///
+    /// # Errors
+    /// What is wrong with a cell that cannot be one of this field's.
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
+}
+
+impl<T: Field> Part for T {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: T::KIND, nullable: T::NULLABLE }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
+        give(self.cell());
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+        let cell = next();
+        T::from_cell(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
+    }
+}
+
+/// Row types as fields of other row types.
+macro_rules! part {
+    ($row:ty $(where $($parameter:ident: $bound:path),*)?) => {
+        impl $(<$($parameter: $bound),*>)? $crate::table::columns::Part for $row {
+            fn columns_as(_: &'static str, _: &'static str, _: &'static str) -> Vec<$crate::table::columns::Column> {
+                <Self as $crate::table::columns::Row>::columns()
+            }
+
+            fn give(&self, give: &mut dyn FnMut($crate::table::columns::Cell<'_>)) {
+                $crate::table::columns::Row::cells(self, give);
+            }
+
+            fn take<'a>(
+                _: &str,
+                next: &mut dyn FnMut() -> $crate::table::columns::Cell<'a>,
+            ) -> Result<Self, String> {
+                $crate::table::columns::FromRow::from_cells(next)
+            }
+        }
+    };
+}
+pub(crate) use part;
+
+/// The section of a table in the documentation, in Markdown.
+#[must_use]
+pub fn markdown<T: Table>() -> String {
+    let row = |column: Column| {
+        let kind = match column.kind {
+            Kind::Real => "real",
+            Kind::Count => "count",
+            Kind::Flag => "flag",
+            Kind::Text => "text",
         };
-        let attributes = json!({ "meaning": by_name(|column| column.meaning), "units": by_name(|column| column.unit) });
-        let fields: Vec<Field> = self.columns.iter().map(Column::field).collect();
-        Arc::new(Schema::new_with_metadata(fields, HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())])))
+        let nullable = if column.nullable { ", may be null" } else { "" };
+        let Column { name, unit, meaning, .. } = column;
+        format!("| `{name}` | {kind}{nullable} | {unit} | {} |\n", meaning.replace('|', "\\|").replace('<', "\\<"))
+    };
+    let rows: String = T::columns().into_iter().map(row).collect();
+    format!("## {}\n\n{}.\n\n| column | type | unit | meaning |\n|---|---|---|---|\n{rows}", T::NAME, T::MEANING)
+}
+
+/// Describes the columns of a row type: see the head of `table/columns.rs`.
+macro_rules! columns {
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $name:literal) => { $name };
+    (@text) => { "" };
+    (@text $text:tt) => { $text };
+    (@in) => { "" };
+    (@in "") => { "" };
+    (@in $unit:tt) => { concat!(", in ", $unit) };
+    ($(#[$attribute:meta])* $visibility:vis struct $row:ident {
+        $($field:ident $(as $name:literal)? : $type:ty $(= $unit:tt, $meaning:tt)?;)*
+    }) => {
+        $(#[$attribute])*
+        #[allow(rustdoc::invalid_html_tags, reason = "meanings are plain text")]
+        $visibility struct $row {
+            $(
+                #[doc = concat!($crate::table::columns::columns!(@text $($meaning)?), $crate::table::columns::columns!(@in $($unit)?), ".")]
+                $visibility $field: $type,
+            )*
+        }
+
+        impl $crate::table::columns::Row for $row {
+            fn columns() -> Vec<$crate::table::columns::Column> {
+                [$(<$type as $crate::table::columns::Part>::columns_as(
+                    $crate::table::columns::columns!(@name $field $($name)?),
+                    $crate::table::columns::columns!(@text $($unit)?),
+                    $crate::table::columns::columns!(@text $($meaning)?),
+                )),*].concat()
+            }
+
+            fn cells(&self, give: &mut dyn FnMut($crate::table::columns::Cell<'_>)) {
+                $($crate::table::columns::Part::give(&self.$field, give);)*
+            }
+        }
+
+        impl $crate::table::columns::FromRow for $row {
+            fn from_cells<'a>(
+                next: &mut dyn FnMut() -> $crate::table::columns::Cell<'a>,
+            ) -> Result<Self, String> {
+                $(let $field = $crate::table::columns::Part::take(
+                    $crate::table::columns::columns!(@name $field $($name)?),
+                    next,
+                )?;)*
+                Ok(Self { $($field),* })
+            }
+        }
+
+        $crate::table::columns::part!($row);
+    };
+}
+pub(crate) use columns;
+
+/// Fields of one kind of cell.
+macro_rules! fields {
+    ($($type:ty: $kind:ident, |$value:ident| $cell:expr, |$read:ident| $back:expr;)*) => {
+        $(impl Field for $type {
+            const KIND: Kind = Kind::$kind;
+
+            fn cell(&self) -> Cell<'_> {
+                let $value = self;
+                Cell::$kind($cell)
+            }
+
+            fn from_cell(cell: Cell<'_>) -> Option<Self> {
+                if let Cell::$kind($read) = cell { $back } else { None }
+            }
+        })*
+    };
+}
+
+fields! {
+    f64: Real, |value| *value, |real| Some(real);
+    u64: Count, |value| *value, |count| Some(count);
+    bool: Flag, |value| *value, |flag| Some(flag);
+    String: Text, |value| value, |text| Some(text.to_owned());
+    Symbol: Text, |value| value.key(), |text| Symbol::from_key(text);
+    BreakOn: Text, |value| value.word(), |text| text.parse().ok();
+}
+pub(crate) use fields;
+
+impl<T: Field> Field for Option<T> {
+    const KIND: Kind = T::KIND;
+    const NULLABLE: bool = true;
+
+    fn cell(&self) -> Cell<'_> {
+        self.as_ref().map_or(Cell::Null, T::cell)
     }
 
-    /// The table's section of the documentation, in Markdown.
+    fn from_cell(cell: Cell<'_>) -> Option<Self> {
+        if cell == Cell::Null { Some(None) } else { T::from_cell(cell).map(Some) }
+    }
+}
+
+impl<T: Row> Row for &T {
+    fn columns() -> Vec<Column> {
+        T::columns()
+    }
+
+    fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
+        (*self).cells(give);
+    }
+}
+
+/// Rows side by side are a row.
+macro_rules! side_by_side {
+    ($($part:ident),*) => {
+        impl<$($part: Row),*> Row for ($($part,)*) {
+            fn columns() -> Vec<Column> {
+                [$($part::columns()),*].concat()
+            }
+
+            #[allow(non_snake_case, reason = "a part is called as its type")]
+            fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
+                let ($($part,)*) = self;
+                $($part.cells(give);)*
+            }
+        }
+
+        impl<$($part: FromRow),*> FromRow for ($($part,)*) {
+            fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+                Ok(($($part::from_cells(next)?,)*))
+            }
+        }
+    };
+}
+
+side_by_side!(A, B);
+side_by_side!(A, B, C);
+side_by_side!(A, B, C, D);
+
+/// Which parameters stand in a row.
+pub trait Selection {
+    /// Their symbols, in order.
+    const SYMBOLS: &'static [Symbol];
+}
+
+/// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have their
+/// defaults.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Selected<S> {
+    /// The parameters.
+    pub parameters: Parameters,
+    selection: PhantomData<S>,
+}
+
+impl<S> Selected<S> {
+    /// The columns of these parameters.
     #[must_use]
-    pub fn markdown(&self) -> String {
-        let mut text =
-            format!("## {}\n\n{}.\n\n| column | type | unit | meaning |\n|---|---|---|---|\n", self.name, self.meaning);
-        for column in &self.columns {
-            let field = column.field();
-            let kind = match field.data_type() {
-                DataType::Float64 => "real",
-                DataType::Int64 => "count",
-                DataType::Boolean => "flag",
-                _ => "text",
+    pub const fn new(parameters: Parameters) -> Self {
+        Self { parameters, selection: PhantomData }
+    }
+}
+
+impl<S> Deref for Selected<S> {
+    type Target = Parameters;
+
+    fn deref(&self) -> &Parameters {
+        &self.parameters
+    }
+}
+
+impl<S: Selection> Row for Selected<S> {
+    fn columns() -> Vec<Column> {
+        let defaults = Parameters::default();
+        let column = |&symbol: &Symbol| {
+            let described = symbol.description();
+            let (kind, nullable) = match defaults.get(symbol) {
+                Value::Count(_) => (Kind::Count, false),
+                Value::Real(_) => (Kind::Real, false),
+                Value::BreakOn(_) => (Kind::Text, false),
+                Value::Flag(_) => (Kind::Flag, false),
+                Value::Absent => (Kind::Real, true),
             };
-            let nullable = if field.is_nullable() { ", may be null" } else { "" };
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "| `{}` | {kind}{nullable} | {} | {} |", column.name, column.unit, column.meaning);
+            Column { name: described.key.into(), unit: described.unit, meaning: described.meaning, kind, nullable }
+        };
+        S::SYMBOLS.iter().map(column).collect()
+    }
+
+    fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
+        for &symbol in S::SYMBOLS {
+            give(match self.parameters.get(symbol) {
+                Value::Count(count) => Cell::Count(count),
+                Value::Real(real) => Cell::Real(real),
+                Value::BreakOn(rule) => Cell::Text(rule.word()),
+                Value::Flag(flag) => Cell::Flag(flag),
+                Value::Absent => Cell::Null,
+            });
         }
-        text
-    }
-
-    /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
-    #[must_use]
-    pub fn json(&self, row: &Row) -> Json {
-        self.columns.iter().map(|column| (column.name.to_owned(), column.value.json(row))).collect()
-    }
-
-    /// An empty buffer for rows of this table.
-    #[must_use]
-    pub fn buffer(&self) -> RowBuffer {
-        let schema = self.schema();
-        let cells = schema.fields().iter().map(|field| Cells::of(field.data_type())).collect();
-        RowBuffer { schema, cells, rows: 0 }
-    }
-
-    /// Appends a row to a buffer of this table.
-    pub fn push(&self, buffer: &mut RowBuffer, row: &Row) {
-        for (column, cells) in self.columns.iter().zip(&mut buffer.cells) {
-            cells.push(&column.value, row);
-        }
-        buffer.rows += 1;
     }
 }
 
-/// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the batch.
-pub struct RowBuffer {
-    schema: SchemaRef,
-    cells: Vec<Cells>,
-    rows: usize,
-}
+part!(Selected<S> where S: Selection);
 
-impl RowBuffer {
-    /// Number of rows.
-    #[must_use]
-    pub const fn len(&self) -> usize {
-        self.rows
-    }
-
-    /// Whether there is no row.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.rows == 0
-    }
-
-    /// Schema of the rows.
-    #[must_use]
-    pub const fn schema(&self) -> &SchemaRef {
-        &self.schema
-    }
-
-    /// Appends some rows of a batch of the same table.
-    ///
-    /// # Errors
-    /// When the batch has other columns or types; the buffer may then not be used further.
-    pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
-        for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
-            let array = batch
-                .column_by_name(field.name())
-                .ok_or_else(|| ArrowError::SchemaError(format!("there is no column {}", field.name())))?;
-            cells.extend(array.slice(rows.start, rows.len()).as_ref()).ok_or_else(|| {
-                ArrowError::SchemaError(format!(
-                    "column {} is {}, not {}",
-                    field.name(),
-                    array.data_type(),
-                    field.data_type()
-                ))
-            })?;
+impl<S: Selection> FromRow for Selected<S> {
+    fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+        let mut parameters = Parameters::default();
+        for &symbol in S::SYMBOLS {
+            let value = match next() {
+                Cell::Count(count) => Value::Count(count),
+                Cell::Real(real) => Value::Real(real),
+                Cell::Text(word) => word.parse().map_or(Value::Absent, Value::BreakOn),
+                Cell::Flag(flag) => Value::Flag(flag),
+                Cell::Null => Value::Absent,
+            };
+            parameters.set(symbol, value).map_err(|error| error.to_string())?;
         }
-        self.rows += rows.len();
-        Ok(())
-    }
-
-    /// Takes all rows out as one batch.
-    ///
-    /// # Errors
-    /// When a column that may not be null holds a null, copied from a batch.
-    pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
-        self.rows = 0;
-        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().map(Cells::take).collect())
-    }
-}
-
-/// The cells of one column.
-enum Cells {
-    Real(Vec<Option<f64>>),
-    Count(Vec<Option<i64>>),
-    Text(Vec<Option<String>>),
-    Flag(Vec<Option<bool>>),
-}
-
-impl Cells {
-    fn of(data_type: &DataType) -> Self {
-        match data_type {
-            DataType::Float64 => Self::Real(Vec::new()),
-            DataType::Int64 => Self::Count(Vec::new()),
-            DataType::Boolean => Self::Flag(Vec::new()),
-            _ => Self::Text(Vec::new()),
-        }
-    }
-
-    fn push<Row>(&mut self, value: &Getter<Row>, row: &Row) {
-        match value {
-            Getter::Real(get) => self.push_real(Some(get(row))),
-            Getter::OptionalReal(get) => self.push_real(get(row)),
-            Getter::Count(get) => self.push_count(Some(get(row))),
-            Getter::OptionalCount(get) => self.push_count(get(row)),
-            Getter::Text(get) => self.push_text(Some(get(row))),
-            Getter::OptionalText(get) => self.push_text(get(row)),
-            Getter::Flag(get) => {
-                if let Self::Flag(cells) = self {
-                    cells.push(Some(get(row)));
-                }
-            }
-            Getter::Parameter(symbol, of) => match of(row).get(*symbol) {
-                Value::Real(real) => self.push_real(Some(real)),
-                Value::Absent => self.push_real(None),
-                Value::Count(count) => self.push_count(Some(count)),
-                value => self.push_text(Some(value.to_string())),
-            },
-        }
-    }
-
-    fn push_real(&mut self, real: Option<f64>) {
-        if let Self::Real(cells) = self {
-            cells.push(real);
-        }
-    }
-
-    fn push_count(&mut self, count: Option<u64>) {
-        if let Self::Count(cells) = self {
-            cells.push(count.map(u64::cast_signed));
-        }
-    }
-
-    fn push_text(&mut self, text: Option<String>) {
-        if let Self::Text(cells) = self {
-            cells.push(text);
-        }
-    }
-
-    fn extend(&mut self, array: &dyn Array) -> Option<()> {
-        let array = array.as_any();
-        match self {
-            Self::Real(cells) => cells.extend(array.downcast_ref::<Float64Array>()?.iter()),
-            Self::Count(cells) => cells.extend(array.downcast_ref::<Int64Array>()?.iter()),
-            Self::Flag(cells) => cells.extend(array.downcast_ref::<BooleanArray>()?.iter()),
-            Self::Text(cells) => {
-                cells.extend(array.downcast_ref::<StringArray>()?.iter().map(|text| text.map(str::to_owned)));
-            }
-        }
-        Some(())
-    }
-
-    fn take(&mut self) -> ArrayRef {
-        match self {
-            Self::Real(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>()),
-            Self::Count(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>()),
-            Self::Flag(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>()),
-            Self::Text(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>()),
-        }
+        parameters.validated().map(Self::new).map_err(|error| error.to_string())
     }
 }
 
@@ -321,108 +391,79 @@ impl Cells {
 pub(crate) mod tests {
     use super::*;
 
-    /// Holds a page of the documentation that is made from columns; writes it anew if `UPDATE_DOCS` is set.
-    pub(crate) fn assert_documented(page: &str, text: &str) {
-        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page);
-        if std::env::var_os("UPDATE_DOCS").is_some() {
-            std::fs::write(&file, text).unwrap();
-        }
-        assert!(
-            std::fs::read_to_string(&file).unwrap_or_default() == text,
-            "docs/{page} is out of date: run the tests with UPDATE_DOCS=1"
-        );
-    }
-
-    struct Reading {
-        force: f64,
-        phase: Option<f64>,
-        number: u64,
-        parameters: Parameters,
-    }
-
-    fn table() -> Table<Reading> {
-        Table {
-            name: "readings",
-            meaning: "One row per reading",
-            columns: vec![
-                Column::new("force", "N", "shear force", Getter::Real(|row| row.force)),
-                Column::new("phase", "rad", "phase of the onset", Getter::OptionalReal(|row| row.phase)),
-                Column::new("number", "", "number of the reading", Getter::Count(|row| row.number)),
-                Column::new("name", "", "its name", Getter::Text(|row| format!("reading {}", row.number))),
-                Column::new("high", "", "above 1 N", Getter::Flag(|row| row.force > 1.0)),
-                Column::parameter(Symbol::T, |row| &row.parameters),
-                Column::parameter(Symbol::BreakOn, |row| &row.parameters),
-            ],
+    columns! {
+        /// One reading.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Reading {
+            force: f64 = "N", "shear force";
+            phase: Option<f64> = "rad", "phase of the onset";
+            position as "number": u64 = "", "number of the reading";
+            name: String = "", "its name";
+            is_high as "high": bool = "", "above 1 N";
+            rule: Option<BreakOn> = "", "when its contacts break";
         }
     }
 
-    fn rows() -> [Reading; 2] {
+    /// A period and a rule.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct PeriodAndRule;
+
+    impl Selection for PeriodAndRule {
+        const SYMBOLS: &'static [Symbol] = &[Symbol::Delta, Symbol::T, Symbol::BreakOn];
+    }
+
+    pub(crate) type Readings = (Reading, Selected<PeriodAndRule>);
+
+    impl Table for Readings {
+        const NAME: &'static str = "readings";
+        const MEANING: &'static str = "One row per reading";
+    }
+
+    pub(crate) fn readings() -> [Readings; 2] {
         let modulated =
             Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.01), ..Parameters::default() };
+        let reading = |force, phase, position, rule| Reading {
+            force,
+            phase,
+            position,
+            name: format!("reading {position}"),
+            is_high: force > 1.0,
+            rule,
+        };
         [
-            Reading { force: 1.5, phase: None, number: 1, parameters: Parameters::default() },
-            Reading { force: -2.5, phase: Some(0.25), number: 2, parameters: modulated },
+            (reading(1.5, None, 1, None), Selected::new(Parameters::default())),
+            (reading(-2.5, Some(0.25), 2, Some(BreakOn::Tension)), Selected::new(modulated)),
         ]
     }
 
     #[test]
-    fn rows_become_columns_of_the_described_types_with_nulls_where_a_value_is_missing() {
-        let (table, mut buffer) = (table(), table().buffer());
-        for row in &rows() {
-            table.push(&mut buffer, row);
-        }
-        assert_eq!(buffer.len(), 2);
-        let batch = buffer.take().unwrap();
-        let expected: Vec<ArrayRef> = vec![
-            Arc::new(Float64Array::from(vec![1.5, -2.5])),
-            Arc::new(Float64Array::from(vec![None, Some(0.25)])),
-            Arc::new(Int64Array::from(vec![1, 2])),
-            Arc::new(StringArray::from(vec!["reading 1", "reading 2"])),
-            Arc::new(BooleanArray::from(vec![true, false])),
-            Arc::new(Float64Array::from(vec![None, Some(0.01)])),
-            Arc::new(StringArray::from(vec!["magnitude", "magnitude"])),
-        ];
-        assert_eq!(batch, RecordBatch::try_new(table.schema(), expected).unwrap());
-        assert!(buffer.is_empty());
+    fn a_column_has_its_name_unit_meaning_and_kind() {
+        let columns = Readings::columns();
+        let described = |name: &str| {
+            let column = columns.iter().find(|column| column.name == name).unwrap();
+            (column.unit, column.meaning, column.kind, column.nullable)
+        };
+        assert_eq!(described("phase"), ("rad", "phase of the onset", Kind::Real, true));
+        assert_eq!(described("number"), ("", "number of the reading", Kind::Count, false));
+        assert_eq!(described("T"), ("s", Symbol::T.description().meaning, Kind::Real, true));
+        assert_eq!(described("break_on").2, Kind::Text);
     }
 
     #[test]
-    fn copied_rows_equal_pushed_rows() {
-        let (table, mut pushed, mut copied) = (table(), table().buffer(), table().buffer());
-        for row in &rows() {
-            table.push(&mut pushed, row);
-        }
-        let batch = pushed.take().unwrap();
-        copied.copy(&batch, 0..1).unwrap();
-        copied.copy(&batch, 1..2).unwrap();
-        assert_eq!(copied.take().unwrap(), batch);
+    fn a_cell_that_a_column_cannot_hold_is_named() {
+        let error = Reading::from_cells(&mut || Cell::Null).unwrap_err();
+        assert!(error.contains("column force cannot hold Null"), "{error}");
+        let period = |value: f64| {
+            let mut cells = [Cell::Real(1e-6), Cell::Real(value), Cell::Text("magnitude")].into_iter();
+            Selected::<PeriodAndRule>::from_cells(&mut || cells.next().unwrap())
+        };
+        assert!(period(-1.0).unwrap_err().contains("T = -1"));
     }
 
     #[test]
-    fn a_batch_of_another_table_is_refused_by_column() {
-        let batch = RecordBatch::try_from_iter([("force", Arc::new(Int64Array::from(vec![1])) as ArrayRef)]).unwrap();
-        let error = table().buffer().copy(&batch, 0..1).unwrap_err();
-        assert!(error.to_string().contains("column force is Int64, not Float64"), "{error}");
-    }
-
-    #[test]
-    fn rows_become_json_by_the_names_of_the_columns() {
-        let [first, second] = rows();
-        let expected = json!({
-            "force": 1.5, "phase": null, "number": 1, "name": "reading 1", "high": true, "T": null, "break_on": "magnitude"
-        });
-        assert_eq!(table().json(&first), expected);
-        let second = table().json(&Reading { force: f64::NAN, ..second });
-        assert_eq!((&second["force"], &second["phase"], &second["T"]), (&Json::Null, &json!(0.25), &json!(0.01)));
-    }
-
-    #[test]
-    fn units_are_in_the_fields_and_where_pandas_looks() {
-        let schema = table().schema();
-        assert_eq!(schema.field(0).metadata()[UNIT], "N");
-        assert_eq!(schema.field(1).metadata()[DESCRIPTION], "phase of the onset");
-        let attributes: serde_json::Value = serde_json::from_str(&schema.metadata()[PANDAS_ATTRS]).unwrap();
-        assert_eq!(attributes["units"]["T"], "s");
-        assert_eq!(attributes["meaning"]["force"], "shear force");
+    fn the_documentation_has_a_line_for_each_column() {
+        let text = markdown::<Readings>();
+        assert!(text.starts_with("## readings\n\nOne row per reading.\n"), "{text}");
+        assert!(text.contains("| `phase` | real, may be null | rad | phase of the onset |\n"), "{text}");
     }
 }

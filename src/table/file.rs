@@ -7,8 +7,9 @@
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::results::layout::EXTENSION;
 use crate::sweep::Sweep;
+use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
-use crate::table::columns::{DESCRIPTION, RowBuffer, Table, UNIT};
+use crate::table::columns::{FromRow, Row};
 use crate::table::storage::{Storage, StorageError, StoredFile};
 use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{DataType, Field, Schema};
@@ -21,8 +22,10 @@ use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io;
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -154,9 +157,9 @@ pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
 }
 
 /// Writes one file of a table. A file that was not finished is unreadable.
-pub struct TableWriter<Row> {
-    table: Table<Row>,
+pub struct TableWriter<R> {
     path: PathBuf,
+    row: PhantomData<fn(&R)>,
     buffer: RowBuffer,
     /// Encodes into memory, one row group at a time.
     writer: ArrowWriter<Vec<u8>>,
@@ -164,32 +167,27 @@ pub struct TableWriter<Row> {
     hasher: Sha256,
 }
 
-impl<Row> TableWriter<Row> {
+impl<R: Row> TableWriter<R> {
     /// Creates the file, over another if there is one.
     ///
     /// # Errors
     /// When that fails.
-    pub fn create(
-        storage: &dyn Storage,
-        path: &Path,
-        table: Table<Row>,
-        footer: &Footer,
-    ) -> Result<Self, DatasetError> {
-        let buffer = table.buffer();
+    pub fn create(storage: &dyn Storage, path: &Path, footer: &Footer) -> Result<Self, DatasetError> {
+        let buffer = RowBuffer::new::<R>();
         let file = storage.create(path).map_err(StorageError::at("create", path))?;
         let writer = footer
             .properties(buffer.schema())
             .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))
             .map_err(|source| DatasetError::Write { path: path.to_owned(), source })?;
-        Ok(Self { table, path: path.to_owned(), buffer, writer, file, hasher: Sha256::new() })
+        Ok(Self { path: path.to_owned(), row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
     }
 
     /// Appends a row.
     ///
     /// # Errors
     /// When a full row group cannot be written.
-    pub fn push(&mut self, row: &Row) -> Result<(), DatasetError> {
-        self.table.push(&mut self.buffer, row);
+    pub fn push(&mut self, row: &R) -> Result<(), DatasetError> {
+        self.buffer.push(row);
         if self.buffer.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
     }
 
@@ -257,6 +255,14 @@ pub struct Batch {
 }
 
 impl Batch {
+    /// The rows, of this type.
+    ///
+    /// # Errors
+    /// When the file lacks a column, or holds a value that the type cannot have.
+    pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
+        arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
+    }
+
     /// A column of doubles.
     ///
     /// # Errors
@@ -343,27 +349,24 @@ fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result
 pub struct Reader<'a> {
     storage: &'a dyn Storage,
     files: std::vec::IntoIter<PathBuf>,
-    columns: Option<&'a [&'a str]>,
+    /// Names of the columns to read; all if there are none.
+    columns: Vec<Cow<'static, str>>,
     current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads these files: the named columns, or all.
+    /// Reads these files.
     #[must_use]
-    pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>, columns: Option<&'a [&'a str]>) -> Self {
-        Self { storage, files: files.into_iter(), columns, current: None }
+    pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
+        Self { storage, files: files.into_iter(), columns: Vec::new(), current: None }
     }
 
     /// Reads all files of a table folder.
     ///
     /// # Errors
     /// As [`files`].
-    pub fn of_folder(
-        storage: &'a dyn Storage,
-        folder: &Path,
-        columns: Option<&'a [&'a str]>,
-    ) -> Result<Self, DatasetError> {
-        Ok(Self::new(storage, files(storage, folder)?, columns))
+    pub fn of_folder(storage: &'a dyn Storage, folder: &Path) -> Result<Self, DatasetError> {
+        Ok(Self::new(storage, files(storage, folder)?))
     }
 
     /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
@@ -372,8 +375,8 @@ impl<'a> Reader<'a> {
         let file = self.storage.open(path).map_err(StorageError::at("read", path))?;
         decode(path, || {
             let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
-            if let Some(columns) = self.columns {
-                let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().copied());
+            if !self.columns.is_empty() {
+                let mask = ProjectionMask::columns(builder.parquet_schema(), self.columns.iter().map(AsRef::as_ref));
                 builder = builder.with_projection(mask);
             }
             builder.build()
@@ -397,6 +400,15 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// Reads the rows of files as rows of one type, batch by batch; an error ends it.
+pub fn read_rows<R: FromRow>(
+    storage: &dyn Storage,
+    files: Vec<PathBuf>,
+) -> impl Iterator<Item = Result<Vec<R>, DatasetError>> + use<'_, R> {
+    let columns = R::columns().into_iter().map(|column| column.name).collect();
+    Reader { columns, ..Reader::new(storage, files) }.map(|batch| batch?.rows_of())
+}
+
 impl Iterator for Reader<'_> {
     type Item = Result<Batch, DatasetError>;
 
@@ -413,27 +425,36 @@ impl Iterator for Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::table::columns::{Column, Getter};
+    use crate::table::columns::columns;
     use crate::table::storage::Disk;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use std::fs::{self, File};
 
-    fn table() -> Table<u64> {
-        Table {
-            name: "numbers",
-            meaning: "One row per number",
-            columns: vec![
-                Column::new("number", "", "a number", Getter::Count(|row| *row)),
-                Column::new("root", "m", "its root", Getter::Real(|row| (*row as f64).sqrt())),
-                Column::new("odd", "", "whether it is odd", Getter::Flag(|row| row % 2 == 1)),
-                Column::new("text", "", "in words", Getter::Text(|row| format!("number {}", row % 10))),
-            ],
+    columns! {
+        /// A number.
+        #[derive(Clone, Debug, PartialEq)]
+        struct Number {
+            value as "number": u64 = "", "a number";
+            root: f64 = "m", "its root";
+            odd: bool = "", "whether it is odd";
+            text: String = "", "in words";
+        }
+    }
+
+    impl Number {
+        fn of(number: u64) -> Self {
+            Self {
+                value: number,
+                root: (number as f64).sqrt(),
+                odd: number % 2 == 1,
+                text: format!("number {}", number % 10),
+            }
         }
     }
 
     fn write(path: &Path, numbers: Range<u64>) {
-        let mut writer = TableWriter::create(&Disk, path, table(), &Footer::default().with("note", "test")).unwrap();
-        numbers.for_each(|number| writer.push(&number).unwrap());
+        let mut writer = TableWriter::create(&Disk, path, &Footer::default().with("note", "test")).unwrap();
+        numbers.for_each(|number| writer.push(&Number::of(number)).unwrap());
         writer.finish().unwrap();
     }
 
@@ -451,10 +472,10 @@ mod tests {
         write(&folder.path().join("b.parquet"), 5..9);
         write(&folder.path().join("a.parquet"), 0..5);
         write(&folder.path().join("c.parquet"), 0..0);
-        for columns in [None, Some(&["number"][..])] {
-            let reader = Reader::of_folder(&Disk, folder.path(), columns).unwrap();
-            assert_eq!(numbers(reader).unwrap(), (0..9).collect::<Vec<_>>());
-        }
+        let reader = Reader::of_folder(&Disk, folder.path()).unwrap();
+        assert_eq!(numbers(reader).unwrap(), (0..9).collect::<Vec<_>>());
+        let rows = read_rows(&Disk, files(&Disk, folder.path()).unwrap()).collect::<Result<Vec<Vec<Number>>, _>>();
+        assert_eq!(rows.unwrap().concat(), (0..9).map(Number::of).collect::<Vec<_>>());
     }
 
     #[test]
@@ -463,8 +484,9 @@ mod tests {
         let (whole, copied) = (folder.path().join("whole.parquet"), folder.path().join("copied.parquet"));
         let rows = GROUP_ROWS as u64 + 1000;
         write(&whole, 0..rows);
-        let mut writer = TableWriter::create(&Disk, &copied, table(), &Footer::default().with("note", "test")).unwrap();
-        for batch in Reader::new(&Disk, vec![whole.clone()], None) {
+        let mut writer =
+            TableWriter::<Number>::create(&Disk, &copied, &Footer::default().with("note", "test")).unwrap();
+        for batch in Reader::new(&Disk, vec![whole.clone()]) {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
             writer.copy(&batch, 0..middle).unwrap();
@@ -500,14 +522,14 @@ mod tests {
         let step = bytes.len() / 97;
         for cut in (0..bytes.len()).step_by(step) {
             fs::write(&path, &bytes[..cut]).unwrap();
-            let error = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()).unwrap_err();
+            let error = numbers(Reader::of_folder(&Disk, folder.path()).unwrap()).unwrap_err();
             assert!(error.to_string().contains("a.parquet: damaged"), "cut at {cut}: {error}");
         }
         for changed in (0..bytes.len()).step_by(7) {
             let mut changed_bytes = bytes.clone();
             changed_bytes[changed] ^= 0x55;
             fs::write(&path, &changed_bytes).unwrap();
-            let error = numbers(Reader::of_folder(&Disk, folder.path(), None).unwrap()).unwrap_err();
+            let error = numbers(Reader::of_folder(&Disk, folder.path()).unwrap()).unwrap_err();
             assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
         }
     }

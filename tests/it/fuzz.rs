@@ -259,7 +259,7 @@ proptest! {
         let file = &tables[which.index(tables.len())];
         let (copy, is_changed) = copy(&root, file, &changes);
         let file = copy.path().join(file.strip_prefix(&root).unwrap());
-        prop_assert_eq!(Reader::new(&Disk, vec![file.clone()], None).any(|batch| batch.is_err()), is_changed);
+        prop_assert_eq!(Reader::new(&Disk, vec![file.clone()]).any(|batch| batch.is_err()), is_changed);
         let verification = verify(&Disk, copy.path()).unwrap();
         prop_assert_eq!(verification.whole, !is_changed);
         prop_assert!(!is_changed || verification.problems.iter().any(|problem| problem.path == file));

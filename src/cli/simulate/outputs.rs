@@ -6,8 +6,7 @@ use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use stickslip::figure::{self, Picture};
 use stickslip::model::{ContactEvent, Parameters};
-use stickslip::observe::{MapRow, ProfileRow, TraceRow};
-use stickslip::results::records;
+use stickslip::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
 use stickslip::sweep::{Sweep, predicted_interval};
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
@@ -86,29 +85,24 @@ pub(super) struct Records<'a> {
 
 pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: Records<'_>) -> Result<()> {
     if let Some(path) = &arguments.trace {
-        write_table(path, records::trace(), footer, recorded.trace.iter().copied())?;
+        write_table(path, footer, recorded.trace.iter().copied())?;
     }
     if let Some(path) = &arguments.map {
-        write_table(path, records::map(), footer, recorded.map.iter().copied())?;
+        write_table(path, footer, recorded.map.iter().copied())?;
     }
     if let Some(path) = &arguments.profile {
-        write_table(path, records::profile(), footer, recorded.profile.iter().copied())?;
+        write_table(path, footer, recorded.profile.iter().copied())?;
     }
     if let Some(path) = &arguments.contacts {
-        write_table(path, records::contacts(), footer, recorded.events.iter().copied())?;
+        write_table(path, footer, recorded.events.iter().map(ContactRow::from))?;
     }
     Ok(())
 }
 
 /// Writes a table beside its place and moves it there, so that no half of a file looks whole.
-pub(super) fn write_table<Row>(
-    path: &Path,
-    table: Table<Row>,
-    footer: &Footer,
-    rows: impl Iterator<Item = Row>,
-) -> Result<()> {
+pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Iterator<Item = R>) -> Result<()> {
     replace(path, |draft| {
-        let mut writer = TableWriter::create(&Disk, draft, table, footer)?;
+        let mut writer = TableWriter::create(&Disk, draft, footer)?;
         for row in rows {
             writer.push(&row)?;
         }

@@ -121,7 +121,7 @@ fn foreign(storage: &dyn Storage, layout: &Layout, manifest: &Manifest, copies: 
 /// The sweep that the parts of an epoch tell of, by the first whole one.
 fn part_texts(storage: &dyn Storage, layout: &Layout, epoch: usize) -> Option<String> {
     let begins = name_of(epoch, 0).rsplit_once('-').map(|(epoch, _)| format!("{epoch}-"))?;
-    let parts = files(storage, &layout.table(tables::jobs().name)).ok()?;
+    let parts = files(storage, &layout.table(tables::JOBS)).ok()?;
     let of_epoch = parts
         .into_iter()
         .filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&begins)));

@@ -85,7 +85,7 @@ fn paths(layout: &Layout, record: &Compaction) -> impl Iterator<Item = PathBuf> 
 /// The compacted files that are there.
 fn all_files(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, DatasetError> {
     let mut all = Vec::new();
-    for table in [tables::slips().name, tables::precursors().name, tables::jobs().name] {
+    for table in [tables::SLIPS, tables::PRECURSORS, tables::JOBS] {
         all.extend(compacted_files(storage, layout, table)?.into_iter().map(|file| layout.table(table).join(file)));
     }
     Ok(all)
@@ -113,9 +113,9 @@ fn is_whole(storage: &dyn Storage, directory: &Directory, record: &Compaction) -
     }
     let of_table = |table: &str| record.of_table(table).iter().map(|file| layout.table(table).join(file)).collect();
     let files = TableFiles {
-        jobs: of_table(tables::jobs().name),
-        slips: of_table(tables::slips().name),
-        precursors: directory.records_precursors().then(|| of_table(tables::precursors().name)),
+        jobs: of_table(tables::JOBS),
+        slips: of_table(tables::SLIPS),
+        precursors: directory.records_precursors().then(|| of_table(tables::PRECURSORS)),
     };
     check(storage, files, |job| {
         jobs = jobs.wrapping_sub(1);

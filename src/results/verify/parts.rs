@@ -5,8 +5,9 @@ use super::{Problem, Remedy, Verification, problem_of};
 use crate::results::compact::Without;
 use crate::results::layout::{EXTENSION, file_of, is_compacted, named_part, part_file, part_name};
 use crate::results::manifest::{Directory, DirectoryError};
-use crate::results::tables;
+use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::{Part, Plan};
+use crate::table::arrow::schema;
 use crate::table::checksum;
 use crate::table::file::{DatasetError, footer, has_columns};
 use crate::table::storage::{Storage, StorageError};
@@ -70,7 +71,7 @@ pub(super) fn verify(
             }
             State::Missing if without.parts.contains(&name) => (),
             State::Missing if committed.contains(&name) => {
-                let path = directory.layout().table(tables::jobs().name).join(part_file(&part));
+                let path = directory.layout().table(tables::JOBS).join(part_file(&part));
                 damaged(path, "it is missing, though it was committed".to_owned(), Remedy::Run);
             }
             State::Missing if directory.wants(&part) => {
@@ -110,7 +111,7 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
     let path = |table: &str| directory.layout().table(table).join(part_file(part));
     let exists = |path: &Path| storage.exists(path).map_err(StorageError::at("look up", path));
     // First, as it is the last that a run puts in its place.
-    let is_done = exists(&path(tables::jobs().name))?;
+    let is_done = exists(&path(tables::JOBS))?;
     let mut errors = Vec::new();
     for table in directory.tables() {
         let path = path(table);
@@ -129,9 +130,9 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
         return Ok(State::Missing);
     }
     let files = TableFiles {
-        jobs: vec![path(tables::jobs().name)],
-        slips: vec![path(tables::slips().name)],
-        precursors: directory.records_precursors().then(|| vec![path(tables::precursors().name)]),
+        jobs: vec![path(tables::JOBS)],
+        slips: vec![path(tables::SLIPS)],
+        precursors: directory.records_precursors().then(|| vec![path(tables::PRECURSORS)]),
     };
     let mut ids = ids(directory, part);
     let checked = check(storage, files, |job| {
@@ -148,7 +149,7 @@ fn state(storage: &dyn Storage, directory: &Directory, part: &Part) -> Result<St
             None => State::Whole,
             Some(id) => {
                 let problem = format!("it ends where the plan has job {id}");
-                State::Damaged(vec![DatasetError::damaged(&path(tables::jobs().name))(problem)])
+                State::Damaged(vec![DatasetError::damaged(&path(tables::JOBS))(problem)])
             }
         },
     })
@@ -162,9 +163,9 @@ fn belongs(storage: &dyn Storage, directory: &Directory, part: &Part, path: &Pat
     }
     let table = path.parent().and_then(|folder| folder.file_name()).unwrap_or_default();
     let schema = [
-        (tables::slips().name, tables::slips().schema()),
-        (tables::precursors().name, tables::precursors().schema()),
-        (tables::jobs().name, tables::jobs().schema()),
+        (tables::SLIPS, schema::<SlipRow<'_>>()),
+        (tables::PRECURSORS, schema::<PrecursorRow<'_>>()),
+        (tables::JOBS, schema::<JobRow>()),
     ];
     if schema.iter().any(|(name, schema)| table == *name && has_columns(&told, schema)) {
         Ok(())

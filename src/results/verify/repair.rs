@@ -51,7 +51,7 @@ pub fn repair(storage: &dyn Storage, root: &Path, committed: &BTreeSet<String>) 
             }
             Remedy::Part => {
                 // Jobs first: a part without them is not done.
-                for table in [tables::jobs().name, tables::precursors().name, tables::slips().name] {
+                for table in [tables::JOBS, tables::PRECURSORS, tables::SLIPS] {
                     for part in &problem.parts {
                         let file = layout.table(table).join(file_of(part));
                         move_away(storage, &file, &quarantine.join(table).join(file_of(part)))?;

@@ -37,7 +37,7 @@ pub(super) fn groups<'a>(
     files: Vec<PathBuf>,
     number: Option<&'static str>,
 ) -> impl Iterator<Item = Result<Group, DatasetError>> + 'a {
-    let mut batches = Reader::new(storage, files, None);
+    let mut batches = Reader::new(storage, files);
     let mut current: Option<(Batch, usize)> = None;
     let mut group: Option<Group> = None;
     std::iter::from_fn(move || {
@@ -86,7 +86,7 @@ fn step(
 
 /// The rows of jobs files.
 pub(super) fn jobs(storage: &dyn Storage, files: Vec<PathBuf>) -> impl Iterator<Item = Result<Job, DatasetError>> {
-    Reader::new(storage, files, None).flat_map(|batch| match batch.and_then(|batch| jobs_of(&batch)) {
+    Reader::new(storage, files).flat_map(|batch| match batch.and_then(|batch| jobs_of(&batch)) {
         Ok(jobs) => jobs.into_iter().map(Ok).collect::<Vec<_>>(),
         Err(error) => vec![Err(error)],
     })

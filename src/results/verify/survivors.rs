@@ -73,7 +73,7 @@ pub(super) fn survivors(
     let mut known = known(storage, whole)?;
     for part in Plan::new(directory.sweeps()).parts() {
         let sweep = &directory.sweeps()[part.epoch];
-        let ids: Vec<String> = (0..part.jobs.len()).map(|job| label(sweep, &part, job).job_id).collect();
+        let ids: Vec<String> = (0..part.jobs.len()).map(|job| label(sweep, &part, job).0.job_id).collect();
         let is_held = match record {
             Some(record) => record.holds(part.epoch, part.index),
             None => ids.iter().any(|id| known.contains_key(id)),
@@ -96,7 +96,7 @@ pub(super) fn survivors(
             continue;
         }
         survivors.broken.insert(part_name(&part));
-        let own = directory.layout().table(tables::jobs().name).join(part_file(&part));
+        let own = directory.layout().table(tables::JOBS).join(part_file(&part));
         if !storage.exists(&own).map_err(StorageError::at("look up", &own))? {
             survivors.lost.insert(part_name(&part));
             survivors.jobs.extend(wanting);
@@ -113,9 +113,9 @@ fn known(
 ) -> Result<HashMap<String, Known>, DatasetError> {
     let mut of_table = |name| whole.remove(name);
     let mut known: HashMap<String, Known> = HashMap::new();
-    let (slips, precursors) = (of_table(tables::slips().name), of_table(tables::precursors().name));
+    let (slips, precursors) = (of_table(tables::SLIPS), of_table(tables::PRECURSORS));
     let records_precursors = precursors.is_some();
-    for job in jobs(storage, of_table(tables::jobs().name).unwrap_or_default()) {
+    for job in jobs(storage, of_table(tables::JOBS).unwrap_or_default()) {
         let job = job?;
         let precursors = if records_precursors { job.precursors } else { 0 };
         known.insert(job.id, Known { is_there: true, slips: job.slips, precursors, failure: job.failure });

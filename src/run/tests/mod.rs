@@ -7,12 +7,12 @@ mod faulty_disk;
 use super::*;
 use crate::model::Parameters;
 use crate::observe::Measurements;
-use crate::observe::{Modulation, Precursor, Slip};
+use crate::observe::{Drops, Modulation, Precursor, Slip};
 use crate::results::layout::Layout;
-use crate::results::tables;
+use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, PART_COST};
-use crate::table::columns::Table;
+use crate::table::columns::Row;
 use crate::table::file::Reader;
 use crate::table::storage::Disk;
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,6 +40,7 @@ fn measure(parameters: &Parameters) -> Measurements {
         interval: (number > 0).then_some(1.0),
         phase: None,
         modulation: Modulation::default(),
+        periods: None,
         peak_force: 477.0,
         drop: 100.0,
         nucleation: onset(number),
@@ -49,7 +50,7 @@ fn measure(parameters: &Parameters) -> Measurements {
         front_speed: None,
         precursors: 1,
         slow_front_speed: None,
-        drops: None,
+        drops: Drops::default(),
     });
     let precursors = (0..count).map(|slip| Precursor {
         slip,
@@ -108,7 +109,7 @@ fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 fn texts(root: &Path, table: &str, column: &str) -> Vec<String> {
     let mut texts = Vec::new();
-    for batch in Reader::of_folder(&Disk, &Layout::new(root).table(table), None).unwrap() {
+    for batch in Reader::of_folder(&Disk, &Layout::new(root).table(table)).unwrap() {
         let batch = batch.unwrap();
         texts.extend(batch.texts(column).unwrap().iter().map(|text| text.unwrap_or_default().to_owned()));
     }
@@ -313,7 +314,7 @@ fn the_status_tells_what_is_there_and_what_is_missing() {
     let directory = Directory::read(&Disk, root.path()).unwrap();
     let status = status(&Disk, &directory).unwrap();
     let rows = texts(root.path(), "jobs", "outcome");
-    let failed = rows.iter().filter(|outcome| *outcome == tables::FAILED).count() as u64;
+    let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;
     assert_eq!((status.jobs_failed, status.jobs_done), (failed, rows.len() as u64 - failed));
     assert_eq!(status.jobs_missing, 2 * SEEDS - rows.len() as u64);
     assert!(status.parts_done > 0 && status.parts_missing > 0 && status.running.is_empty());
@@ -346,15 +347,15 @@ fn events_account_for_every_job() {
 
 #[test]
 fn all_tables_have_the_described_columns() {
-    fn columns<Row>(table: &Table<Row>) -> Vec<String> {
-        table.schema().fields().iter().map(|field| field.name().clone()).collect()
+    fn columns<R: Row>() -> Vec<String> {
+        R::columns().into_iter().map(|column| column.name.into_owned()).collect()
     }
     let root = tempfile::tempdir().unwrap();
     run_all(root.path(), &sweep(3, ""), &fine);
-    let expected = [columns(&tables::slips()), columns(&tables::precursors()), columns(&tables::jobs())];
+    let expected = [columns::<SlipRow<'_>>(), columns::<PrecursorRow<'_>>(), columns::<JobRow>()];
     for (table, expected) in ["slips", "precursors", "jobs"].into_iter().zip(expected) {
         let folder = Layout::new(root.path()).table(table);
-        let batch = Reader::of_folder(&Disk, &folder, None).unwrap().next().unwrap().unwrap();
+        let batch = Reader::of_folder(&Disk, &folder).unwrap().next().unwrap().unwrap();
         let names: Vec<_> = batch.rows.schema().fields().iter().map(|field| field.name().clone()).collect();
         assert_eq!(names, expected);
     }

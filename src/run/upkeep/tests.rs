@@ -96,7 +96,7 @@ fn run_all(root: &Path, seeds: u64) -> u64 {
 /// The ids of all jobs in the tables, as a reader finds them.
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
-    for batch in Reader::of_folder(&Disk, &Layout::new(root).table("jobs"), None).unwrap() {
+    for batch in Reader::of_folder(&Disk, &Layout::new(root).table("jobs")).unwrap() {
         ids.extend(batch.unwrap().texts("job_id").unwrap().iter().map(|id| id.unwrap().to_owned()));
     }
     ids.sort();

@@ -1,0 +1,295 @@
+//! Rows as Arrow record batches and as JSON.
+//!
+//! Units stand in the metadata of every Arrow field (`unit`, `description`) and, as JSON under `PANDAS_ATTRS`, in that of the
+//! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
+//! around in every reader.
+
+use super::columns::{Cell, Column, FromRow, Kind, Row};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int64Type};
+use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use serde_json::{Map, Value as Json, json};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Key of the unit in a field's metadata.
+pub const UNIT: &str = "unit";
+/// Key of the meaning in a field's metadata.
+pub const DESCRIPTION: &str = "description";
+/// Key under which pandas looks for `DataFrame.attrs` in the metadata of an Arrow schema.
+pub const PANDAS_ATTRS: &str = "PANDAS_ATTRS";
+
+fn data_type(kind: Kind) -> DataType {
+    match kind {
+        Kind::Real => DataType::Float64,
+        Kind::Count => DataType::Int64,
+        Kind::Flag => DataType::Boolean,
+        Kind::Text => DataType::Utf8,
+    }
+}
+
+fn field(column: &Column) -> Field {
+    Field::new(column.name.as_ref(), data_type(column.kind), column.nullable).with_metadata(HashMap::from([
+        (UNIT.to_owned(), column.unit.to_owned()),
+        (DESCRIPTION.to_owned(), column.meaning.to_owned()),
+    ]))
+}
+
+/// Arrow schema of a row, with units and meanings in the metadata of its fields and, for pandas, of the schema.
+#[must_use]
+pub fn schema<R: Row>() -> SchemaRef {
+    let columns = R::columns();
+    let by_name = |text: fn(&Column) -> &'static str| {
+        columns.iter().map(|column| (column.name.to_string(), text(column).into())).collect::<Map<_, _>>()
+    };
+    let attributes = json!({ "meaning": by_name(|column| column.meaning), "units": by_name(|column| column.unit) });
+    let fields: Vec<Field> = columns.iter().map(field).collect();
+    Arc::new(Schema::new_with_metadata(fields, HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())])))
+}
+
+/// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
+#[must_use]
+pub fn json<R: Row>(row: &R) -> Json {
+    let (columns, mut object) = (R::columns(), Map::new());
+    row.cells(&mut |cell| {
+        let value = match cell {
+            Cell::Null => Json::Null,
+            Cell::Real(real) => real.into(),
+            Cell::Count(count) => count.into(),
+            Cell::Flag(flag) => flag.into(),
+            Cell::Text(text) => text.into(),
+        };
+        object.insert(columns[object.len()].name.to_string(), value);
+    });
+    object.into()
+}
+
+/// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the batch.
+pub struct RowBuffer {
+    schema: SchemaRef,
+    cells: Vec<Cells>,
+    rows: usize,
+}
+
+/// The cells of one column.
+enum Cells {
+    Real(Vec<Option<f64>>),
+    Count(Vec<Option<i64>>),
+    Flag(Vec<Option<bool>>),
+    Text(Vec<Option<String>>),
+}
+
+impl RowBuffer {
+    /// An empty buffer for rows of this type.
+    #[must_use]
+    pub fn new<R: Row>() -> Self {
+        let cells = R::columns().into_iter().map(|column| match column.kind {
+            Kind::Real => Cells::Real(Vec::new()),
+            Kind::Count => Cells::Count(Vec::new()),
+            Kind::Flag => Cells::Flag(Vec::new()),
+            Kind::Text => Cells::Text(Vec::new()),
+        });
+        Self { schema: schema::<R>(), cells: cells.collect(), rows: 0 }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.rows
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.rows == 0
+    }
+
+    /// Schema of the rows.
+    #[must_use]
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// Appends a row of the type that the buffer was made for.
+    pub fn push<R: Row>(&mut self, row: &R) {
+        let mut columns = self.cells.iter_mut();
+        row.cells(&mut |cell| {
+            if let Some(column) = columns.next() {
+                column.push(cell);
+            }
+        });
+        self.rows += 1;
+    }
+
+    /// Appends some rows of a batch of the same table.
+    ///
+    /// # Errors
+    /// When the batch has other columns or types; the buffer may then not be used further.
+    pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
+        for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
+            let array = column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
+            cells.extend(&array.slice(rows.start, rows.len()));
+        }
+        self.rows += rows.len();
+        Ok(())
+    }
+
+    /// Takes all rows out as one batch.
+    ///
+    /// # Errors
+    /// When a column that may not be null holds a null, copied from a batch.
+    pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+        self.rows = 0;
+        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().map(Cells::take).collect())
+    }
+}
+
+impl Cells {
+    fn push(&mut self, cell: Cell<'_>) {
+        match (self, cell) {
+            (Self::Real(cells), Cell::Real(real)) => cells.push(Some(real)),
+            (Self::Count(cells), Cell::Count(count)) => cells.push(Some(count.cast_signed())),
+            (Self::Flag(cells), Cell::Flag(flag)) => cells.push(Some(flag)),
+            (Self::Text(cells), Cell::Text(text)) => cells.push(Some(text.to_owned())),
+            // A missing value; a cell of another kind than its column does not exist.
+            (Self::Real(cells), _) => cells.push(None),
+            (Self::Count(cells), _) => cells.push(None),
+            (Self::Flag(cells), _) => cells.push(None),
+            (Self::Text(cells), _) => cells.push(None),
+        }
+    }
+
+    /// Appends the cells of an array of the column's type.
+    fn extend(&mut self, array: &dyn Array) {
+        match self {
+            Self::Real(cells) => cells.extend(array.as_primitive::<Float64Type>()),
+            Self::Count(cells) => cells.extend(array.as_primitive::<Int64Type>()),
+            Self::Flag(cells) => cells.extend(array.as_boolean()),
+            Self::Text(cells) => cells.extend(array.as_string::<i32>().iter().map(|text| text.map(str::to_owned))),
+        }
+    }
+
+    fn take(&mut self) -> ArrayRef {
+        match self {
+            Self::Real(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>()),
+            Self::Count(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>()),
+            Self::Flag(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>()),
+            Self::Text(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>()),
+        }
+    }
+}
+
+/// A column of a batch, by name and type.
+fn column<'a>(batch: &'a RecordBatch, name: &str, expected: &DataType) -> Result<&'a ArrayRef, String> {
+    let array = batch.column_by_name(name).ok_or_else(|| format!("there is no column {name}"))?;
+    let found = array.data_type();
+    if found == expected { Ok(array) } else { Err(format!("column {name} is {found}, not {expected}")) }
+}
+
+fn cell(array: &dyn Array, kind: Kind, row: usize) -> Cell<'_> {
+    match kind {
+        _ if array.is_null(row) => Cell::Null,
+        Kind::Real => Cell::Real(array.as_primitive::<Float64Type>().value(row)),
+        Kind::Count => Cell::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
+        Kind::Flag => Cell::Flag(array.as_boolean().value(row)),
+        Kind::Text => Cell::Text(array.as_string::<i32>().value(row)),
+    }
+}
+
+/// The rows of a batch. Columns that the row does not have are passed over.
+///
+/// # Errors
+/// What is wrong with a batch that lacks a column or holds a value that cannot be.
+pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
+    let columns = R::columns();
+    let arrays = columns.iter().map(|described| {
+        let array = column(batch, &described.name, &data_type(described.kind))?;
+        Ok((array.as_ref(), described.kind))
+    });
+    let arrays = arrays.collect::<Result<Vec<(&dyn Array, Kind)>, String>>()?;
+    let row = |row: usize| {
+        let mut columns = arrays.iter();
+        R::from_cells(&mut || columns.next().map_or(Cell::Null, |&(array, kind)| cell(array, kind, row)))
+    };
+    (0..batch.num_rows()).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::columns::tests::{Reading, Readings, readings};
+    use super::*;
+
+    fn batch() -> RecordBatch {
+        let mut buffer = RowBuffer::new::<Readings>();
+        for row in &readings() {
+            buffer.push(row);
+        }
+        assert_eq!(buffer.len(), 2);
+        let batch = buffer.take().unwrap();
+        assert!(buffer.is_empty());
+        batch
+    }
+
+    #[test]
+    fn rows_become_columns_of_the_described_types_with_nulls_where_a_value_is_missing() {
+        let expected: Vec<ArrayRef> = vec![
+            Arc::new(Float64Array::from(vec![1.5, -2.5])),
+            Arc::new(Float64Array::from(vec![None, Some(0.25)])),
+            Arc::new(Int64Array::from(vec![1, 2])),
+            Arc::new(StringArray::from(vec!["reading 1", "reading 2"])),
+            Arc::new(BooleanArray::from(vec![true, false])),
+            Arc::new(StringArray::from(vec![None, Some("tension")])),
+            Arc::new(Float64Array::from(vec![0.0, 1e-6])),
+            Arc::new(Float64Array::from(vec![None, Some(0.01)])),
+            Arc::new(StringArray::from(vec!["magnitude", "magnitude"])),
+        ];
+        assert_eq!(batch(), RecordBatch::try_new(schema::<Readings>(), expected).unwrap());
+    }
+
+    #[test]
+    fn rows_read_back_whole_and_as_projections() {
+        assert_eq!(rows::<Readings>(&batch()).unwrap(), readings());
+        let alone: Vec<Reading> = readings().map(|(reading, _)| reading).to_vec();
+        assert_eq!(rows::<Reading>(&batch()).unwrap(), alone);
+    }
+
+    #[test]
+    fn copied_rows_equal_pushed_rows() {
+        let mut copied = RowBuffer::new::<Readings>();
+        copied.copy(&batch(), 0..1).unwrap();
+        copied.copy(&batch(), 1..2).unwrap();
+        assert_eq!(copied.take().unwrap(), batch());
+    }
+
+    #[test]
+    fn a_batch_of_another_table_is_refused_by_column() {
+        let other = RecordBatch::try_from_iter([("force", Arc::new(Int64Array::from(vec![1])) as ArrayRef)]).unwrap();
+        let error = RowBuffer::new::<Reading>().copy(&other, 0..1).unwrap_err();
+        assert!(error.to_string().contains("column force is Int64, not Float64"), "{error}");
+        assert_eq!(rows::<Reading>(&other).unwrap_err(), "column force is Int64, not Float64");
+    }
+
+    #[test]
+    fn rows_become_json_by_the_names_of_the_columns() {
+        let [first, (second, selected)] = readings();
+        let expected = json!({
+            "force": 1.5, "phase": null, "number": 1, "name": "reading 1", "high": true, "rule": null, "Delta": 0.0,
+            "T": null, "break_on": "magnitude"
+        });
+        assert_eq!(json(&first), expected);
+        let second = json(&(Reading { force: f64::NAN, ..second }, selected));
+        assert_eq!((&second["force"], &second["phase"], &second["T"]), (&Json::Null, &json!(0.25), &json!(0.01)));
+    }
+
+    #[test]
+    fn units_are_in_the_fields_and_where_pandas_looks() {
+        let schema = schema::<Readings>();
+        assert_eq!(schema.field(0).metadata()[UNIT], "N");
+        assert_eq!(schema.field(1).metadata()[DESCRIPTION], "phase of the onset");
+        let attributes: Json = serde_json::from_str(&schema.metadata()[PANDAS_ATTRS]).unwrap();
+        assert_eq!(attributes["units"]["T"], "s");
+        assert_eq!(attributes["meaning"]["force"], "shear force");
+    }
+}
