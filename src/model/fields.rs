@@ -24,8 +24,8 @@
 //! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
 //! | `"meaning"` | one line, without a full stop; it also heads columns of tables |
 //!
-//! Out of a row come the field with its documentation, its default, its [`Description`], access by key and the row of the
-//! table in `docs/`, written by the tests with `UPDATE_DOCS=1`.
+//! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
+//! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
 /// Description of one field.
 #[derive(Clone, Copy, Debug)]
