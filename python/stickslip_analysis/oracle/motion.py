@@ -58,17 +58,15 @@ class Contacts:
 
 
 class Bounds(NamedTuple):
-    """The motion at some times, and bounds that hold from then on: arrays of times by blocks."""
+    """The motion at some times, and bounds that hold from then on: arrays of times by blocks, in SI units.
 
-    #: Displacement since the start, in m.
+    `displacement` counts from the start, `drift` is its linear part; `curvature` bounds |x''|, `distance` |x - drift|.
+    """
+
     displacement: np.ndarray
-    #: Velocity, in m/s.
     velocity: np.ndarray
-    #: The linear drift alone, in m.
     drift: np.ndarray
-    #: Bound on |x''|, in m/s².
     curvature: np.ndarray
-    #: Bound on the distance from the drift, in m.
     distance: np.ndarray
 
 

@@ -36,7 +36,10 @@ def document(results: Path) -> str:
     """The document in Markdown."""
     statements, questions = ([section(results) for section in sections] for sections in (STATEMENTS, QUESTIONS))
     summary = [
-        [section.title, f"{sum(check.agrees for check in section.checks)} of {len(section.checks)}"]
+        {
+            "statement": section.title,
+            "checks that agree": f"{sum(check.agrees for check in section.checks)} of {len(section.checks)}",
+        }
         for section in statements + questions
         if section.checks
     ]
@@ -51,7 +54,7 @@ def document(results: Path) -> str:
             "Differences between parameter sets are taken seed by seed, as equal seeds have the same contacts.",
             "Where the paper gives no number, the criterion is a choice and stands beside the result.",
         ),
-        table(["statement", "checks that agree"], summary),
+        table(summary),
         "## The paper's statements",
         *(section.markdown() for section in statements),
         "## Beyond the paper",

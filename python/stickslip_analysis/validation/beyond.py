@@ -19,8 +19,8 @@ STRONG = 0.8
 SHORT = 0.04
 #: Frequencies in Hz of the sweeps of size, contacts and disorder.
 FREQUENCIES = (29, 58, 116)
-#: η just above 1, from which Φ_max is far enough from φ_min to be passed.
-ABOVE_ONE = 1.014
+#: η from which the window of the phase holds φ_min (docs/model.md).
+WHOLE_WINDOW = 1.014
 
 
 def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
@@ -38,22 +38,20 @@ def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
         near.text(),
         near.low > 0.5,
     )
-    differences, rows = [], []
-    for (low, high), (_, mine) in zip(pairwise(edges), slips.groupby("bin")):
+    differences = []
+    for (low, high), (_, mine) in zip(pairwise(edges), slips.groupby("bin"), strict=True):
         up, down = mine[mine["is_up"]], mine[~mine["is_up"]]
         differences.append(difference(down, up, "n"))
-        rows.append(
-            [
-                f"{1e3 * low:.1f} to {1e3 * high:.1f}",
-                *(f"{1e3 * part['interval'].median():.1f}" for part in (up, down)),
-                *(f"{part['n'].mean():.2f}" for part in (up, down)),
-                differences[-1].text(2),
-            ]
+        section.rows.append(
+            {
+                "T (ms)": f"{1e3 * low:.1f} to {1e3 * high:.1f}",
+                "median τ (ms), T up": f"{1e3 * up['interval'].median():.1f}",
+                "median τ (ms), T down": f"{1e3 * down['interval'].median():.1f}",
+                "mean n, T up": f"{up['n'].mean():.2f}",
+                "mean n, T down": f"{down['n'].mean():.2f}",
+                "n down − n up, paired by seed": differences[-1].text(2),
+            }
         )
-    section.table = (
-        ["T (ms)", "median τ (ms), T up", "T down", "mean n, T up", "T down", "n down − n up, paired by seed"],
-        rows,
-    )
     means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
     whole = mean((means[False] - means[True]).groupby("seed").mean())
     section.remark(
@@ -77,31 +75,20 @@ def locking_map(results: Path) -> Section:
     """Where slips lock, over period and amplitude."""
     section = Section("Arnold tongues: locking over period and amplitude", "`sweeps/locking-map.toml`", "locking-map")
     sets = Sweep(results / "locking-map").reduced("sets")
-    rows = []
     for low, high in pairwise((0, 0.5, 1, 1.5, 2, 3, 5, 10, 20)):
         mine = sets[(sets["eta"] >= low) & (sets["eta"] < high)]
         if len(mine) < 2:
             continue
         short = mine[mine["T"] < SHORT]["locking_index"]
-        rows.append(
-            [
-                f"{low:g} to {high:g}",
-                len(mine),
-                mean(mine["locked"].astype(float)).text(2),
-                mean(short).text() if len(short) > 1 else "",
-                f"{(short > STRONG).mean():.2f}" if len(short) else "",
-            ]
+        section.rows.append(
+            {
+                "η": f"{low:g} to {high:g}",
+                "sets": len(mine),
+                "share with locked phases": mean(mine["locked"].astype(float)).text(2),
+                f"mean locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text() if len(short) > 1 else "",
+                f"share of these above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
+            }
         )
-    section.table = (
-        [
-            "η",
-            "sets",
-            "share with locked phases",
-            f"mean locking index, T < {1e3 * SHORT:.0f} ms",
-            f"share of these above {STRONG}",
-        ],
-        rows,
-    )
     count = sets["intervals"].mean()
     section.remark(
         f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
@@ -145,21 +132,14 @@ def staircase(results: Path) -> Section:
         "Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase"
     )
     slips = Sweep(results / "staircase").slips().dropna(subset="interval")
-    rows, shares, rises = [], {}, []
+    shares, rises = {}, []
     for amplitude, mine in slips.groupby("Delta"):
         medians, on_step = median_periods(mine)
         shares[amplitude] = jackknife(lambda rows: median_periods(rows)[1].mean(), mine)
         rises.append(f"{(medians[on_step].round().diff() > 0).sum()} times at {1e6 * amplitude:.1f} µm")
-        widths = [stretches(on_step & (medians.round() == n)) for n in range(1, 7)]
-        rows.append([f"{1e6 * amplitude:.1f}", shares[amplitude].text(2), *widths])
-    section.table = (
-        [
-            "Δ (µm)",
-            "share of the periods T whose median τ is within 0.05 T of nT",
-            *(f"n = {n}: T (ms)" for n in range(1, 7)),
-        ],
-        rows,
-    )
+        stated = "share of the periods T whose median τ is within 0.05 T of nT"
+        steps = {f"n = {n}: T (ms)": stretches(on_step & (medians.round() == n)) for n in range(1, 7)}
+        section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", stated: shares[amplitude].text(2)} | steps)
     weakest, strongest = min(shares), max(shares)
     widens = shares[strongest].low > shares[weakest].high
     section.remark(
@@ -180,27 +160,23 @@ def dependence(results: Path, *, sweep: str, column: str, what: str, digits: int
     section = Section(f"Locking against {what}", f"`sweeps/{sweep}.toml`, Δ = 1 µm", sweep)
     slips = Sweep(results / sweep).slips()
     slips = slips.assign(disorder=slips["dfs"] / slips["fs"])
-    rows, weakest = [], {}
+    weakest = {}
     for value, mine in slips.groupby(column):
         still = select(mine, Delta=0.0)
         tau = jackknife(lambda rows: 1e3 * rows["interval"].mean(), still)
         spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), still)
-        lengths = [
-            jackknife(lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency))
+        lengths = {
+            f"resultant length of φ at {frequency} Hz": jackknife(
+                lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency)
+            )
             for frequency in FREQUENCIES
-        ]
+        }
         shown = f"{value:.{digits}f}"
-        weakest[shown] = min(lengths, key=lambda length: length.value)
-        rows.append([shown, tau.text(1), spread.text(2), *(length.text(2) for length in lengths)])
-    section.table = (
-        [
-            what,
-            "τ without modulation (ms)",
-            "its s.d. over mean",
-            *(f"resultant length of φ at {frequency} Hz" for frequency in FREQUENCIES),
-        ],
-        rows,
-    )
+        weakest[shown] = min(lengths.values(), key=lambda length: length.value)
+        section.rows.append(
+            {what: shown, "τ without modulation (ms)": tau.text(1), "its s.d. over mean": spread.text(2)}
+            | {head: length.text(2) for head, length in lengths.items()}
+        )
     locked = [shown for shown, length in weakest.items() if length.low > 0.5]
     where = "all of these values" if len(locked) == len(weakest) else ", ".join(locked) or "none of these values"
     section.remark(
@@ -249,10 +225,10 @@ def choices(results: Path) -> Section:
         f" {', '.join(counts)}."
     )
     phases = Sweep(results / "fig3").slips()
-    phases = phases[phases["eta"] > ABOVE_ONE]
+    phases = phases[phases["eta"] > WHOLE_WINDOW]
     past = phases["phase"] - numpy.arcsin(1 / phases["eta"])
     section.item(
-        f"Window of the phase: {100 * (past > 0).mean():.2f} % of the slips of `fig3` at η > {ABOVE_ONE} lie past"
+        f"Window of the phase: {100 * (past > 0).mean():.2f} % of the slips of `fig3` at η > {WHOLE_WINDOW} lie past"
         f" Φ_max, by at most {past.max():.3f} rad; the window reaches 0.5 rad past it."
     )
     startup = Sweep(results / "startup").reduced("startup")

@@ -16,6 +16,11 @@ class Check:
     measured: str
     agrees: bool
 
+    def row(self) -> dict:
+        """Its row of a table."""
+        agrees = "yes" if self.agrees else "**no**"
+        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "agrees": agrees}
+
 
 @dataclass
 class Section:
@@ -27,7 +32,8 @@ class Section:
     #: A picture in results/, by the stem of its name.
     picture: str | None = None
     checks: list[Check] = field(default_factory=list)
-    table: tuple[list[str], list[list]] | None = None
+    #: Of a table: the cells of each row by the heads of their columns.
+    rows: list[dict] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
 
     def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
@@ -48,10 +54,9 @@ class Section:
         if self.picture:
             parts.append(f"![{self.title}](../results/{self.picture}.png)")
         if self.checks:
-            rows = [[c.claim, c.criterion, c.measured, "yes" if c.agrees else "**no**"] for c in self.checks]
-            parts.append(table(["the paper says", "agrees if", "measured", "agrees"], rows))
-        if self.table:
-            parts.append(table(*self.table))
+            parts.append(table([check.row() for check in self.checks]))
+        if self.rows:
+            parts.append(table(self.rows))
         return "\n\n".join(parts + self.remarks)
 
 
@@ -60,7 +65,7 @@ def paragraph(*sentences: str, width: int = WIDTH) -> str:
     return "\n".join(textwrap.fill(one, width, break_long_words=False, break_on_hyphens=False) for one in sentences)
 
 
-def table(head: list[str], rows: list[list]) -> str:
-    """A table."""
-    lines = [head, ["---"] * len(head), *rows]
+def table(rows: list[dict]) -> str:
+    """A table; each row holds its cells by the heads of their columns."""
+    lines = [rows[0], ["---"] * len(rows[0]), *(row.values() for row in rows)]
     return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

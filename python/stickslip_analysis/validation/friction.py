@@ -1,7 +1,6 @@
 """Statements 6 to 8: mean friction, slow fronts and the loading profile."""
 
 import math
-from itertools import pairwise
 from pathlib import Path
 
 import numpy
@@ -27,18 +26,19 @@ def friction(results: Path) -> Section:
     jobs, slips = sweep.table("jobs"), sweep.slips()
     still, still_slips = select(jobs, Delta=0.0), select(slips, Delta=0.0)
     peak, stiffness, reference = still_slips["peak_force"].mean(), still["Kd"].iloc[0], still["mean_friction"].mean()
-    rows, small, curves = [], [], {frequency: [] for frequency in FREQUENCIES}
+    curves = {f: [] for f in FREQUENCIES}
     for amplitude in sorted(set(jobs["Delta"]) - {0.0}):
         ratio = stiffness * amplitude / peak
-        changes = [
-            difference(select(jobs, Delta=amplitude, T=1 / frequency), still, "mean_friction").scaled(100 / reference)
-            for frequency in FREQUENCIES
-        ]
-        rows.append([f"{ratio:.3f}", *(change.text(1) for change in changes)])
-        if 0.05 <= ratio <= 0.1:
-            small += [change.value for change in changes]
-        for frequency, change in zip(FREQUENCIES, changes):
-            curves[frequency].append((ratio, change.value))
+        changes = {
+            f: difference(select(jobs, Delta=amplitude, T=1 / f), still, "mean_friction").scaled(100 / reference)
+            for f in FREQUENCIES
+        }
+        section.rows.append(
+            {"K_d Δ / F_m": f"{ratio:.3f}"} | {f"change at {f} Hz (%)": change.text(1) for f, change in changes.items()}
+        )
+        for f, change in changes.items():
+            curves[f].append((ratio, change.value))
+    small = [change for curve in curves.values() for ratio, change in curve if 0.05 <= ratio <= 0.1]
     section.check(
         "at the amplitudes of Fig. 3 (ΔF/F_m from 0.05 to 0.1) the effect is negligible",
         "mean friction changed by less than 10 %",
@@ -61,7 +61,6 @@ def friction(results: Path) -> Section:
             for cut, found in thresholds.items()
         ),
     )
-    section.table = (["K_d Δ / F_m", "change at 29 Hz (%)", "58 Hz (%)", "200 Hz (%)"], rows)
     waits, free = (1e3 * rows["interval"].mean() for rows in (select(slips, Delta=6e-7, T=1 / 29), still_slips))
     weakest, strongest = (
         f"from {tenth[f]:.2f} at {f} Hz" for f in (min(tenth, key=tenth.get), max(tenth, key=tenth.get))
@@ -82,7 +81,8 @@ def friction(results: Path) -> Section:
 
 def first_below(curve: list[tuple[float, float]], level: float) -> float:
     """Where a curve of points (x, y) falls below a level for good, by linear interpolation."""
-    (x, y), (next_x, next_y) = [pair for pair in pairwise(curve) if pair[0][1] > level][-1]
+    last = max(index for index, (_, y) in enumerate(curve) if y > level)
+    (x, y), (next_x, next_y) = curve[last : last + 2]
     return x + (next_x - x) * (y - level) / (y - next_y)
 
 
@@ -102,34 +102,23 @@ def slow_fronts(results: Path) -> Section:
         slow=is_front.reindex(slips.index, fill_value=False),
         fast=(large.groupby(of_slip).size() > 0).reindex(slips.index, fill_value=False),
     ).reset_index()
-    rows, slow, fast = [], {}, {}
+    slow, fast = {}, {}
     for frequency in (None, 29, 58, 116, 200):
         mine = select(slips, Delta=1e-6, frequency=frequency) if frequency else select(slips, Delta=0.0)
         reaches = of_same_jobs(large, mine)["reach"].quantile([0.5, 0.25, 0.75])
         slow[frequency], fast[frequency], count = (
             jackknife(lambda rows: rows[column].mean(), mine) for column in ("slow", "fast", "precursors")
         )
-        rows.append(
-            [
-                f"{frequency} Hz" if frequency else "none",
-                len(mine),
-                slow[frequency].text(2),
-                fast[frequency].text(2),
-                "{:.0f} ({:.0f} to {:.0f})".format(*reaches),
-                count.text(2),
-            ]
+        section.rows.append(
+            {
+                "modulation": f"{frequency} Hz" if frequency else "none",
+                "slips": len(mine),
+                "share with a slow front": slow[frequency].text(2),
+                f"share with a large precursor (at least {LARGE} breaks)": fast[frequency].text(2),
+                "blocks reached by these, median and quartiles": "{:.0f} ({:.0f} to {:.0f})".format(*reaches),
+                "precursors per slip (at least 20 breaks)": count.text(2),
+            }
         )
-    section.table = (
-        [
-            "modulation",
-            "slips",
-            "share with a slow front",
-            f"share with a large precursor (at least {LARGE} breaks)",
-            "blocks reached by these, median and quartiles",
-            "precursors per slip (at least 20 breaks)",
-        ],
-        rows,
-    )
     for frequency in (29, 58, 116, 200):
         section.check(
             f"perturbations eliminate slow fronts, {frequency} Hz",

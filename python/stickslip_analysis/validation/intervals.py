@@ -100,11 +100,11 @@ def stick_slip(results: Path) -> Section:
     )
     counted = {f"precursors of at least {size} breaks": count for size, count in counts.items()}
     counted["drops of F_S of at least 0.5 N"] = slips["drops_before"]
-    rows = []
     for what, count in counted.items():
-        shares = [(count == number).mean() for number in range(6)] + [(count > 5).mean()]
-        rows.append([what, f"{count.mean():.2f}", *(f"{one:.2f}" for one in shares)])
-    section.table = (["", "mean per slip", *(f"share of slips with {n}" for n in range(6)), "more"], rows)
+        shares = {f"share of slips with {number}": f"{(count == number).mean():.2f}" for number in range(6)}
+        section.rows.append(
+            {"": what, "mean per slip": f"{count.mean():.2f}"} | shares | {"more": f"{(count > 5).mean():.2f}"}
+        )
     cut = 0.5 * slips["drop"].median()
     seen = slips["drop_during"] >= cut
     false = slips["largest_drop_before"] >= cut
@@ -202,12 +202,17 @@ def many_periods(results: Path) -> Section:
     section.check(
         "... once locked", "of the locked sets, more than 0.5 of the intervals", locked.text(), locked.low > 0.5
     )
-    rows = []
     for low, high in pairwise((1, 2, 4, 10, 30, 100, 1001)):
         mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
         near = share(mine["near"], mine["set_id"])
-        rows.append([f"{low} to {min(high, 1000)}", near.units, f"{mine['locked'].mean():.2f}", near.text()])
-    section.table = (["η", "sets", "share of slips in locked sets", "within 0.1 T of nT"], rows)
+        section.rows.append(
+            {
+                "η": f"{low} to {min(high, 1000)}",
+                "sets": near.units,
+                "share of slips in locked sets": f"{mine['locked'].mean():.2f}",
+                "within 0.1 T of nT": near.text(),
+            }
+        )
     return section
 
 

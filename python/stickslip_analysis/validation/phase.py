@@ -68,21 +68,17 @@ def phase(results: Path) -> Section:
         f"{locked.text(2)} of {len(under_one)} sets",
         locked.high < 0.05,
     )
-    rows = []
     for velocity, those in under_one.groupby("V0"):
         load = load_phase(slips[slips["set_id"].isin(those["set_id"])])
-        locks, length, p = those["locked"].sum(), resultant_length(load), rayleigh_p(load)
-        rows.append([f"{velocity:.2g}", len(those), locks, f"{length:.3f}", f"{p:.2g}"])
-    section.table = (
-        [
-            "V0 (m/s)",
-            "sets with η < 1",
-            "of these locked",
-            "resultant length of the load phase",
-            "p, slips taken as independent",
-        ],
-        rows,
-    )
+        section.rows.append(
+            {
+                "V0 (m/s)": f"{velocity:.2g}",
+                "sets with η < 1": len(those),
+                "of these locked": those["locked"].sum(),
+                "resultant length of the load phase": f"{resultant_length(load):.3f}",
+                "p, slips taken as independent": f"{rayleigh_p(load):.2g}",
+            }
+        )
     lengths = []
     for eta, rows in low.groupby(low["eta"].round(4)):
         length = jackknife(lambda rows: resultant_length(rows["phase"]), rows, unit="set_id")
@@ -155,11 +151,15 @@ def stiff_drive(results: Path) -> Section:
         under.high < 0.02,
     )
     section.check(*envelope(high))
-    rows = []
     for low, high in ((0, 0.7), (1, 2), (2, 5), (5, 20), (20, 100), (100, 1001)):
         mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
         if not mine.empty:
             lengths = mean(mine.groupby("set_id")["phase"].apply(resultant_length))
-            rows.append([f"{low} to {min(high, 1000)}", lengths.units, lengths.text(2)])
-    section.table = (["η", "sets", "resultant length of φ, mean over sets"], rows)
+            section.rows.append(
+                {
+                    "η": f"{low} to {min(high, 1000)}",
+                    "sets": lengths.units,
+                    "resultant length of φ, mean over sets": lengths.text(2),
+                }
+            )
     return section
