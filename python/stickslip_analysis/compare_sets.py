@@ -28,7 +28,11 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
 
 def main() -> None:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m stickslip_analysis.compare_sets",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("results", type=Path, help="results directory of a sweep")
     parser.add_argument("set_id", nargs=2, help="ids of the two sets")
     options = parser.parse_args()

@@ -35,7 +35,7 @@ def table(result: dict) -> str:
 
 def main() -> int:
     """Replays the log that the command line names."""
-    parser = contact_log.parser(description)
+    parser = contact_log.parser("oracle", description)
     parser.add_argument("--breaks", type=int, default=sys.maxsize, help="replay so many breaks (default: all)")
     parser.add_argument("--follow", action="store_true", help="continue from the logged times of breaks (see above)")
     parser.add_argument("--worst", type=float, default=1e-8, help="limit on the worst time error, in s (%(default)g)")

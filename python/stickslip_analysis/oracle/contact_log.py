@@ -162,9 +162,13 @@ class ContactLog:
             raise LogError("the initial attachment of some contacts is missing")
 
 
-def parser(description: str) -> argparse.ArgumentParser:
-    """A command line with the log and an option for each parameter."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+def parser(module: str, description: str) -> argparse.ArgumentParser:
+    """The command line of a module of the package, with the log and an option for each parameter."""
+    parser = argparse.ArgumentParser(
+        prog=f"python -m stickslip_analysis.{module}",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("log", type=Path, help="contact log (Parquet)")
     group = parser.add_argument_group("parameters", "SI units; they override those in the footer of the log")
     for field in dataclasses.fields(Parameters)[:-1]:
