@@ -239,7 +239,7 @@ pub(super) mod tests {
                 let found = coverage(size, resultant, |draws, length| {
                     (0..length).map(|_| draws.von_mises(concentration)).collect()
                 });
-                // 1000 repetitions tell coverage to 0.7 (standard error).
+                // 1000 repetitions give coverage to 0.7 (standard error).
                 assert!(found.iter().all(|held| (92.0..98.0).contains(held)), "{concentration}, {size:?}: {found:?}");
             }
         }

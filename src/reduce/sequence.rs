@@ -7,7 +7,7 @@
 //! S = 1.5), and corrected for the mean being that of the same values. Counting pairs makes it exact for short jobs too: a job
 //! of one slip has none.
 
-/// Wolff's S: the correlation decays about so many times slower than the integrated time tells.
+/// Wolff's S: the correlation decays about this many times slower than the integrated time suggests.
 const DECAY: f64 = 1.5;
 
 /// Values of a quantity with D components, in the order of slips, and where jobs begin.

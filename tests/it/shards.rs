@@ -46,10 +46,10 @@ fn what_is_there_is_reduced_and_what_is_missing_is_told() {
     let first = folder.ends(0, "run many.toml --out r --shard 1/2");
     let missing = json(&folder.ends(0, "status r --json").stdout)["jobs_missing"].as_u64().unwrap();
     assert!(missing > 4096, "{missing}");
-    let told = format!("reduced what is there: {missing} jobs in 3 parts are missing");
-    assert!(first.stderr.contains(&told), "{}", first.stderr);
+    let note = format!("reduced what is there: {missing} jobs in 3 parts are missing");
+    assert!(first.stderr.contains(&note), "{}", first.stderr);
     let reduced = folder.ends(0, "reduce r --json");
-    assert!(reduced.stderr.contains(&told), "{}", reduced.stderr);
+    assert!(reduced.stderr.contains(&note), "{}", reduced.stderr);
     assert_eq!(json(&reduced.stdout)["jobs"].as_u64(), Some(28_000 - missing));
 }
 
