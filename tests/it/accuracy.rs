@@ -21,7 +21,10 @@ fn scaling_writes_what_it_prints() {
         assert_eq!(printed_value.len(), 8);
         for (printed_value, stored) in printed_value.into_iter().zip(table.reals(column)) {
             // The parser of the JSON may be off by the last bit.
-            assert!(printed_value > 0.0 && (printed_value - stored).abs() <= 1e-15 * stored, "{column}: {printed_value} {stored}");
+            assert!(
+                printed_value > 0.0 && (printed_value - stored).abs() <= 1e-15 * stored,
+                "{column}: {printed_value} {stored}"
+            );
         }
     }
     let exponents = folder.file("cost/scaling-exponents.parquet");

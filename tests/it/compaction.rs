@@ -177,7 +177,7 @@ fn read(folder: &Path) -> Option<u64> {
 }
 
 #[test]
-fn readers_get_every_row_once_or_are_told_while_tables_are_compacted_and_after_kills() {
+fn readers_get_every_row_once_or_an_error_while_tables_are_compacted_and_after_kills() {
     let folder = Folder::new();
     folder.write("cheap.toml", &sweep(SEEDS));
     folder.write("fewer.toml", &sweep(FEWER_SEEDS));

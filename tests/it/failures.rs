@@ -58,7 +58,7 @@ fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
 }
 
 #[test]
-fn a_poison_job_is_told_as_a_command_that_fails_in_the_same_way() {
+fn a_poison_job_is_reported_as_a_command_that_fails_in_the_same_way() {
     let folder = Folder::new();
     folder.write("poison.toml", POISON);
     let ended = folder.ends(1, "run poison.toml --out r");

@@ -40,7 +40,7 @@ fn a_shard_without_parts_that_ends_first_has_nothing_to_reduce_and_says_so() {
 }
 
 #[test]
-fn what_is_there_is_reduced_and_what_is_missing_is_told() {
+fn what_is_there_is_reduced_and_what_is_missing_is_reported() {
     let folder = Folder::new();
     folder.write("many.toml", MANY);
     let first = folder.ends(0, "run many.toml --out r --shard 1/2");
