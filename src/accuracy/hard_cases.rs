@@ -139,7 +139,7 @@ impl HardCase {
         let row = Stability {
             threat: self.threat.to_owned(),
             case: self.name(),
-            solver: super::described(self.solver),
+            solver: super::solver_in_words(self.solver),
             cpu_seconds,
             ..Stability::default()
         };

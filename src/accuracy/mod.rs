@@ -63,7 +63,7 @@ pub enum AccuracyError {
 
 /// A solver and its setting in words.
 #[must_use]
-pub fn described(solver: Solver) -> String {
+pub fn solver_in_words(solver: Solver) -> String {
     match solver {
         Solver::EventDriven { tolerance } => format!("event-driven, tolerance {tolerance:e}"),
         Solver::FixedStep { time_step } => format!("fixed step, dt {time_step:e} s"),
@@ -89,7 +89,7 @@ struct Realisation<'a> {
 }
 
 impl Realisation<'_> {
-    /// Its observer ends a simulation; none needs so many events.
+    /// Observers end these simulations; none comes near this number of events.
     const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
 
     fn simulate(&self, observer: &mut dyn Observer) -> Result<(), AccuracyError> {
@@ -110,7 +110,7 @@ impl Realisation<'_> {
     }
 
     fn failed(&self, source: SimulationError) -> AccuracyError {
-        let (case, solver) = ((self.in_words)(self.parameters), described(self.solver));
+        let (case, solver) = ((self.in_words)(self.parameters), solver_in_words(self.solver));
         AccuracyError::Simulation { case, seed: self.parameters.seed, solver, source }
     }
 }

@@ -111,9 +111,9 @@ pub struct MethodRow {
     pub parameters: Parameters,
     /// Method and setting.
     pub solver: Solver,
-    /// What it costs, by its cheapest realisation per step: other work on the machine can only add to that.
+    /// Cost, by the realisation that is fastest per step: other work on the machine can only add to that.
     pub cost: Cost,
-    /// CPU time per step of the dearest realisation over that of the cheapest: how quiet the machine was.
+    /// CPU time per step of the slowest realisation over that of the fastest: how quiet the machine was.
     pub cost_spread: f64,
     /// Errors of the first break times; `None` if they would take too long.
     pub break_times: Option<BreakErrors>,
@@ -205,14 +205,14 @@ impl Findings {
     }
 }
 
-/// Slips and cost of one solver so far.
+/// Slips and cost of one solver, seed by seed.
 #[derive(Clone, Debug, Default)]
 struct Ensemble {
     slips: Vec<Slip>,
     slips_seen: u64,
     end_time: f64,
     steps: u64,
-    /// CPU time per step of the cheapest and of the dearest realisation, in s.
+    /// CPU time per step of the fastest and of the slowest realisation, in s.
     per_step: Option<(f64, f64)>,
 }
 
@@ -227,8 +227,8 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// Costs, at those of a step in the cheapest realisation, and how many times that the dearest takes. Where there are no
-    /// slips, costs per slip follow from the mean interval in s.
+    /// Cost by the CPU time per step of the fastest realisation, and that of the slowest over it. Without slips the cost per
+    /// slip follows from the mean interval in s.
     fn cost(&self, mean_interval: f64) -> (Cost, f64) {
         let (least, most) = self.per_step.unwrap_or_default();
         let summary = Summary { end_time: self.end_time, steps: self.steps, ..Summary::default() };

@@ -6,8 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use stickslip::accuracy::{
-    self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, described,
-    drive_in_words, hard_cases, scaling_report, stability_report, study_report,
+    self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
+    hard_cases, scaling_report, solver_in_words, stability_report, study_report,
 };
 use stickslip::table::storage::Disk;
 
@@ -150,7 +150,7 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
         });
         lines.push(format!(
             "{:30}{costs} {:>8.0} {:>6.2} {:>18} {:>24} {:>9}",
-            described(row.solver),
+            solver_in_words(row.solver),
             1e9 * row.cost.per_step,
             row.cost_spread,
             times.unwrap_or_else(|| "-".to_owned()),
@@ -182,7 +182,7 @@ fn distance_table(findings: &Findings) -> Vec<String> {
             let ratio = found.map(|found| found.wasserstein.value / found.wasserstein.floor);
             ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2}"))
         };
-        lines.push(format!("{:30}{}", described(row.solver), cells(found.into_iter().map(ratio))));
+        lines.push(format!("{:30}{}", solver_in_words(row.solver), cells(found.into_iter().map(ratio))));
     }
     let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
     let (rows, wasserstein) =

@@ -157,7 +157,7 @@ impl Frame {
         self.curve(sheet, [(self.x.low, y), (self.x.high, y)], stroke);
     }
 
-    /// Those data points that lie inside.
+    /// The data points that lie inside.
     pub(super) fn points(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
         let inside = points.into_iter().filter(|&(x, y)| self.x.contains(x) && self.y.contains(y));
         sheet.discs(inside.map(|point| self.place(point)), dot);
@@ -261,7 +261,7 @@ pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
     (mark, text.into())
 }
 
-/// Space that a legend of so many entries takes at the top or bottom of a frame.
+/// Space that a legend takes at the top or bottom of a frame.
 pub(super) fn legend_space(entries: usize) -> f64 {
     INSET + entries as f64 * LEGEND_ROW + PADDING
 }

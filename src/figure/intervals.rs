@@ -13,7 +13,7 @@ const RADIUS: f64 = 1.8;
 const MIN_RATIO: f64 = 1.4;
 
 /// Draws interval against period, both logarithmic, with the lines τ = nT of the most frequent n; `None` without any
-/// interval under modulation. Locked slips of such an n have the colour of its line.
+/// interval under modulation. Locked slips of these n have the colour of their line.
 pub(super) fn intervals(points: &[Point]) -> Option<Picture> {
     let place = |point: &Point| Some((point.period?, point.interval?));
     let slips = Scatter::new(points, RADIUS, 0.4, place);

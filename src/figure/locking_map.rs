@@ -1,5 +1,4 @@
-//! The locking map: over period and amplitude of the modulation, how many periods an interval takes, and how well it keeps
-//! to whole periods.
+//! The locking map: how many periods an interval takes and its locking index, over period and amplitude of the modulation.
 
 use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
 use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};
@@ -12,7 +11,7 @@ use std::f64::consts::TAU;
 const LAYOUT: Layout = Layout::column(592.0, &[270.0, 270.0], ROW_GAP, COLOUR_BAR);
 /// Least values of amplitude and of period that make a map.
 const MIN_VALUES: usize = 8;
-/// Periods in an interval that have a colour of their own: each ink, and a darker one. More have one in common.
+/// Numbers of periods that have a colour of their own: each ink, and a darker one. Larger ones share a colour.
 const MAX_PERIODS: usize = 2 * INKS.len();
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.

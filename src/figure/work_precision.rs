@@ -6,7 +6,7 @@ use super::frame::{Frame, LEFT, LEGEND, Layout, LegendPlace, Mark, entry};
 use super::picture::{Dot, Fill, GREY, INKS, Ink, Picture, Sheet, Stroke};
 
 const NAME: &str = "work-precision";
-/// What chance alone gives: a stripe.
+/// The stripe of errors that chance alone gives.
 const CHANCE: Fill = Fill { ink: GREY, opacity: 0.3 };
 
 /// Error and cost of a method at one setting.
@@ -43,7 +43,7 @@ impl ErrorPanel {
     }
 }
 
-/// Draws a panel beside the other for each kind of error, with a line per method through its settings in the given order;
+/// Draws panels side by side, one for each kind of error, with a line per method through its settings in the given order;
 /// values that are not > 0 are left out.
 ///
 /// # Errors
