@@ -1,10 +1,10 @@
-//! Intervals that hold the true value in 95 of 100 repetitions.
+//! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 
 use super::moments::Moments;
 use super::sequence::Estimate;
 use std::f64::consts::PI;
 
-/// Share of repetitions in which an interval holds the true value.
+/// Share of repetitions in which an interval contains the true value.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// The ends of a 95 % confidence interval.
@@ -53,9 +53,9 @@ impl Estimate<2> {
     /// Of the resultant length R of unit vectors; `None` for fewer than two.
     ///
     /// The square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ + s'⁴), with the
-    /// variances s² along and s'² across. The interval holds every R from which the found square is less than t standard
-    /// deviations away (score interval): it is R ± t s for long resultants (delta method), and needs no other rule near
-    /// R = 0, where a resultant is too long by chance.
+    /// variances s² along and s'² across. The interval contains every R from which the measured square is less than t standard
+    /// deviations away (score interval): it is R ± t s for long resultants (delta method), and also holds near R = 0, where
+    /// chance alone makes a resultant longer.
     pub(super) fn length_interval(&self) -> Option<Interval> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
         let unbiased = length * length - along - across;
@@ -67,8 +67,9 @@ impl Estimate<2> {
     }
 
     /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if no
-    /// direction is excluded; `None` for fewer than two. By the circular standard error, Fisher, Statistical Analysis of Circular Data (1993), Sec. 4.4.4,
-    /// whose (1 - ρ_2)/2 is the variance across the mean; holds as well for short resultants (Fieller's interval).
+    /// direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical Analysis of
+    /// Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for short resultants, too
+    /// (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
         let sine = student(self.freedom()?) * across.sqrt();
@@ -82,7 +83,7 @@ fn student(freedom: f64) -> f64 {
     // Normal quantile; beyond the limit t differs from it by less than 1e-6.
     const NORMAL: f64 = 1.959_963_984_540_054;
     const LARGE: f64 = 3e6;
-    // Newton steps from the beginning of Fisher's expansion converge from below.
+    // Newton steps from the first terms of Fisher's expansion converge from below.
     const STEPS: u32 = 8;
     if freedom > LARGE {
         return NORMAL;
