@@ -1,8 +1,8 @@
 //! Before chaos: break times against a reference, contact by contact, and for how long two trajectories stay together.
 //!
-//! A break is identified by block, contact and generation, which mean the same contact in every solver. Two trajectories
-//! are apart from the first break of the reference on that the other misses, or makes earlier or later by more than a tenth
-//! of the wave crossing time.
+//! A break is identified by block, contact and generation, which mean the same contact in every solver. Two
+//! trajectories are apart from the first break of the reference on that the other misses, or makes earlier or later by
+//! more than a tenth of the wave crossing time.
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::{Observer, Segment};
@@ -49,7 +49,8 @@ impl Observer for Reference {
     }
 }
 
-/// An observer that compares breaks with those of a reference: at least the first `counted`, and until the two are apart.
+/// An observer that compares breaks with those of a reference: at least the first `counted`, and until the two are
+/// apart.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     reference: &'a Reference,

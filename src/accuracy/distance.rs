@@ -1,9 +1,9 @@
 //! After chaos: how far the distributions of two samples of slips are apart, with bootstrap intervals.
 //!
 //! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Both are positive even
-//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation have a
-//! sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is keyed: the same
-//! samples give the same intervals.
+//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation
+//! have a sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is
+//! keyed: the same samples give the same intervals.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -17,8 +17,8 @@ const TAIL: f64 = 0.025;
 /// Quantile of the distances under the null hypothesis that makes the floor.
 const FLOOR: f64 = 0.95;
 
-/// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in 95 %
-/// of cases.
+/// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in
+/// 95 % of cases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
     /// Of the samples.
@@ -55,8 +55,8 @@ pub struct Distances {
     pub deviation: Bias,
 }
 
-/// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. Comparisons with different
-/// keys have independent random numbers.
+/// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. Comparisons with
+/// different keys have independent random numbers.
 #[must_use]
 pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distances> {
     if sample.is_empty() || reference.is_empty() {
@@ -98,8 +98,8 @@ pub(super) fn deviation(sample: &[f64]) -> f64 {
     (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
-/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds noise,
-/// and noise makes distances longer.
+/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds
+/// noise, and noise makes distances longer.
 fn shifted(value: f64, mut resampled: Vec<f64>) -> Bias {
     let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
     Bias { value, low: value + (low - median), high: value + (high - median) }

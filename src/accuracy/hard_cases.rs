@@ -1,7 +1,7 @@
 //! Hard cases: parameters that break a naive code, each run with an audit and within budgets, so that none hangs.
 //!
-//! A case passes if it ends as it must: the simulation reaches its end and its ledger balances, bad values are refused by
-//! name, or it stops and gives the cause.
+//! A case passes if it ends as it must: the simulation reaches its end and its ledger balances, bad values are refused
+//! by name, or it stops and gives the cause.
 
 use super::cpu;
 use crate::model::equation::{StiffnessMatrix, stability_limit};
@@ -17,8 +17,8 @@ use std::time::Duration;
 const EVENT_BUDGET: u64 = 5_000_000;
 /// Time on the clock after which a case is given up: far beyond what any takes.
 const TIME_BUDGET: Duration = Duration::from_secs(40);
-/// Largest residual of the ledger that passes, in tolerances of the event-driven solver, and of a fixed step near its limit
-/// of stability. Measured at the default tolerance: 0.08 at T = 1e-5 and under 0.01 elsewhere; 6e-3.
+/// Largest residual of the ledger that passes, in tolerances of the event-driven solver, and of a fixed step near its
+/// limit of stability. Measured at the default tolerance: 0.08 at T = 1e-5 and under 0.01 elsewhere; 6e-3.
 const BALANCED_TOLERANCES: f64 = 1.0;
 const BALANCED_FIXED_STEP: f64 = 2e-2;
 

@@ -132,8 +132,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those of
-/// the reference, in units of the distance that chance alone stays under.
+/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those
+/// of the reference, in units of the distance that chance alone stays under.
 fn work_precision_figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
     let breaks = lines(&findings.methods, velocity, |row| {

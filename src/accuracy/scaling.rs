@@ -1,8 +1,8 @@
 //! Scaling: what a slip costs as the slider grows, in blocks N and in contacts per block N_s.
 //!
 //! Every case breaks about as many contacts: the larger the slider, the fewer its slips. The start-up is also run alone
-//! and its cost subtracted, which leaves that of the slips past start-up. Exponents are slopes of straight lines through
-//! the logarithms.
+//! and its cost subtracted, which leaves that of the slips past start-up. Exponents are slopes of straight lines
+//! through the logarithms.
 
 use super::cpu::Cost;
 use super::{AccuracyError, Realisation};

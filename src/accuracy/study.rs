@@ -1,10 +1,10 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of slips
-//! that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first drive more
-//! realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A fixed step at low
-//! velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps
-//! in one.
+//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of
+//! slips that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first
+//! drive more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
+//! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip
+//! follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cpu::Cost;
@@ -42,7 +42,8 @@ pub struct Study {
     pub first_drive_multiple: u64,
     /// Slips of each realisation, past start-up.
     pub slips: u64,
-    /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own way.
+    /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own
+    /// way.
     pub breaks: usize,
     /// Breaks over which trajectories are followed to see how far they stay together.
     pub followed_breaks: usize,
@@ -227,8 +228,8 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// Cost by the CPU time per step of the fastest realisation, and that of the slowest over it. Without slips the cost per
-    /// slip follows from the mean interval in s.
+    /// Cost by the CPU time per step of the fastest realisation, and that of the slowest over it. Without slips the
+    /// cost per slip follows from the mean interval in s.
     fn cost(&self, mean_interval: f64) -> (Cost, f64) {
         let (least, most) = self.per_step.unwrap_or_default();
         let summary = Summary { end_time: self.end_time, steps: self.steps, ..Summary::default() };

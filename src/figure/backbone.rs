@@ -17,8 +17,8 @@ const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 const SLOW: Fill = Fill { ink: LIGHT_GREY, opacity: 0.4 };
 const CURVE_POINTS: u32 = 400;
 
-/// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max; the
-/// axis holds them all.
+/// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
+/// the axis holds them all.
 pub(super) fn backbone(points: &[Point], bins: &[BackboneBin]) -> Option<Picture> {
     let slips = Scatter::new(points, 1.6, 0.45, |point| Some((point.eta, point.phase?)));
     let (low, high) = bounds(slips.xs())?;

@@ -24,7 +24,8 @@ pub(super) struct ColourBar {
     pub(super) ticks: Vec<(f64, String)>,
 }
 
-/// A share from 0 to 1 as a colour, in perceptually even steps from dark to bright, also to the colour-blind and in grey.
+/// A share from 0 to 1 as a colour, in perceptually even steps from dark to bright, also to the colour-blind and in
+/// grey.
 pub(super) fn shade(share: f64) -> Color {
     Color::from(ColorMap::Viridis.map(share.clamp(0.0, 1.0)))
 }

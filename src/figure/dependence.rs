@@ -1,5 +1,5 @@
-//! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line for
-//! each modulation.
+//! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line
+//! for each modulation.
 
 use super::axis::{Axis, bounds};
 use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};

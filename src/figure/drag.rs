@@ -28,8 +28,8 @@ struct Slip {
     interval: f64,
 }
 
-/// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None` if no
-/// slip has an interval on a ramp.
+/// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None`
+/// if no slip has an interval on a ramp.
 pub(super) fn drag(points: &[Point]) -> Option<Picture> {
     let stage = |point: &Point| STAGES.iter().position(|(way, ..)| point.way == Some(*way));
     let periods = bounds(points.iter().filter(|point| stage(point).is_some()).filter_map(|point| point.period));

@@ -38,8 +38,8 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more sets
-/// or none.
+/// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more
+/// sets or none.
 pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin]) -> Option<Picture> {
     let panels = panels(sets, bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;

@@ -1,4 +1,5 @@
-//! The locking map: how many periods an interval takes and its locking index, over period and amplitude of the modulation.
+//! The locking map: how many periods an interval takes and its locking index, over period and amplitude of the
+//! modulation.
 
 use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
 use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};

@@ -1,4 +1,5 @@
-//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b, d).
+//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b,
+//! d).
 
 use super::FigureError;
 use super::axis::{Axis, bounds};

@@ -1,5 +1,5 @@
-//! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and the
-//! locking index under it.
+//! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and
+//! the locking index under it.
 
 use super::axis::{Axis, bounds, logarithmic_bounds};
 use super::frame::{Entry, Frame, LEGEND, Layout, LegendPlace, Mark, ROW_GAP, entry};

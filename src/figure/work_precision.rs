@@ -43,8 +43,8 @@ impl ErrorPanel {
     }
 }
 
-/// Draws panels side by side, one for each kind of error, with a line per method through its settings in the given order;
-/// values that are not > 0 are left out.
+/// Draws panels side by side, one for each kind of error, with a line per method through its settings in the given
+/// order; values that are not > 0 are left out.
 ///
 /// # Errors
 /// When a panel, or the figure, has nothing left.

@@ -1,11 +1,11 @@
 //! Circular statistics: mean direction, resultant length, and the Rayleigh (Schuster) test against a uniform phase.
 //!
-//! p-value: Wilkie's approximation, exp(√(1 + 4n + 4(n² - R²)) - (1 + 2n)) with the resultant R (Wilkie, Appl. Stat. 32,
-//! 311 (1983); Zar, Biostatistical Analysis), is accurate to a few percent except where few angles lie close together: there
-//! it is too large, by a factor of 400 for n = 3. There the saddle-point density of R (Daniels, Ann. Math. Stat. 25, 631
-//! (1954)), normalised to one, is accurate to 10 %. Both fall with R and are too large where they fail, so we take the
-//! smaller of the two; for n = 2 the exact value. Checked against importance sampling down to p = 3e-5: within 10 %, but
-//! 15 % for n = 3 near p = 0.16.
+//! p-value: Wilkie's approximation, exp(√(1 + 4n + 4(n² - R²)) - (1 + 2n)) with the resultant R (Wilkie, Appl. Stat.
+//! 32, 311 (1983); Zar, Biostatistical Analysis), is accurate to a few percent except where few angles lie close
+//! together: there it is too large, by a factor of 400 for n = 3. There the saddle-point density of R (Daniels, Ann.
+//! Math. Stat. 25, 631 (1954)), normalised to one, is accurate to 10 %. Both fall with R and are too large where they
+//! fail, so we take the smaller of the two; for n = 2 the exact value. Checked against importance sampling down to p =
+//! 3e-5: within 10 %, but 15 % for n = 3 near p = 0.16.
 
 use super::sequence::Estimate;
 use std::f64::consts::{PI, TAU};
@@ -27,8 +27,8 @@ impl Estimate<2> {
     }
 
     /// p-value of the Rayleigh test: the probability of a resultant at least this long if the angles were uniform.
-    /// Correlated angles count as their effective number, rounded down: by their plain number, any drift of the phase would
-    /// be significant.
+    /// Correlated angles count as their effective number, rounded down: by their plain number, any drift of the phase
+    /// would be significant.
     pub(super) fn rayleigh(&self) -> Option<f64> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -52,8 +52,8 @@ pub fn wrap(angle: f64, top: f64) -> f64 {
 /// p = 1e-4.
 const MAX_SADDLE_POINT: u64 = 50;
 
-/// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Accurate to 10 % down to 1e-4
-/// (15 % for three angles near p = 0.16).
+/// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Accurate to 10 % down to
+/// 1e-4 (15 % for three angles near p = 0.16).
 #[must_use]
 pub fn rayleigh_probability(count: u64, length: f64) -> f64 {
     let n = count as f64;
@@ -85,7 +85,8 @@ fn saddle_point(n: f64, length: f64) -> f64 {
 
 /// Integral of the saddle-point density over ln κ from `from` on, by Simpson's rule.
 fn saddle_tail(n: f64, from: f64) -> f64 {
-    // For large κ the density falls as κ^(-(n-1)/2), n >= 3: after 30 e-folds nothing is left. Steps of 0.03 resolve n = 50.
+    // For large κ the density falls as κ^(-(n-1)/2), n >= 3: after 30 e-folds nothing is left. Steps of 0.03 resolve n
+    // = 50.
     const STEPS: u32 = 1200;
     const STEP: f64 = 0.03;
     let density = |step: u32| {
@@ -177,8 +178,8 @@ mod tests {
         assert_eq!(wrap(-PI, PI), PI);
     }
 
-    /// Values of importance sampling (2e6 resultants of von Mises angles, reweighted to uniform ones; standard errors below
-    /// 0.5 %), except n = 100: the large-sample series of Greenwood and Durand, Ann. Math. Stat. 26, 233 (1955).
+    /// Values of importance sampling (2e6 resultants of von Mises angles, reweighted to uniform ones; standard errors
+    /// below 0.5 %), except n = 100: the large-sample series of Greenwood and Durand, Ann. Math. Stat. 26, 233 (1955).
     #[test]
     fn rayleigh_probability_is_accurate_to_ten_percent() {
         for (count, length, expected) in RAYLEIGH {
@@ -223,7 +224,8 @@ mod tests {
 
     #[test]
     fn the_rayleigh_test_of_correlated_phases_keeps_its_level() {
-        // Uniform phases that drift: each is the previous plus a normal step of 0.6 rad, memory exp(-0.18) of the vector.
+        // Uniform phases that drift: each is the previous plus a normal step of 0.6 rad, memory exp(-0.18) of the
+        // vector.
         let drift = |seed: u64| {
             let mut draws = Draws::new(seed);
             let jobs: Vec<Vec<f64>> = (0..16)

@@ -53,9 +53,9 @@ impl Estimate<2> {
     /// Of the resultant length R of unit vectors; `None` for fewer than two.
     ///
     /// The square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ + s'⁴), with the
-    /// variances s² along and s'² across. The interval contains every R from which the measured square is less than t standard
-    /// deviations away (score interval): it is R ± t s for long resultants (delta method), and also holds near R = 0, where
-    /// chance alone makes a resultant longer.
+    /// variances s² along and s'² across. The interval contains every R from which the measured square is less than t
+    /// standard deviations away (score interval): it is R ± t s for long resultants (delta method), and also holds near
+    /// R = 0, where chance alone makes a resultant longer.
     pub(super) fn length_interval(&self) -> Option<Interval> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
         let unbiased = length * length - along - across;
@@ -66,10 +66,10 @@ impl Estimate<2> {
         Some(Interval { low: end(middle - root), high: end(middle + root) })
     }
 
-    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if no
-    /// direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical Analysis of
-    /// Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for short resultants, too
-    /// (Fieller's interval).
+    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
+    /// no direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical
+    /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
+    /// short resultants, too (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
         let sine = student(self.freedom()?) * across.sqrt();
@@ -176,8 +176,8 @@ pub(super) mod tests {
         assert!((low - (432.0 - 2.0 * 12.706_205)).abs() < 1e-4 && (high - (432.0 + 2.0 * 12.706_205)).abs() < 1e-4);
     }
 
-    /// How often of 100 the intervals of length, direction and plain mean hold the true values, over repetitions of jobs
-    /// of angles about a mean of 0.7.
+    /// How often of 100 the intervals of length, direction and plain mean hold the true values, over repetitions of
+    /// jobs of angles about a mean of 0.7.
     fn coverage(
         (jobs, length): (usize, usize),
         resultant: f64,
@@ -221,7 +221,8 @@ pub(super) mod tests {
     fn intervals_of_correlated_angles_cover() {
         for (memory, deviation) in [(0.5, 0.3), (0.5, 1.0), (0.8, 0.8)] {
             let resultant = libm::exp(-0.5 * deviation * deviation);
-            // At (2, 50) and (10, 20) fewer than 35 of the most correlated are effective, and lengths cover in 88 to 93 %.
+            // At (2, 50) and (10, 20) fewer than 35 of the most correlated are effective, and lengths cover in 88 to 93
+            // %.
             for size in SIZES.into_iter().skip(if memory > 0.6 { 2 } else { 0 }) {
                 let found = coverage(size, resultant, |draws, length| {
                     draws.autoregressive(memory, length).iter().map(|x| deviation * x).collect()

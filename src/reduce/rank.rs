@@ -9,8 +9,9 @@ pub(super) struct Sample<'a> {
     pub(super) inflation: f64,
 }
 
-/// Two-sided p-value of the test of Mann and Whitney, Ann. Math. Stat. 18, 50 (1947), in the normal limit with ties; `None`
-/// for an empty sample. The variance of U, (n1 n2)² (1/n1 + 1/n2 + 1/(n1 n2))/12, is taken with effective numbers.
+/// Two-sided p-value of the test of Mann and Whitney, Ann. Math. Stat. 18, 50 (1947), in the normal limit with ties;
+/// `None` for an empty sample. The variance of U, (n1 n2)² (1/n1 + 1/n2 + 1/(n1 n2))/12, is taken with effective
+/// numbers.
 pub(super) fn rank_test(first: Sample<'_>, second: Sample<'_>) -> Option<f64> {
     if first.values.is_empty() || second.values.is_empty() {
         return None;

@@ -1,11 +1,11 @@
 //! Values of a quantity slip by slip, job by job, and the uncertainty of their mean.
 //!
-//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of independent ones
-//! times 1 + 2 Σ_k ρ_k N_k/n = n/n_eff, with the autocorrelation ρ_k and the N_k pairs at lag k within jobs. The estimate is
-//! the Γ-method of U. Wolff, Comput. Phys. Commun. 156, 143 (2004): autocovariances pooled over the jobs about the mean of
-//! all, summed up to the lag at which truncation error and noise balance (his automatic window, S = 1.5), and corrected for
-//! the bias of a mean estimated from the same values. Counting pairs makes it exact for short jobs, too: a job of one slip
-//! has none.
+//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of independent
+//! ones times 1 + 2 Σ_k ρ_k N_k/n = n/n_eff, with the autocorrelation ρ_k and the N_k pairs at lag k within jobs. The
+//! estimate is the Γ-method of U. Wolff, Comput. Phys. Commun. 156, 143 (2004): autocovariances pooled over the jobs
+//! about the mean of all, summed up to the lag at which truncation error and noise balance (his automatic window, S =
+//! 1.5), and corrected for the bias of a mean estimated from the same values. Counting pairs makes it exact for short
+//! jobs, too: a job of one slip has none.
 
 /// Wolff's S: ratio of the decay time of the correlation to its integrated time.
 const DECAY: f64 = 1.5;
@@ -72,11 +72,13 @@ impl<const D: usize> Sequences<D> {
                 break;
             }
         }
-        // Deviations from the mean of the same values: n <δδ> falls short of the variance by that of the mean, at each lag.
+        // Deviations from the mean of the same values: n <δδ> falls short of the variance by that of the mean, at each
+        // lag.
         let ratio = correlated.trace() / zeroth.trace();
         let inflation = (ratio / (1.0 - weight / n + ratio / n)).max(1.0);
         let independent = zeroth.times(n / (n - inflation));
-        // Exact in two limits: n - 1 for independent values, and the number of jobs - 1 if the slips of a job are equal.
+        // Exact in two limits: n - 1 for independent values, and the number of jobs - 1 if the slips of a job are
+        // equal.
         let freedom = n / weight - 1.0;
         Estimate {
             count: count as u64,
@@ -103,8 +105,8 @@ impl<const D: usize> Sequences<D> {
     }
 }
 
-/// Whether a window is wide enough: Wolff's g (his Eq. 52) is negative. `time` is the integrated autocorrelation time within
-/// the window, 1/2 for independent values.
+/// Whether a window is wide enough: Wolff's g (his Eq. 52) is negative. `time` is the integrated autocorrelation time
+/// within the window, 1/2 for independent values.
 fn is_wide(lag: f64, time: f64, n: f64) -> bool {
     if time <= 0.5 {
         return true;
@@ -195,8 +197,8 @@ impl<const D: usize> Estimate<D> {
         (self.count > 0).then(|| self.total.map(|sum| sum / self.count as f64))
     }
 
-    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which is
-    /// mostly noise where values are few, makes no interval narrower.
+    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which
+    /// is mostly noise where values are few, makes no interval narrower.
     pub(super) fn variance(&self, direction: &[f64; D]) -> f64 {
         let squared = self.count as f64 * self.count as f64;
         self.independent.along(direction).max(self.correlated.along(direction)) / squared
@@ -213,8 +215,8 @@ impl<const D: usize> Estimate<D> {
         (self.count > 0).then(|| self.count as f64 / self.inflation())
     }
 
-    /// Degrees of freedom of the variance, after Satterthwaite, Biometrics Bull. 2, 110 (1946); `None` for fewer than two
-    /// values. Infinite where the variance is known or zero.
+    /// Degrees of freedom of the variance, after Satterthwaite, Biometrics Bull. 2, 110 (1946); `None` for fewer than
+    /// two values. Infinite where the variance is known or zero.
     pub(super) fn freedom(&self) -> Option<f64> {
         let trace = self.independent.trace();
         let freedom = if self.spread > 0.0 { trace * trace / self.spread } else { f64::INFINITY };
