@@ -1,8 +1,8 @@
 //! Before chaos: break times against a reference, contact by contact, and for how long two trajectories stay together.
 //!
-//! A break is known by block, contact and generation, which mean the same contact in every solver. Two trajectories are
-//! apart from the first break of the reference that the other makes at another time by more than a tenth of the wave
-//! crossing time, or not at all.
+//! A break is identified by block, contact and generation, which mean the same contact in every solver. Two
+//! trajectories are apart from the first break of the reference on that the other misses, or makes earlier or later by
+//! more than a tenth of the wave crossing time.
 
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::{Observer, Segment};
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 /// Trajectories are apart when a break differs by more than this part of the wave crossing time.
 pub const APART: f64 = 0.1;
 
-/// A contact's life.
+/// One attachment of a contact: block, contact, generation.
 type Key = (usize, usize, u32);
 
 fn key(event: &ContactEvent) -> Key {
@@ -29,7 +29,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Keeps so many breaks.
+    /// Keeps this number of breaks.
     pub fn new(parameters: &Parameters, wanted: usize) -> Self {
         Self { wanted, apart: APART * parameters.wave_crossing_time(), order: HashMap::new(), times: Vec::new() }
     }
@@ -50,14 +50,15 @@ impl Observer for Reference {
     }
 }
 
-/// An observer that compares breaks with those of a reference: the first `counted` of them, and on until the two are apart.
+/// An observer that compares breaks with those of a reference: at least the first `counted`, and until the two are
+/// apart.
 #[derive(Clone, Debug)]
 pub struct Comparison<'a> {
     reference: &'a Reference,
     counted: usize,
-    /// Error of each break of the reference, in s; not a number until it is made.
+    /// Error of each break of the reference, in s; NaN until the break occurs.
     errors: Vec<f64>,
-    /// Breaks of the reference that must have been made by now.
+    /// Breaks of the reference that must have occurred by now.
     due: usize,
     apart: Option<usize>,
     now: f64,
@@ -103,7 +104,7 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// Passes the breaks that must have been made by now.
+    /// Moves on past the breaks that must have occurred by now.
     fn pass(&mut self, now: f64) {
         self.now = now;
         while let Some(time) = self.reference.times.get(self.due)

@@ -1,4 +1,4 @@
-//! CPU time of the calling thread, what it buys, and the processor that it runs on.
+//! CPU time of the calling thread, costs in it, and the processor.
 
 use crate::solver::Summary;
 use crate::table::columns::columns;
@@ -19,15 +19,15 @@ pub fn thread_seconds() -> f64 {
 }
 
 fn clock_seconds() -> f64 {
-    static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }
 
 /// CPU seconds of the calling thread that a computation takes, and its result.
 pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
-    let begin = thread_seconds();
+    let start = thread_seconds();
     let result = compute();
-    (thread_seconds() - begin, result)
+    (thread_seconds() - start, result)
 }
 
 columns! {
@@ -57,19 +57,19 @@ impl Cost {
         }
     }
 
-    /// The same, were a slip to take so many steps.
+    /// The same if a slip takes this number of steps.
     #[must_use]
     pub fn extrapolated(self, steps_per_slip: f64) -> Self {
         Self { per_slip: self.per_step * steps_per_slip, steps_per_slip, ..self }
     }
 }
 
-/// Name of the processor as the operating system tells it, and the architecture.
+/// Name of the processor as the operating system gives it, and the architecture.
 #[must_use]
 pub fn processor() -> String {
-    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let description = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let field = |key: &str| {
-        let line = told.lines().find(|line| line.starts_with(key))?;
+        let line = description.lines().find(|line| line.starts_with(key))?;
         line.split_once(':').map(|(_, value)| value.trim().to_owned())
     };
     let name = field("model name").unwrap_or_else(|| "unknown processor".to_owned());

@@ -1,9 +1,9 @@
 //! After chaos: how far the distributions of two samples of slips are apart, with bootstrap intervals.
 //!
 //! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Both are positive even
-//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation have a
-//! sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is keyed: the same
-//! samples give the same intervals.
+//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation
+//! have a sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is
+//! keyed: the same samples give the same intervals.
 
 use crate::table::columns::{Cell, Column, Kind, Part, columns};
 use rand_chacha::ChaCha8Rng;
@@ -83,8 +83,8 @@ columns! {
     }
 }
 
-/// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. `key` keeps the random numbers
-/// of different comparisons apart.
+/// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. Comparisons with
+/// different keys have independent random numbers.
 #[must_use]
 pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distances> {
     if sample.is_empty() || reference.is_empty() {
@@ -98,37 +98,20 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
         by_chance.push(differences(&resample(reference, sample.len(), &mut generator), &other));
     }
     let found = differences(&sorted(sample), &sorted(reference));
-    let distance = |of: fn(&Differences) -> f64| {
-        let Bias { value, low, high } = shifted(of(&found), resampled.iter().map(of).collect());
-        let floor = quantile(&mut by_chance.iter().map(of).collect::<Vec<_>>(), FLOOR);
+    let bias = |which: usize| shifted(found[which], resampled.iter().map(|other| other[which]).collect());
+    let distance = |which: usize| {
+        let Bias { value, low, high } = bias(which);
+        let floor = quantile(&mut by_chance.iter().map(|other| other[which]).collect::<Vec<_>>(), FLOOR);
         Distance { value, low: low.max(0.0), high, floor }
     };
-    let bias = |of: fn(&Differences) -> f64| shifted(of(&found), resampled.iter().map(of).collect());
-    Some(Distances {
-        wasserstein: distance(|differences| differences.wasserstein),
-        kolmogorov: distance(|differences| differences.kolmogorov),
-        mean: bias(|differences| differences.mean),
-        deviation: bias(|differences| differences.deviation),
-    })
+    let ([wasserstein, kolmogorov], [mean, deviation]) = ([0, 1].map(distance), [2, 3].map(bias));
+    Some(Distances { wasserstein, kolmogorov, mean, deviation })
 }
 
-/// Differences of two sorted samples.
-struct Differences {
-    wasserstein: f64,
-    kolmogorov: f64,
-    mean: f64,
-    deviation: f64,
-}
-
-fn differences(sample: &[f64], reference: &[f64]) -> Differences {
-    let (wasserstein, kolmogorov) = both(sample, reference);
-    let (mean_of, deviation_of) = (mean(sample), deviation(sample));
-    Differences {
-        wasserstein,
-        kolmogorov,
-        mean: mean_of - mean(reference),
-        deviation: deviation_of - deviation(reference),
-    }
+/// Differences of two sorted samples: Wasserstein-1, Kolmogorov-Smirnov, of the means, of the standard deviations.
+fn differences(sample: &[f64], reference: &[f64]) -> [f64; 4] {
+    let (wasserstein, kolmogorov) = wasserstein_and_kolmogorov(sample, reference);
+    [wasserstein, kolmogorov, mean(sample) - mean(reference), deviation(sample) - deviation(reference)]
 }
 
 /// Mean of a sample.
@@ -143,8 +126,8 @@ pub(super) fn deviation(sample: &[f64]) -> f64 {
     (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
-/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds noise,
-/// and noise makes distances longer.
+/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds
+/// noise, and noise makes distances longer.
 fn shifted(value: f64, mut resampled: Vec<f64>) -> Bias {
     let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
     Bias { value, low: value + (low - median), high: value + (high - median) }
@@ -176,7 +159,7 @@ fn below(bound: usize, generator: &mut ChaCha8Rng) -> usize {
 }
 
 /// Both distances of sorted samples.
-fn both(left: &[f64], right: &[f64]) -> (f64, f64) {
+fn wasserstein_and_kolmogorov(left: &[f64], right: &[f64]) -> (f64, f64) {
     let (mut i, mut j) = (0, 0);
     let (mut wasserstein, mut kolmogorov) = (0.0, 0.0_f64);
     let mut before = left[0].min(right[0]);
@@ -219,14 +202,14 @@ mod tests {
 
     #[test]
     fn distances_of_small_samples_are_those_by_hand() {
-        assert_eq!(both(&[0.0, 1.0], &[0.0, 1.0]), (0.0, 0.0));
-        assert_eq!(both(&[0.0, 1.0], &[2.0, 3.0]), (2.0, 1.0));
-        let (wasserstein, kolmogorov) = both(&[1.0, 2.0, 3.0], &[2.0]);
+        assert_eq!(wasserstein_and_kolmogorov(&[0.0, 1.0], &[0.0, 1.0]), (0.0, 0.0));
+        assert_eq!(wasserstein_and_kolmogorov(&[0.0, 1.0], &[2.0, 3.0]), (2.0, 1.0));
+        let (wasserstein, kolmogorov) = wasserstein_and_kolmogorov(&[1.0, 2.0, 3.0], &[2.0]);
         assert!((wasserstein - 2.0 / 3.0).abs() < 1e-15 && (kolmogorov - 1.0 / 3.0).abs() < 1e-15);
     }
 
     #[test]
-    fn a_shift_is_told_from_chance_and_chance_from_a_shift() {
+    fn a_shift_is_distinguished_from_chance_and_chance_from_a_shift() {
         let reference = uniform(1000, 0.0, 1);
         let same = distances(&uniform(500, 0.0, 2), &reference, 3).unwrap();
         assert!(same.wasserstein.value <= 1.5 * same.wasserstein.floor, "{same:?}");
@@ -239,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn every_interval_holds_its_value_and_a_wider_sample_is_told_by_its_deviation() {
+    fn every_interval_holds_its_value_and_a_wider_sample_shows_in_its_deviation() {
         let reference = uniform(1000, 0.0, 1);
         let wide: Vec<f64> = uniform(500, -0.5, 2).into_iter().map(|value| 1.2 * value + 0.5).collect();
         for sample in [uniform(500, 0.0, 2), uniform(1000, 0.0, 1), wide.clone()] {

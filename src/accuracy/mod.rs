@@ -7,30 +7,32 @@
 //! scaling.rs    what a slip costs as the slider grows
 //! hard_cases.rs parameters that break a naive code, each audited
 //! cpu.rs        what a computation costs
-//! tables.rs -> write.rs
+//! tables.rs -> report.rs: tables as Parquet and JSON, figures
 //! ```
 
 pub mod breaks;
 pub mod cpu;
 pub mod distance;
 mod hard_cases;
+mod report;
 mod scaling;
 mod study;
 mod tables;
-mod write;
 
 pub use cpu::Cost;
 pub use distance::{Bias, Distance, Distances};
 pub use hard_cases::{HardCase, Stability, hard_cases};
+pub use report::{Report, scaling_report, stability_report, study_report};
 pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
-pub use write::{as_json, scaling_json, stability_json, write, write_scaling, write_stability};
 
 use crate::figure::FigureError;
 use crate::model::Parameters;
-use crate::solver::{Limits, SimulationError, Solver};
+use crate::observe::{Measurements, Recording, measure};
+use crate::solver::{Ledger, Limits, Observer, SimulationError, Solver, simulate, simulate_audited};
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
+use std::sync::atomic::AtomicBool;
 
 /// A study that cannot be made or written.
 #[derive(Debug, thiserror::Error)]
@@ -38,7 +40,7 @@ pub enum AccuracyError {
     /// A simulation cannot go on.
     #[error("{case}, seed {seed}, {solver}: {source}")]
     Simulation {
-        /// What parameters it had, in words.
+        /// Its parameters, in words.
         case: String,
         /// Realisation.
         seed: u64,
@@ -60,7 +62,7 @@ pub enum AccuracyError {
 
 /// A solver and its setting in words.
 #[must_use]
-pub fn described(solver: Solver) -> String {
+pub fn solver_in_words(solver: Solver) -> String {
     match solver {
         Solver::EventDriven { tolerance } => format!("event-driven, tolerance {tolerance:e}"),
         Solver::FixedStep { time_step } => format!("fixed step, dt {time_step:e} s"),
@@ -77,15 +79,37 @@ pub fn drive_in_words(parameters: &Parameters) -> String {
     format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
 }
 
-/// Observers end these simulations; none needs as many events as the default budget of a job.
-const NO_LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
-
-/// The error of a simulation; `in_words` tells what it had for parameters.
-fn failed(
-    in_words: fn(&Parameters) -> String,
-    parameters: &Parameters,
+/// One realisation of a study with one solver.
+struct Realisation<'a> {
+    parameters: &'a Parameters,
     solver: Solver,
-) -> impl FnOnce(SimulationError) -> AccuracyError + use<> {
-    let (case, seed, solver) = (in_words(parameters), parameters.seed, described(solver));
-    move |source| AccuracyError::Simulation { case, seed, solver, source }
+    /// What it is called in errors.
+    in_words: fn(&Parameters) -> String,
+}
+
+impl Realisation<'_> {
+    /// Observers end these simulations; none comes near this number of events.
+    const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
+
+    fn simulate(&self, observer: &mut dyn Observer) -> Result<(), AccuracyError> {
+        simulate(self.parameters, self.solver, Self::LIMITS, observer).map_err(|source| self.failed(source))?;
+        Ok(())
+    }
+
+    fn audit(&self, observer: &mut dyn Observer) -> Result<Ledger, AccuracyError> {
+        let audited = simulate_audited(self.parameters, self.solver, Self::LIMITS, observer);
+        audited.map(|(_, ledger)| ledger).map_err(|source| self.failed(source))
+    }
+
+    /// CPU time in s, and what a sweep would measure.
+    fn measure(&self, recording: &Recording) -> Result<(f64, Measurements), AccuracyError> {
+        let never = AtomicBool::new(false);
+        let (cpu_seconds, measured) = cpu::timed(|| measure(self.parameters, recording, self.solver, &never));
+        Ok((cpu_seconds, measured.map_err(|source| self.failed(source))?))
+    }
+
+    fn failed(&self, source: SimulationError) -> AccuracyError {
+        let (case, solver) = ((self.in_words)(self.parameters), solver_in_words(self.solver));
+        AccuracyError::Simulation { case, seed: self.parameters.seed, solver, source }
+    }
 }

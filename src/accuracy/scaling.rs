@@ -1,20 +1,20 @@
 //! Scaling: what a slip costs as the slider grows, in blocks N and in contacts per block N_s.
 //!
-//! Every case breaks about as many contacts: the larger the slider, the fewer its slips. The start-up is run once more alone
-//! and its cost taken off, so what is left is that of slips past start-up. Exponents are slopes of straight lines through
-//! the logarithms.
+//! Every case breaks about as many contacts: the larger the slider, the fewer its slips. The start-up is also run alone
+//! and its cost subtracted, which leaves that of the slips past start-up. Exponents are slopes of straight lines
+//! through the logarithms.
 
-use super::cpu::{self, Cost};
-use super::{AccuracyError, NO_LIMITS, failed};
+use super::cpu::Cost;
+use super::{AccuracyError, Realisation};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Recording, SlipObserver};
-use crate::solver::{Solver, Summary, simulate};
+use crate::observe::Recording;
+use crate::solver::{Solver, Summary};
 use crate::table::columns::{Selected, Selection, Table, columns};
 
-/// Slips of start-up, whose cost is taken off.
+/// Slips of start-up, whose cost is subtracted.
 const START_UP: u64 = 2;
-/// Fewest slips that are timed.
-const FEWEST_SLIPS: u64 = 2;
+/// Least slips that are timed.
+const MIN_SLIPS: u64 = 2;
 
 /// What to run.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ pub struct ScalingFindings {
 }
 
 impl Scaling {
-    /// Over factors of sixteen: minutes.
+    /// Over factors of sixteen, which takes minutes.
     #[must_use]
     pub fn full() -> Self {
         Self {
@@ -99,7 +99,7 @@ impl Scaling {
         }
     }
 
-    /// Over factors of four: seconds.
+    /// Over factors of four, which takes seconds.
     #[must_use]
     pub fn quick() -> Self {
         Self { blocks: vec![70, 140, 280], contacts_per_block: vec![20, 80], contacts: 30_000, ..Self::full() }
@@ -107,15 +107,11 @@ impl Scaling {
 
     /// The sizes, each once.
     fn cases(&self) -> Vec<Parameters> {
-        let wide = self.blocks.iter().map(|&count| (Symbol::N, count));
-        let dense = self.contacts_per_block.iter().map(|&count| (Symbol::Ns, count));
-        let mut cases = Vec::new();
-        for (size, count) in wide.chain(dense) {
-            let mut case = Parameters::default();
-            match size {
-                Symbol::N => case.blocks = count,
-                _ => case.contacts_per_block = count,
-            }
+        let wide = self.blocks.iter().map(|&blocks| Parameters { blocks, ..Parameters::default() });
+        let dense = self.contacts_per_block.iter();
+        let dense = dense.map(|&contacts_per_block| Parameters { contacts_per_block, ..Parameters::default() });
+        let mut cases: Vec<Parameters> = Vec::new();
+        for case in wide.chain(dense) {
             if !cases.contains(&case) {
                 cases.push(case);
             }
@@ -125,18 +121,18 @@ impl Scaling {
 
     /// Slips that are timed at a size.
     fn slips(&self, parameters: &Parameters) -> u64 {
-        (self.contacts / (parameters.blocks * parameters.contacts_per_block) as u64).max(FEWEST_SLIPS)
+        (self.contacts / (parameters.blocks * parameters.contacts_per_block) as u64).max(MIN_SLIPS)
     }
 
-    /// Runs it. `tell` hears in words what comes next.
+    /// Runs it; `report` gets a line before each size.
     ///
     /// # Errors
     /// When a simulation cannot go on.
-    pub fn run(&self, tell: &mut dyn FnMut(&str)) -> Result<ScalingFindings, AccuracyError> {
+    pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<ScalingFindings, AccuracyError> {
         let mut sizes = Vec::new();
         for parameters in &self.cases() {
             let slips = self.slips(parameters);
-            tell(&format!("{}: {slips} slips", size_in_words(parameters)));
+            report(&format!("{}: {slips} slips", size_in_words(parameters)));
             for &tolerance in &self.tolerances {
                 sizes.push(timed(parameters, tolerance, slips)?);
             }
@@ -150,14 +146,11 @@ impl Scaling {
 /// Times slips past start-up.
 fn timed(parameters: &Parameters, tolerance: f64, slips: u64) -> Result<SizeRow, AccuracyError> {
     let solver = Solver::EventDriven { tolerance };
-    let run = |slips: u64| {
-        let recording = Recording { slips, discard: 0, ..Recording::default() };
-        let mut observer = SlipObserver::new(parameters, &recording);
-        let (cpu_seconds, run) = cpu::timed(|| simulate(parameters, solver, NO_LIMITS, &mut observer));
-        run.map(|summary| (cpu_seconds, summary)).map_err(failed(size_in_words, parameters, solver))
-    };
+    let realisation = Realisation { parameters, solver, in_words: size_in_words };
+    let run = |slips| realisation.measure(&Recording { slips, discard: 0, ..Recording::default() });
     let (start_up_seconds, start_up) = run(START_UP)?;
     let (all_seconds, all) = run(START_UP + slips)?;
+    let (start_up, all) = (start_up.summary, all.summary);
     let past = Summary {
         end_time: all.end_time - start_up.end_time,
         steps: all.steps - start_up.steps,
@@ -244,7 +237,7 @@ mod tests {
             let contacts = scaling.slips(case) * (case.blocks * case.contacts_per_block) as u64;
             assert!((380_000..=400_000).contains(&contacts), "{}: {contacts}", size_in_words(case));
         }
-        assert_eq!(Scaling { contacts: 1, ..scaling }.slips(&cases[0]), FEWEST_SLIPS);
+        assert_eq!(Scaling { contacts: 1, ..scaling }.slips(&cases[0]), MIN_SLIPS);
     }
 
     #[test]

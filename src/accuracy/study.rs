@@ -1,18 +1,18 @@
-//! The study: every solver at several settings, in one run, on one thread, interleaved; what each costs and how far it errs.
+//! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of slips
-//! that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first drive more
-//! realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A fixed step at low
-//! velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip follows from the steps
-//! in one.
+//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of
+//! slips that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first
+//! drive more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
+//! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip
+//! follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
-use super::cpu::{self, Cost};
+use super::cpu::Cost;
 use super::distance::{Distances, deviation, distances, mean};
-use super::{AccuracyError, NO_LIMITS, drive_in_words, failed};
+use super::{AccuracyError, Realisation, drive_in_words};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
-use crate::solver::{Solver, Summary, TOLERANCES, simulate, simulate_audited};
+use crate::solver::{Solver, Summary, TOLERANCES};
 use crate::table::columns::{Cell, Field, Kind, Selected, Selection, Table, columns, fields};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -27,7 +27,7 @@ const AUDITED_SLIPS: u64 = 2;
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
 /// Seeds of the reference ensemble begin here, far from those of the methods: the samples are independent.
 const REFERENCE_SEEDS: u64 = 1_000_000;
-/// The reference ensemble has so many times the seeds of a method, so that its own error matters less.
+/// Seeds of the reference ensemble for each one of a method: more, so that its own error matters less.
 const REFERENCE_SHARE: u64 = 2;
 
 /// What to run.
@@ -39,11 +39,12 @@ pub struct Study {
     pub solvers: Vec<Solver>,
     /// Realisations of each ensemble, all timed.
     pub seeds: u64,
-    /// Under the first drive so many times as many, the others not timed.
+    /// Multiple of these realisations under the first drive; those beyond them are not timed.
     pub first_drive_multiple: u64,
     /// Slips of each realisation, past start-up.
     pub slips: u64,
-    /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own way.
+    /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own
+    /// way.
     pub breaks: usize,
     /// Breaks over which trajectories are followed to see how far they stay together.
     pub followed_breaks: usize,
@@ -56,7 +57,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// The full study: minutes.
+    /// The full study, which takes minutes.
     #[must_use]
     pub fn full() -> Self {
         Self {
@@ -73,7 +74,7 @@ impl Study {
         }
     }
 
-    /// A quick one: a minute.
+    /// A quick one, which takes a minute.
     #[must_use]
     pub fn quick() -> Self {
         Self {
@@ -158,24 +159,22 @@ impl Quantity {
     /// Its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Interval => "interval",
-            Self::Phase => "phase",
-            Self::Drop => "drop",
-            Self::PeakForce => "peak_force",
-            Self::Duration => "duration",
-            Self::FrontSpeed => "front_speed",
-        }
+        self.column().0
     }
 
-    fn of(self, slip: &Slip) -> Option<f64> {
+    fn sample(self, slips: &[Slip]) -> Vec<f64> {
+        slips.iter().filter_map(self.column().1).collect()
+    }
+
+    /// Name and values.
+    const fn column(self) -> (&'static str, fn(&Slip) -> Option<f64>) {
         match self {
-            Self::Interval => slip.interval,
-            Self::Phase => slip.phase,
-            Self::Drop => Some(slip.drop),
-            Self::PeakForce => Some(slip.peak_force),
-            Self::Duration => Some(slip.duration),
-            Self::FrontSpeed => slip.front_speed,
+            Self::Interval => ("interval", |slip| slip.interval),
+            Self::Phase => ("phase", |slip| slip.phase),
+            Self::Drop => ("drop", |slip| Some(slip.drop)),
+            Self::PeakForce => ("peak_force", |slip| Some(slip.peak_force)),
+            Self::Duration => ("duration", |slip| Some(slip.duration)),
+            Self::FrontSpeed => ("front_speed", |slip| slip.front_speed),
         }
     }
 }
@@ -227,73 +226,60 @@ impl Findings {
     }
 }
 
-/// Slips and cost of one solver so far.
+/// Slips and cost of one solver, seed by seed.
 #[derive(Clone, Debug, Default)]
 struct Ensemble {
     slips: Vec<Slip>,
     slips_seen: u64,
-    summary: Summary,
-    /// CPU time per step of each realisation, in s.
-    per_step: Vec<f64>,
+    end_time: f64,
+    steps: u64,
+    /// CPU time per step of the fastest and of the slowest realisation, in s.
+    per_step: Option<(f64, f64)>,
 }
 
 impl Ensemble {
     fn add(&mut self, cpu_seconds: f64, summary: &Summary, slips: Vec<Slip>) {
-        self.per_step.push(cpu_seconds / summary.steps as f64);
-        self.summary.end_time += summary.end_time;
-        self.summary.steps += summary.steps;
+        let per_step = cpu_seconds / summary.steps as f64;
+        let (least, most) = self.per_step.unwrap_or((per_step, per_step));
+        self.per_step = Some((least.min(per_step), most.max(per_step)));
+        self.end_time += summary.end_time;
+        self.steps += summary.steps;
         self.slips_seen += if slips.is_empty() { 0 } else { DISCARD + slips.len() as u64 };
         self.slips.extend(slips);
     }
 
-    /// CPU time per step of the cheapest realisation, in s.
-    fn least_per_step(&self) -> f64 {
-        self.per_step.iter().fold(f64::INFINITY, |least, &cost| least.min(cost))
-    }
-
-    /// That of the dearest over that of the cheapest.
-    fn spread(&self) -> f64 {
-        self.per_step.iter().fold(0.0_f64, |most, &cost| most.max(cost)) / self.least_per_step()
-    }
-
-    /// Costs, at those of a step in the cheapest realisation; where there are no slips, those per slip follow from the mean
-    /// interval in s.
-    fn cost(&self, mean_interval: f64) -> Cost {
-        let cpu_seconds = self.least_per_step() * self.summary.steps as f64;
-        let cost = Cost::of(cpu_seconds, &self.summary, self.slips_seen);
-        if self.slips_seen > 0 {
-            cost
-        } else {
-            cost.extrapolated(mean_interval * self.summary.steps as f64 / self.summary.end_time)
-        }
+    /// Cost by the CPU time per step of the fastest realisation, and that of the slowest over it. Without slips the
+    /// cost per slip follows from the mean interval in s.
+    fn cost(&self, mean_interval: f64) -> (Cost, f64) {
+        let (least, most) = self.per_step.unwrap_or_default();
+        let summary = Summary { end_time: self.end_time, steps: self.steps, ..Summary::default() };
+        let cost = Cost::of(least * self.steps as f64, &summary, self.slips_seen);
+        let steps_per_slip = mean_interval * self.steps as f64 / self.end_time;
+        (if self.slips_seen > 0 { cost } else { cost.extrapolated(steps_per_slip) }, most / least)
     }
 }
 
 impl Study {
-    /// Runs it. `tell` hears in words what comes next.
+    /// Runs it; `report` gets a line before each stage.
     ///
     /// # Errors
     /// When a simulation cannot go on.
-    pub fn run(&self, tell: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
+    pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
         let mut findings = Findings::default();
-        for (index, parameters) in self.drives().iter().enumerate() {
-            tell(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
+        for (drive, parameters) in self.drives().iter().enumerate() {
+            report(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = Solver::EventDriven { tolerance: *TOLERANCES.start() };
-            simulate(parameters, tightest, NO_LIMITS, &mut first_breaks).map_err(failed(
-                drive_in_words,
-                parameters,
-                tightest,
-            ))?;
+            realisation(parameters, tightest).simulate(&mut first_breaks)?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
-                let break_times = self.break_times(parameters, solver, &first_breaks)?;
-                checks.push((break_times, self.ledger_residual(parameters, solver)?));
+                let realisation = realisation(parameters, solver);
+                checks.push((self.break_times(&realisation, &first_breaks)?, self.ledger_residual(&realisation)?));
             }
-            tell("timed ensembles");
+            report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
-            let seeds = self.seeds * if index == 0 { self.first_drive_multiple } else { 1 };
-            tell("reference ensemble, and what the others have more than their timed realisations");
+            let seeds = self.seeds * if drive == 0 { self.first_drive_multiple } else { 1 };
+            report("reference ensemble, and the realisations of the others that are not timed");
             let reference = Solver::EventDriven { tolerance: ENSEMBLE_TOLERANCE };
             let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
@@ -302,21 +288,22 @@ impl Study {
                     ensemble.slips.extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
                 }
             }
-            let mean_interval = mean(&sample(&reference, Quantity::Interval));
-            for ((&solver, ensemble), (break_times, ledger_residual)) in self.solvers.iter().zip(&ensembles).zip(checks)
-            {
+            let mean_interval = mean(&Quantity::Interval.sample(&reference));
+            let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
+            for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
+                let parameters = parameters.clone();
+                let (cost, cost_spread) = ensemble.cost(mean_interval);
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters.clone()),
                     solver,
-                    cost: ensemble.cost(mean_interval),
-                    cost_spread: ensemble.spread(),
+                    cost,
+                    cost_spread,
                     break_times,
                     ledger_residual,
                 });
             }
-            let pairs: Vec<_> = self.solvers.iter().zip(&ensembles).collect();
-            let compared = pairs.into_par_iter().enumerate().flat_map_iter(|(row, (&solver, ensemble))| {
-                let key = index * self.solvers.len() + row;
+            let compared = pairs.into_par_iter().enumerate().flat_map_iter(|(row, (solver, ensemble))| {
+                let key = drive * self.solvers.len() + row;
                 distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
             });
             findings.distances.extend(compared.collect::<Vec<_>>());
@@ -330,46 +317,29 @@ impl Study {
 
     /// Slips of these seeds; not timed, so on all threads.
     fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>, AccuracyError> {
-        let realisation = |seed: u64| {
+        let slips = |seed: u64| {
             let parameters = Parameters { seed, ..parameters.clone() };
-            let mut observer = SlipObserver::new(&parameters, &self.recording());
-            simulate(&parameters, solver, NO_LIMITS, &mut observer).map_err(failed(
-                drive_in_words,
-                &parameters,
-                solver,
-            ))?;
-            Ok(observer.into_rows().0)
+            Ok(realisation(&parameters, solver).measure(&self.recording())?.1.slips)
         };
-        let slips: Vec<Vec<Slip>> = seeds.into_par_iter().map(realisation).collect::<Result<_, AccuracyError>>()?;
-        Ok(slips.concat())
+        Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>, AccuracyError>>()?.concat())
     }
 
-    fn break_times(
-        &self,
-        parameters: &Parameters,
-        solver: Solver,
-        reference: &Reference,
-    ) -> Result<BreakErrors, AccuracyError> {
-        let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
-        if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
+    fn break_times(&self, realisation: &Realisation<'_>, reference: &Reference) -> Result<BreakErrors, AccuracyError> {
+        let takes_too_long = realisation.parameters.drive_velocity < self.fixed_step_breaks_from;
+        if takes_too_long && matches!(realisation.solver, Solver::FixedStep { .. }) {
             return Ok(BreakErrors::default());
         }
         let mut comparison = Comparison::new(reference, self.breaks);
-        simulate(parameters, solver, NO_LIMITS, &mut comparison).map_err(failed(drive_in_words, parameters, solver))?;
+        realisation.simulate(&mut comparison)?;
         Ok(comparison.errors())
     }
 
-    fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>, AccuracyError> {
-        if self.is_stretch_only(parameters, solver) {
+    fn ledger_residual(&self, realisation: &Realisation<'_>) -> Result<Option<f64>, AccuracyError> {
+        if self.is_stretch_only(realisation.parameters, realisation.solver) {
             return Ok(None);
         }
         let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
-        let mut observer = SlipObserver::new(parameters, &recording);
-        let (_, ledger) = simulate_audited(parameters, solver, NO_LIMITS, &mut observer).map_err(failed(
-            drive_in_words,
-            parameters,
-            solver,
-        ))?;
+        let ledger = realisation.audit(&mut SlipObserver::new(realisation.parameters, &recording))?;
         Ok(Some(ledger.residual()))
     }
 
@@ -385,20 +355,22 @@ impl Study {
             let parameters = Parameters { seed, ..parameters.clone() };
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
                 let is_stretch = self.is_stretch_only(&parameters, solver);
-                let mut limits = NO_LIMITS;
+                let mut recording = self.recording();
                 if is_stretch && let Solver::FixedStep { time_step } = solver {
-                    limits.end_time = time_step * self.timed_steps as f64;
+                    recording.max_time = Some(time_step * self.timed_steps as f64);
                 }
-                let mut observer = SlipObserver::new(&parameters, &self.recording());
-                let (cpu_seconds, summary) = cpu::timed(|| simulate(&parameters, solver, limits, &mut observer));
-                let summary = summary.map_err(failed(drive_in_words, &parameters, solver))?;
+                let (cpu_seconds, measured) = realisation(&parameters, solver).measure(&recording)?;
                 // The few slips of a stretch are no sample.
-                let slips = if is_stretch { Vec::new() } else { observer.into_rows().0 };
-                ensemble.add(cpu_seconds, &summary, slips);
+                let slips = if is_stretch { Vec::new() } else { measured.slips };
+                ensemble.add(cpu_seconds, &measured.summary, slips);
             }
         }
         Ok(ensembles)
     }
+}
+
+fn realisation(parameters: &Parameters, solver: Solver) -> Realisation<'_> {
+    Realisation { parameters, solver, in_words: drive_in_words }
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.
@@ -410,7 +382,7 @@ fn distance_rows(
     key: u64,
 ) -> Vec<DistanceRow> {
     let row = |(place, quantity): (u64, Quantity)| {
-        let (sample, reference) = (sample(slips, quantity), sample(reference, quantity));
+        let (sample, reference) = (quantity.sample(slips), quantity.sample(reference));
         let key = key * Quantity::ALL.len() as u64 + place;
         Some(DistanceRow {
             parameters: Selected::new(parameters.clone()),
@@ -428,16 +400,12 @@ fn distance_rows(
     (0..).zip(Quantity::ALL).filter_map(row).collect()
 }
 
-fn sample(slips: &[Slip], quantity: Quantity) -> Vec<f64> {
-    slips.iter().filter_map(|slip| quantity.of(slip)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_small_study_tells_a_coarse_step_from_a_tight_tolerance() {
+    fn a_small_study_distinguishes_a_coarse_step_from_a_tight_tolerance() {
         let (coarse, tight) = (Solver::FixedStep { time_step: 4e-6 }, Solver::EventDriven { tolerance: 1e-8 });
         let study = Study {
             velocities: vec![1e-4],
@@ -498,12 +466,12 @@ mod tests {
         let mut ensemble = Ensemble::default();
         let summary = Summary { end_time: 0.5, steps: 500_000, ..Summary::default() };
         ensemble.add(0.1, &summary, Vec::new());
-        let cost = ensemble.cost(10.0);
+        let (cost, _) = ensemble.cost(10.0);
         assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
         assert!((cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12);
         // Another realisation that other work has slowed down changes nothing but the spread.
         ensemble.add(0.3, &summary, Vec::new());
-        assert!((ensemble.cost(10.0).per_slip - 2.0).abs() < 1e-12);
-        assert!((ensemble.spread() - 3.0).abs() < 1e-12);
+        let (cost, spread) = ensemble.cost(10.0);
+        assert!((cost.per_slip - 2.0).abs() < 1e-12 && (spread - 3.0).abs() < 1e-12);
     }
 }

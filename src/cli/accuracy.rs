@@ -6,8 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use stickslip::accuracy::{
-    self, Distances, Findings, MethodRow, Quantity, Scaling, ScalingFindings, Stability, Study, described,
-    drive_in_words, hard_cases, scaling_json, stability_json,
+    self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
+    hard_cases, scaling_report, solver_in_words, stability_report, study_report,
 };
 use stickslip::table::storage::Disk;
 
@@ -66,26 +66,14 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         }
     }
     let findings = study.run(&mut |next| output::tell(next))?;
-    let files = accuracy::write(&Disk, &arguments.out, &study, &findings)?;
-    if arguments.json {
-        output::json(&accuracy::as_json(&study, &findings))?;
-    } else {
-        output::print(&study_text(&study, &findings))?;
-        print_files(&files)?;
-    }
+    write_and_print(arguments, &study_report(&study, &findings)?, &study_text(&study, &findings))?;
     Ok(Exit::Done)
 }
 
 fn run_scaling(arguments: &Arguments) -> Result<Exit> {
     let scaling = if arguments.quick { Scaling::quick() } else { Scaling::full() };
     let findings = scaling.run(&mut |next| output::tell(next))?;
-    let files = accuracy::write_scaling(&Disk, &arguments.out, &findings)?;
-    if arguments.json {
-        output::json(&scaling_json(&findings))?;
-    } else {
-        output::print(&scaling_text(&findings))?;
-        print_files(&files)?;
-    }
+    write_and_print(arguments, &scaling_report(&findings)?, &scaling_text(&findings))?;
     Ok(Exit::Done)
 }
 
@@ -95,17 +83,17 @@ fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
         output::tell(&format!("{}: {}", case.threat, case.name()));
         rows.push(case.run());
     }
-    let files = accuracy::write_stability(&Disk, &arguments.out, &rows)?;
-    if arguments.json {
-        output::json(&stability_json(&rows))?;
-    } else {
-        output::print(&stability_text(&rows))?;
-        print_files(&files)?;
-    }
+    write_and_print(arguments, &stability_report(&rows), &stability_text(&rows))?;
     Ok(if rows.iter().all(|row| row.passed) { Exit::Done } else { Exit::Failed })
 }
 
-fn print_files(files: &[PathBuf]) -> Result<()> {
+/// Writes the report, and prints it as JSON or text.
+fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Result<()> {
+    let files = report.write(&Disk, &arguments.out)?;
+    if arguments.json {
+        return output::json(report.json());
+    }
+    output::print(text)?;
     files.iter().try_for_each(|file| output::print(&format!("{}\n", file.display())))
 }
 
@@ -162,7 +150,7 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
         });
         lines.push(format!(
             "{:30}{costs} {:>8.0} {:>6.2} {:>18} {:>24} {:>9}",
-            described(row.solver),
+            solver_in_words(row.solver),
             1e9 * row.cost.per_step,
             row.cost_spread,
             times.unwrap_or_else(|| "-".to_owned()),
@@ -194,7 +182,7 @@ fn distance_table(findings: &Findings) -> Vec<String> {
             let ratio = found.map(|found| found.wasserstein.value / found.wasserstein.floor);
             ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2}"))
         };
-        lines.push(format!("{:30}{}", described(row.solver), cells(found.into_iter().map(ratio))));
+        lines.push(format!("{:30}{}", solver_in_words(row.solver), cells(found.into_iter().map(ratio))));
     }
     let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
     let (rows, wasserstein) =

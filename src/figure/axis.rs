@@ -12,6 +12,7 @@ enum Scale {
 /// One axis of a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
+    /// What it shows, with its unit; an empty label is not drawn.
     pub(super) label: String,
     pub(super) low: f64,
     pub(super) high: f64,
@@ -22,23 +23,23 @@ pub(super) struct Axis {
     pub(super) minor: Vec<f64>,
 }
 
-/// Ticks with a number that an axis bears.
-const MOST_TICKS: f64 = 6.0;
+/// Ticks with a number on an axis.
+const MAX_TICKS: f64 = 6.0;
 
 impl Axis {
     /// Linear from `low` to `high`.
     pub(super) fn linear(label: &str, low: f64, high: f64) -> Self {
-        Self::stepped(label, low, high, MOST_TICKS)
+        Self::linear_with(label, low, high, MAX_TICKS)
     }
 
-    /// Linear from `low` to `high` with few ticks, for low frames.
-    pub(super) fn few(label: &str, low: f64, high: f64) -> Self {
-        Self::stepped(label, low, high, 0.5 * MOST_TICKS)
+    /// Linear from `low` to `high` with half as many ticks, for low frames.
+    pub(super) fn sparse(label: &str, low: f64, high: f64) -> Self {
+        Self::linear_with(label, low, high, 0.5 * MAX_TICKS)
     }
 
-    fn stepped(label: &str, low: f64, high: f64, most: f64) -> Self {
-        let high = if high > low { high } else { low + low.abs().max(1.0) };
-        let step = nice_step((high - low) / most);
+    fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
+        let high = above(low, high);
+        let step = nice_step((high - low) / max_ticks);
         let decimals = usize::try_from(-exponent(step)).unwrap_or(0);
         let ticks = multiples(step, low, high).map(|tick| (tick, number(tick, decimals))).collect();
         // A step of 2 is halved, others are cut in five.
@@ -47,34 +48,31 @@ impl Axis {
         Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
     }
 
-    /// Linear over round numbers that hold `low` and `high`.
-    pub(super) fn around(label: &str, low: f64, high: f64) -> Self {
-        let high = if high > low { high } else { low + low.abs().max(1.0) };
-        let step = nice_step((high - low) / MOST_TICKS);
+    /// Linear between the round numbers that enclose `low` and `high`.
+    pub(super) fn rounded(label: &str, low: f64, high: f64) -> Self {
+        let high = above(low, high);
+        let step = nice_step((high - low) / MAX_TICKS);
         Self::linear(label, (low / step).floor() * step, (high / step).ceil() * step)
     }
 
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
-        let (first, last) = (exponent(low), exponent(high));
         let decades = libm::log10(high / low);
         let mantissas: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         // Every decade up to 7 of them, then every second, third, ...
         #[expect(clippy::cast_possible_truncation, reason = "at most some hundred decades")]
         let every = ((decades / 7.0).ceil() as i32).max(1);
-        let is_inside = |value: f64| value >= low * (1.0 - 1e-9) && value <= high * (1.0 + 1e-9);
-        let plain = low >= 9e-4 && high <= 1.1e4;
+        let number = if low >= 9e-4 && high <= 1.1e4 { plain_power } else { power_of_ten };
         let (mut ticks, mut minor) = (Vec::new(), Vec::new());
-        for power in first..=last {
+        for power in exponent(low)..=exponent(high) {
             let decade = libm::exp10(f64::from(power));
             for mantissa in (1..10).map(f64::from) {
                 let value = mantissa * decade;
-                if !is_inside(value) {
-                } else if mantissas.contains(&mantissa) && power.rem_euclid(every) == 0 {
-                    ticks.push((
-                        value,
-                        if plain { plain_power(mantissa, power) } else { power_of_ten(mantissa, power) },
-                    ));
+                if value < low * (1.0 - 1e-9) || value > high * (1.0 + 1e-9) {
+                    continue;
+                }
+                if mantissas.contains(&mantissa) && power.rem_euclid(every) == 0 {
+                    ticks.push((value, number(mantissa, power)));
                 } else if every == 1 || mantissa == 1.0 {
                     minor.push(value);
                 }
@@ -91,8 +89,8 @@ impl Axis {
     }
 
     /// Words at 0, 1, 2, ...
-    pub(super) fn words(label: &str, words: &[&str]) -> Self {
-        let ticks = words.iter().enumerate().map(|(place, word)| (place as f64, (*word).to_owned())).collect();
+    pub(super) fn categories(label: &str, words: &[&str]) -> Self {
+        let ticks = (0..).map(f64::from).zip(words.iter().map(|word| (*word).to_owned())).collect();
         let high = words.len() as f64 - 0.5;
         Self { label: label.to_owned(), low: -0.5, high, scale: Scale::Linear, ticks, minor: Vec::new() }
     }
@@ -106,12 +104,12 @@ impl Axis {
     }
 
     /// Whether a value lies on the axis.
-    pub(super) fn holds(&self, value: f64) -> bool {
+    pub(super) fn contains(&self, value: f64) -> bool {
         value >= self.low && value <= self.high
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
-    pub(super) fn even(&self, count: u32) -> impl Iterator<Item = f64> + use<> {
+    pub(super) fn evenly_placed(&self, count: u32) -> impl Iterator<Item = f64> + use<> {
         let (low, high, scale) = (self.low, self.high, self.scale);
         (0..count).map(move |step| {
             let place = f64::from(step) / f64::from(count - 1);
@@ -123,7 +121,7 @@ impl Axis {
     }
 }
 
-/// Bounds of a logarithmic axis for data: a little further than the data, as `None` for none at all.
+/// Bounds of a logarithmic axis for data: a little wider than the data; `None` without any value > 0.
 pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     const MARGIN: f64 = 0.08;
     let (low, high) = bounds(values.filter(|&value| value > 0.0))?;
@@ -132,7 +130,13 @@ pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f
     Some((low * libm::exp(-margin), high * libm::exp(margin)))
 }
 
-/// Least and largest of some finite values.
+/// Bounds in multiples of π/2 that enclose some angles in rad, and at least [-π, π].
+pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = bounds(angles).unwrap_or((0.0, 0.0));
+    ((low.min(-PI) / FRAC_PI_2).floor() * FRAC_PI_2, (high.max(PI) / FRAC_PI_2).ceil() * FRAC_PI_2)
+}
+
+/// Least and largest of the finite values.
 pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.filter(|value| value.is_finite()).fold(None, |bounds, value| {
         let (low, high) = bounds.unwrap_or((value, value));
@@ -140,9 +144,14 @@ pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
+/// The upper end of an axis, also where the data are a single value.
+fn above(low: f64, high: f64) -> f64 {
+    if high > low { high } else { low + low.abs().max(1.0) }
+}
+
 #[expect(clippy::cast_possible_truncation, reason = "the decimal exponent of a double")]
 fn exponent(value: f64) -> i32 {
-    // The logarithm of a power of ten may fall a hair short.
+    // The logarithm of a power of ten may round to just below a whole number.
     (libm::log10(value) + 1e-9).floor() as i32
 }
 
@@ -160,12 +169,11 @@ fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     (first..=last).map(move |multiple| multiple as f64 * step)
 }
 
-/// With a true minus sign.
+/// With a true minus sign, and none before zero.
 fn number(value: f64, decimals: usize) -> String {
-    // Adding zero turns a rounded -0 into 0.
-    let rounded = format!("{:.decimals$}", value.abs());
-    let is_zero = rounded.chars().all(|digit| digit == '0' || digit == '.');
-    if value < 0.0 && !is_zero { format!("−{rounded}") } else { rounded }
+    let digits = format!("{:.decimals$}", value.abs());
+    let is_zero = digits.chars().all(|digit| digit == '0' || digit == '.');
+    if value < 0.0 && !is_zero { format!("−{digits}") } else { digits }
 }
 
 fn plain_power(mantissa: f64, power: i32) -> String {
@@ -173,19 +181,8 @@ fn plain_power(mantissa: f64, power: i32) -> String {
 }
 
 fn power_of_ten(mantissa: f64, power: i32) -> String {
-    let raised = |character| match character {
-        '-' => '⁻',
-        '0' => '⁰',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        _ => '⁹',
-    };
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |character: char| character.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
     let power: String = power.to_string().chars().map(raised).collect();
     if mantissa == 1.0 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
 }
@@ -194,19 +191,12 @@ fn halves_of_pi(angle: f64) -> String {
     #[expect(clippy::cast_possible_truncation, reason = "a few halves")]
     let halves = (angle / FRAC_PI_2).round() as i64;
     let sign = if halves < 0 { "−" } else { "" };
-    match (halves.abs(), halves % 2 == 0) {
-        (0, _) => "0".to_owned(),
-        (1, _) => format!("{sign}π/2"),
-        (2, _) => format!("{sign}π"),
-        (halves, true) => format!("{sign}{}π", halves / 2),
-        (halves, false) => format!("{sign}{halves}π/2"),
+    let (count, over) = if halves % 2 == 0 { (halves.abs() / 2, "") } else { (halves.abs(), "/2") };
+    match count {
+        0 => "0".to_owned(),
+        1 => format!("{sign}π{over}"),
+        _ => format!("{sign}{count}π{over}"),
     }
-}
-
-/// The bounds in multiples of π/2 that hold some angles in rad, at least [-π, π].
-pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = bounds(angles).unwrap_or((0.0, 0.0));
-    ((low.min(-PI) / FRAC_PI_2).floor() * FRAC_PI_2, (high.max(PI) / FRAC_PI_2).ceil() * FRAC_PI_2)
 }
 
 #[cfg(test)]
@@ -232,7 +222,7 @@ mod tests {
         for exponent in -12..12 {
             for span in [0.0, 0.3, 1.0, 7.7, 100.0] {
                 let low = 3.3 * libm::exp10(f64::from(exponent));
-                let linear = Axis::around("", low, low * (1.0 + span));
+                let linear = Axis::rounded("", low, low * (1.0 + span));
                 assert!((2..=8).contains(&linear.ticks.len()), "{low} {span}: {:?}", linear.ticks);
                 let (low, high) = logarithmic_bounds([low, low * (1.0 + span)].into_iter()).unwrap();
                 let logarithmic = Axis::logarithmic("", low, high);
@@ -244,7 +234,7 @@ mod tests {
     #[test]
     fn even_places_go_from_end_to_end() {
         let axis = Axis::logarithmic("", 0.2, 1000.0);
-        let values: Vec<f64> = axis.even(5).collect();
+        let values: Vec<f64> = axis.evenly_placed(5).collect();
         assert!((values[0] - 0.2).abs() < 1e-12 && (values[4] - 1000.0).abs() < 1e-9);
         assert!((axis.place(values[2]) - 0.5).abs() < 1e-12);
     }

@@ -12,6 +12,8 @@ const WIDTH: f64 = 18.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.2);
 /// Between the label's end and that of the bar's space.
 const INSET: f64 = 14.0;
+/// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
+pub(super) const OVERLAP: f64 = 0.5;
 
 /// What a bar shows.
 pub(super) struct ColourBar {
@@ -22,36 +24,37 @@ pub(super) struct ColourBar {
     pub(super) ticks: Vec<(f64, String)>,
 }
 
-/// A share from 0 to 1 in colours of even steps to the eye, also of the colour-blind and in grey: dark to bright.
+/// A share from 0 to 1 as a colour, in perceptually even steps from dark to bright, also to the colour-blind and in
+/// grey.
 pub(super) fn shade(share: f64) -> Color {
     Color::from(ColorMap::Viridis.map(share.clamp(0.0, 1.0)))
 }
 
-/// All of [`shade`], from below.
-pub(super) fn shades() -> Vec<Color> {
-    const STEPS: u32 = 64;
-    (0..STEPS).map(|step| shade(f64::from(step) / f64::from(STEPS - 1))).collect()
-}
-
 impl ColourBar {
+    /// A bar of all shades, with numbers at these shares.
+    pub(super) fn of_shades(label: &'static str, ticks: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        const STEPS: u32 = 64;
+        let colours = (0..STEPS).map(|step| shade(f64::from(step) / f64::from(STEPS - 1))).collect();
+        Self { label, colours, ticks: ticks.into_iter().map(|(share, number)| (share, number.to_string())).collect() }
+    }
+
     /// Draws the bar right of a frame, and the label above it.
     pub(super) fn draw(&self, sheet: &mut Sheet, frame: &Frame) {
-        let (left, top, bottom) = (frame.left + frame.width + GAP, frame.top, frame.top + frame.height);
+        let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());
         let height = frame.height / self.colours.len() as f64;
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {
-            // A hair over the box above, which is drawn later: viewers that scale show no seams.
-            let (top, overlap) = (bottom - (step + 1) as f64 * height, if step == 0 { 0.0 } else { 0.5 });
+            let (top, overlap) = (bottom - (step + 1) as f64 * height, if step == 0 { 0.0 } else { OVERLAP });
             ([left, top, WIDTH, height + overlap], colour.clone())
         });
-        sheet.clipped((left, top), (WIDTH, frame.height), |sheet| sheet.rectangles(boxes));
+        sheet.clipped([left, top, WIDTH, frame.height], |sheet| sheet.rectangles(boxes));
         let right = left + WIDTH;
         sheet.line(vec![(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], BORDER);
         for (place, number) in &self.ticks {
             let y = bottom - place * frame.height;
             sheet.line(vec![(right, y), (right + 5.0, y)], BORDER);
-            sheet.text((right + 9.0, y + 0.36 * f64::from(TICK_TEXT)), number, TICK_TEXT, Anchor::Start);
+            sheet.centred_text((right + 9.0, y), number, TICK_TEXT, Anchor::Start);
         }
-        let end = frame.left + frame.width + COLOUR_BAR - INSET;
+        let end = frame.right() + COLOUR_BAR - INSET;
         sheet.text((end, top - 13.0), self.label, LEGEND_TEXT, Anchor::End);
     }
 }

@@ -1,98 +1,83 @@
-//! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line for
-//! each modulation.
+//! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line
+//! for each modulation.
 
 use super::axis::{Axis, bounds};
-use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, UNDER};
-use super::picture::{Dot, INKS, Ink, Picture, Sheet, Stroke};
+use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};
+use super::picture::{INKS, Ink, Picture, Stroke};
 use super::sets::{Grid, distinct, modulation, swept};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetSummary, Statistic};
 
-const PANEL: (f64, f64) = (300.0, 230.0);
-/// Between two columns, for the numbers of the right one.
-const COLUMN_GAP: f64 = 92.0;
-const ROW_GAP: f64 = 52.0;
-/// Right of the panels, for amplitude and frequency in one line.
-const MODULATIONS: f64 = 270.0;
+/// Between the columns stand the numbers of the right one; right of them amplitude and frequency in one line.
+const LAYOUT: Layout =
+    Layout { columns: 2, width: 300.0, column_gap: 92.0, heights: &[230.0; 2], row_gap: ROW_GAP, right: 270.0 };
 /// Least values of a parameter that make a dependence; a rule has two.
-const LEAST: usize = 3;
+const MIN_VALUES: usize = 3;
 const MILLISECONDS: f64 = 1e3;
 
 type Getter = fn(&SetSummary) -> Option<Statistic>;
-/// The panels, row by row.
-const PANELS: [(&str, Getter); 4] = [
-    ("Locking index", |set| set.locking_index),
-    ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS))),
-    ("Resultant length of φ", |set| set.resultant_length),
-    ("Standard deviation of τ (ms)", |set| {
-        set.tau_deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
-    }),
+/// The panels: in either row a share of one, and a length of time.
+const PANELS: [[(&str, Getter); 2]; 2] = [
+    [
+        ("Locking index", |set| set.locking_index),
+        ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS))),
+    ],
+    [
+        ("Resultant length of φ", |set| set.resultant_length),
+        ("Standard deviation of τ (ms)", |set| {
+            set.tau_deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
+        }),
+    ],
 ];
 
 /// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
 /// modulations; `None` for others.
-pub fn dependence(sets: &[SetSummary]) -> Option<Picture> {
+pub(super) fn dependence(sets: &[SetSummary]) -> Option<Picture> {
     let all: Vec<&SetSummary> = sets.iter().collect();
     let [symbol] = swept(&all)[..] else { return None };
-    let values = distinct(sets, |parameters| number(parameters, symbol));
-    let least = if symbol == Symbol::BreakOn { 2 } else { LEAST };
-    let lines = lines(sets)?;
-    if lines.iter().any(|line| line.len() < least) {
+    let min_values = if symbol == Symbol::BreakOn { 2 } else { MIN_VALUES };
+    let lines = lines(all.iter().copied())?;
+    if lines.iter().any(|line| line.len() < min_values) {
         return None;
     }
     let x = match symbol {
-        Symbol::BreakOn => Axis::words("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
-        _ => Grid::of(values).wider_axis(&label(symbol)),
+        Symbol::BreakOn => Axis::categories("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
+        _ => Grid::of(distinct(&all, |parameters| number(parameters, symbol))).wider_axis(&label(symbol)),
     };
-    let (rows, columns) = (PANELS.len() / 2, 2.0);
-    let size = (
-        LEFT + columns * PANEL.0 + COLUMN_GAP + MODULATIONS,
-        ABOVE + rows as f64 * (PANEL.1 + ROW_GAP) - ROW_GAP + UNDER,
-    );
-    let mut sheet = Sheet::new("dependence", size);
-    for (index, (y_label, statistic)) in PANELS.into_iter().enumerate() {
-        let (row, column) = (index / 2, index % 2);
-        let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
-        // Shares of one, and lengths of time from zero on.
-        let high = if column == 0 { 1.0 } else { bounds(ends).map_or(1.0, |(_, high)| high) };
-        let frame = Frame {
-            left: LEFT + column as f64 * (PANEL.0 + COLUMN_GAP),
-            top: ABOVE + row as f64 * (PANEL.1 + ROW_GAP),
-            width: PANEL.0,
-            height: PANEL.1,
-            x: x.clone(),
-            y: Axis::around(y_label, 0.0, high),
-        };
-        for (line, ink) in lines.iter().zip(INKS) {
-            let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, statistic(set)?)));
-            draw(&mut sheet, &frame, &points.collect::<Vec<_>>(), ink);
-        }
-        frame.axes(&mut sheet, row + 1 == rows);
-        frame.y_label(&mut sheet);
-        if row + 1 == rows {
+    let mut sheet = LAYOUT.sheet("dependence");
+    for (row, panels) in PANELS.into_iter().enumerate() {
+        for (column, (y_label, statistic)) in panels.into_iter().enumerate() {
+            let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
+            let high = if column == 0 { 1.0 } else { bounds(ends).map_or(1.0, |(_, high)| high) };
+            let frame = LAYOUT.frame(row, column, x.clone(), Axis::rounded(y_label, 0.0, high));
+            for (line, ink) in lines.iter().zip(INKS) {
+                let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, statistic(set)?)));
+                frame.statistics(&mut sheet, &points.collect::<Vec<_>>(), stroke(ink), 4.0);
+            }
+            frame.axes(&mut sheet);
+            frame.y_label(&mut sheet);
             frame.x_label(&mut sheet);
-        }
-        if index == 1 {
-            let entry =
-                |(line, ink): (&Vec<&SetSummary>, Ink)| (Mark::Line(stroke(ink)), modulation(&line[0].parameters));
-            frame.legend(&mut sheet, LegendPlace::Beside, &lines.iter().zip(INKS).map(entry).collect::<Vec<_>>());
+            if (row, column) == (0, 1) {
+                let names = lines.iter().map(|line| modulation(&line[0].parameters));
+                let entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Line(stroke(ink)), name)).collect();
+                frame.legend(&mut sheet, LegendPlace::Beside, &entries);
+            }
         }
     }
     Some(sheet.finish())
 }
 
-/// The sets of each modulation, as they come, if there are no more than inks.
-fn lines(sets: &[SetSummary]) -> Option<Vec<Vec<&SetSummary>>> {
+/// The sets of each modulation, in their order, if there are enough inks.
+fn lines<'a>(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Vec<Vec<&'a SetSummary>>> {
     let modulation = |set: &SetSummary| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
     let mut lines: Vec<Vec<&SetSummary>> = Vec::new();
     for set in sets {
-        match lines.iter().position(|line| modulation(line[0]) == modulation(set)) {
-            Some(line) => lines[line].push(set),
-            None if lines.len() == INKS.len() => return None,
+        match lines.iter_mut().find(|line| modulation(line[0]) == modulation(set)) {
+            Some(line) => line.push(set),
             None => lines.push(vec![set]),
         }
     }
-    Some(lines)
+    (lines.len() <= INKS.len()).then_some(lines)
 }
 
 /// Where a parameter stands on the axis: its value, the spread of thresholds over their mean, the place of a rule.
@@ -107,36 +92,26 @@ fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
 }
 
 fn label(symbol: Symbol) -> String {
-    let (name, unit) = match symbol {
-        Symbol::N => ("Blocks N", ""),
-        Symbol::Ns => ("Contacts per block Nₛ", ""),
-        Symbol::M => ("Slider mass M", "kg"),
-        Symbol::K => ("Slider stiffness K", "N/m"),
-        Symbol::Kd => ("Drive stiffness Kd", "N/m"),
-        Symbol::SmallK => ("Contact stiffness k", "N/m"),
-        Symbol::Fs => ("Contact threshold fₛ", "N"),
-        Symbol::Dfs => ("Spread of thresholds Δfₛ / fₛ", ""),
-        Symbol::TauR => ("Reattachment delay τᵣ", "s"),
-        Symbol::Gamma => ("Damping rate γ", "1/s"),
-        Symbol::V0 => ("Drive velocity V₀", "m/s"),
-        other => (other.key(), other.description().unit),
+    let unit = if symbol == Symbol::Dfs { "" } else { symbol.description().unit };
+    let name = match symbol {
+        Symbol::N => "Blocks N",
+        Symbol::Ns => "Contacts per block Nₛ",
+        Symbol::M => "Slider mass M",
+        Symbol::K => "Slider stiffness K",
+        Symbol::Kd => "Drive stiffness Kd",
+        Symbol::SmallK => "Contact stiffness k",
+        Symbol::Fs => "Contact threshold fₛ",
+        Symbol::Dfs => "Spread of thresholds Δfₛ / fₛ",
+        Symbol::TauR => "Reattachment delay τᵣ",
+        Symbol::Gamma => "Damping rate γ",
+        Symbol::V0 => "Drive velocity V₀",
+        other => other.key(),
     };
     if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
 const fn stroke(ink: Ink) -> Stroke {
     Stroke::solid(ink, 1.6)
-}
-
-fn draw(sheet: &mut Sheet, frame: &Frame, points: &[(f64, Statistic)], ink: Ink) {
-    let values = || points.iter().map(|&(x, statistic)| (x, statistic.value));
-    frame.clipped(sheet, |sheet| {
-        frame.curve(sheet, values(), stroke(ink));
-        for &(x, statistic) in points {
-            frame.error_bar(sheet, x, statistic.interval, ink);
-        }
-    });
-    frame.points(sheet, values(), Dot { ink, radius: 4.0, opacity: 1.0 });
 }
 
 #[cfg(test)]
@@ -169,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rule_of_breaking_is_told_in_words() {
+    fn the_breaking_rule_is_an_axis_of_words() {
         let tension = |amplitude| {
             let plain = set(amplitude, 0.02, 4.0);
             SetSummary { parameters: Parameters { break_on: BreakOn::Tension, ..plain.parameters.clone() }, ..plain }

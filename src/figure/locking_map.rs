@@ -1,85 +1,71 @@
-//! The locking map: over period and amplitude of the modulation, how many periods an interval takes, and how well it keeps
-//! to whole periods.
+//! The locking map: how many periods an interval takes and its locking index, over period and amplitude of the
+//! modulation.
 
-use super::colour_bar::{COLOUR_BAR, ColourBar, shade, shades};
-use super::frame::{ABOVE, Frame, LEFT, LegendPlace, Mark, UNDER};
-use super::picture::{BLACK, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
-use super::sets::{Grid, MICROMETRES, Periods, distinct, swept};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
+use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};
+use super::picture::{BLACK, INKS, Ink, LIGHT_GREY, Picture, Stroke};
+use super::sets::{Grid, MICROMETRES, Modulations, Periods, is_modulated};
 use crate::reduce::SetSummary;
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
-const WIDTH: f64 = 760.0;
-const HEIGHT: f64 = 270.0;
-/// Between the panels, whose labels stand there.
-const GAP: f64 = 52.0;
+const LAYOUT: Layout = Layout::column(592.0, &[270.0, 270.0], ROW_GAP, COLOUR_BAR);
 /// Least values of amplitude and of period that make a map.
-const LEAST: usize = 8;
-/// Periods in an interval that have a colour of their own: each ink, and a darker one. More have one in common.
-const MOST_PERIODS: usize = 2 * INKS.len();
+const MIN_VALUES: usize = 8;
+/// Numbers of periods that have a colour of their own: each ink, and a darker one. Larger ones share a colour.
+const MAX_PERIODS: usize = 2 * INKS.len();
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 const WHITE: Ink = "#ffffff";
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
-/// periods or more; `None` for others.
-pub fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
-    let modulated: Vec<&SetSummary> = sets.iter().filter(|set| set.parameters.modulation_period.is_some()).collect();
-    let amplitudes =
-        distinct(modulated.iter().copied(), |parameters| Some(MICROMETRES * parameters.modulation_amplitude));
-    let periods = distinct(modulated.iter().copied(), |parameters| parameters.modulation_period);
-    let is_grid = amplitudes.len().min(periods.len()) >= LEAST
-        && 2 * modulated.len() >= amplitudes.len() * periods.len()
-        && swept(&modulated).is_empty();
-    if !is_grid {
+/// periods or more; `None` for others. Sets without modulation do not count.
+pub(super) fn locking_map(sets: &[SetSummary]) -> Option<Picture> {
+    let Modulations { modulated, amplitudes, periods, .. } =
+        Modulations::of(sets.iter().filter(|set| is_modulated(set)))?;
+    let cells = amplitudes.len() * periods.len();
+    if amplitudes.len().min(periods.len()) < MIN_VALUES || 2 * modulated.len() < cells {
         return None;
     }
-    let (periods, amplitudes) = (Periods::of(&periods, None), Grid::of(amplitudes));
-    let mut sheet = Sheet::new("locking-map", (WIDTH, ABOVE + 2.0 * HEIGHT + GAP + UNDER));
-    let mut frame = Frame {
-        left: LEFT,
-        top: ABOVE,
-        width: WIDTH - LEFT - COLOUR_BAR,
-        height: HEIGHT,
-        x: periods.grid.axis(periods.label),
-        y: amplitudes.axis("Amplitude Δ (µm)"),
-    };
+    let periods = Periods::of(&periods, None);
+    let amplitudes = Grid::of(amplitudes.into_iter().map(|amplitude| MICROMETRES * amplitude).collect());
     let drive_velocity = modulated[0].parameters.drive_velocity;
-    let colours: [fn(&SetSummary) -> Option<Color>; 2] = [
+    let critical_amplitude = |place: f64| MICROMETRES * drive_velocity * periods.period(place) / TAU;
+    let cell_colours: [fn(&SetSummary) -> Option<Color>; 2] = [
         |set| {
             let colour = colour(whole_periods(set)?);
             Some(if set.is_locked { colour } else { paler(colour) })
         },
         |set| set.locking_index.map(|index| shade(index.value)),
     ];
-    let index_ticks = [0.0, 0.25, 0.5, 0.75, 1.0].map(|index: f64| (index, index.to_string())).to_vec();
-    let bars = [periods_bar(&modulated), ColourBar { label: "locking index", colours: shades(), ticks: index_ticks }];
-    for (panel, (colour, bar)) in colours.into_iter().zip(bars).enumerate() {
-        frame.top = ABOVE + panel as f64 * (HEIGHT + GAP);
+    let index_ticks = [0.0, 0.25, 0.5, 0.75, 1.0].map(|index| (index, index));
+    let bars = [periods_bar(&modulated), ColourBar::of_shades("locking index", index_ticks)];
+
+    let mut sheet = LAYOUT.sheet("locking-map");
+    for (panel, (cell_colour, bar)) in cell_colours.into_iter().zip(bars).enumerate() {
+        let frame = LAYOUT.frame(panel, 0, periods.grid.axis(periods.label), amplitudes.axis("Amplitude Δ (µm)"));
         frame.clipped(&mut sheet, |sheet| {
-            let cells = modulated.iter().filter_map(|set| {
+            sheet.rectangles(modulated.iter().filter_map(|set| {
                 let period = periods.place(set.parameters.modulation_period?);
                 let amplitude = MICROMETRES * set.parameters.modulation_amplitude;
                 let [left, top, width, height] =
                     frame.box_of(periods.grid.cell_of(period), amplitudes.cell_of(amplitude));
-                // A hair over the next cell: viewers that scale show no seams.
-                Some(([left, top, width + 0.5, height + 0.5], colour(set)?))
-            });
-            sheet.rectangles(cells);
+                Some(([left, top, width + OVERLAP, height + OVERLAP], cell_colour(set)?))
+            }));
             for stroke in [CASING, LINE] {
-                let critical = |place: f64| MICROMETRES * drive_velocity * periods.period(place) / TAU;
-                frame.curve(sheet, frame.x.even(200).map(|place| (place, critical(place))), stroke);
+                let places = frame.x.evenly_placed(200);
+                frame.curve(sheet, places.map(|place| (place, critical_amplitude(place))), stroke);
             }
         });
-        frame.axes(&mut sheet, panel == 1);
+        frame.axes(&mut sheet);
         frame.y_label(&mut sheet);
         bar.draw(&mut sheet, &frame);
         if panel == 0 {
-            frame.legend(&mut sheet, LegendPlace::Above, &[(Mark::Line(LINE), "η = 1".to_owned())]);
+            frame.legend(&mut sheet, LegendPlace::Above, &[entry(Mark::Line(LINE), "η = 1")]);
         }
+        frame.x_label(&mut sheet);
     }
-    frame.x_label(&mut sheet);
     Some(sheet.finish())
 }
 
@@ -90,11 +76,11 @@ fn whole_periods(set: &SetSummary) -> Option<usize> {
     Some(periods.round() as usize)
 }
 
-/// The colour of a number of periods, told apart from its neighbours by colour-blind readers, too.
+/// The colour of a number of periods, which colour-blind readers, too, can tell from its neighbours.
 fn colour(periods: usize) -> Color {
     match periods {
         0 => Color::from(WHITE),
-        1..=MOST_PERIODS => {
+        1..=MAX_PERIODS => {
             let ink = Color::from(INKS[(periods - 1) % INKS.len()]);
             if periods <= INKS.len() { ink } else { darker(ink) }
         }
@@ -104,15 +90,15 @@ fn colour(periods: usize) -> Color {
 
 /// Halfway to black.
 fn darker(ink: Color) -> Color {
-    each_part(ink, |part| part / 2)
+    map_parts(ink, |part| part / 2)
 }
 
 /// Most of the way to white.
 fn paler(ink: Color) -> Color {
-    each_part(ink, |part| 255 - (255 - part) / 4)
+    map_parts(ink, |part| 255 - (255 - part) / 4)
 }
 
-fn each_part(ink: Color, change: impl Fn(u8) -> u8) -> Color {
+fn map_parts(ink: Color, change: impl Fn(u8) -> u8) -> Color {
     match ink {
         Color::Rgb(red, green, blue) => Color::Rgb(change(red), change(green), change(blue)),
         other => other,
@@ -121,10 +107,10 @@ fn each_part(ink: Color, change: impl Fn(u8) -> u8) -> Color {
 
 /// The colours from the least number of periods to the largest that occur.
 fn periods_bar(sets: &[&SetSummary]) -> ColourBar {
-    let present = || sets.iter().filter_map(|set| whole_periods(set)).map(|periods| periods.min(MOST_PERIODS + 1));
+    let present = || sets.iter().filter_map(|set| whole_periods(set)).map(|periods| periods.min(MAX_PERIODS + 1));
     let (first, last) = (present().min().unwrap_or(0), present().max().unwrap_or(0));
     let count = (last - first + 1) as f64;
-    let number = |periods: usize| if periods > MOST_PERIODS { format!(">{MOST_PERIODS}") } else { periods.to_string() };
+    let number = |periods: usize| if periods > MAX_PERIODS { format!(">{MAX_PERIODS}") } else { periods.to_string() };
     ColourBar {
         label: "τ / T (pale: not locked)",
         colours: (first..=last).map(colour).collect(),
@@ -167,10 +153,10 @@ mod tests {
     #[test]
     fn each_number_of_periods_has_its_colour_and_its_pale_colour() {
         let hex = |colour: Color| format!("{colour:?}");
-        let pale = (1..=MOST_PERIODS + 1).map(|periods| hex(paler(colour(periods))));
+        let pale = (1..=MAX_PERIODS + 1).map(|periods| hex(paler(colour(periods))));
         let all: std::collections::BTreeSet<String> =
-            (0..=MOST_PERIODS + 1).map(|periods| hex(colour(periods))).chain(pale).collect();
-        assert_eq!(all.len(), 2 * MOST_PERIODS + 3);
+            (0..=MAX_PERIODS + 1).map(|periods| hex(colour(periods))).chain(pale).collect();
+        assert_eq!(all.len(), 2 * MAX_PERIODS + 3);
         assert_eq!(hex(colour(13)), hex(colour(40)));
         assert_eq!(whole_periods(&set(1e-6, 0.02, 3.02)), Some(3));
     }

@@ -1,4 +1,12 @@
 //! Figures: reduced data -> pictures in the paper's layout, as SVG and PNG bytes; [`draw_all`] alone writes.
+//!
+//! ```text
+//! draw.rs -> a file for each figure: its data, its panels; `None` where the data do not fit
+//!            scatter.rs, sets.rs     slips as dots; in what sets differ, and the grid on which they lie
+//!            frame.rs, axis.rs       panels on a sheet, axes, legends
+//!            colour_bar.rs           the colours of maps
+//!            picture.rs              lines, discs, text -> SVG, PNG
+//! ```
 
 mod axis;
 mod backbone;
@@ -13,23 +21,16 @@ mod intervals;
 mod locking_map;
 mod picture;
 mod scaling;
+mod scatter;
 mod sets;
 mod simulation;
 mod staircase;
 mod work_precision;
 
-pub use backbone::backbone;
-pub use dependence::dependence;
-pub use drag::drag;
 pub use draw::draw_all;
-pub use friction::friction;
-pub use histograms::{Bar, HistogramPanel, MOST_PANELS, histograms};
-pub use intervals::intervals;
-pub use locking_map::locking_map;
 pub use picture::Picture;
 pub use scaling::{Growth, Line, scaling};
 pub use simulation::{AttachedMap, simulation};
-pub use staircase::staircase;
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 use crate::table::file::DatasetError;

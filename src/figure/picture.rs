@@ -4,11 +4,12 @@ use super::FigureError;
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
-use kuva::render::render::{Primitive, Scene, TextAnchor};
+pub(super) use kuva::render::render::TextAnchor as Anchor;
+use kuva::render::render::{Primitive, Scene};
 
 /// Pixels of the PNG per unit of the SVG: 1300 pixels for a figure of a column's width.
 const PIXELS_PER_UNIT: f32 = 2.0;
-/// First those that have the Greek letters and superscripts that the labels use. The PNG has DejaVu Sans built in.
+/// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
 /// A finished figure.
@@ -18,7 +19,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Its name, which is also that of its files.
+    /// Its name; its files have the same.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name
@@ -69,7 +70,7 @@ pub(super) const RED: Ink = "#d62020";
 /// The paper's averages.
 pub(super) const BLUE: Ink = "#1f55c4";
 
-/// For lines beside each other: colours that colour-blind readers tell apart (Okabe and Ito).
+/// For lines side by side: colours that colour-blind readers tell apart (Okabe and Ito).
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// A line's look.
@@ -91,12 +92,25 @@ impl Stroke {
     }
 }
 
-/// Where a text is held.
+/// A disc's look.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Anchor {
-    Start,
-    Middle,
-    End,
+pub(super) struct Dot {
+    pub(super) ink: Ink,
+    pub(super) radius: f64,
+    pub(super) opacity: f64,
+}
+
+impl Dot {
+    pub(super) const fn solid(ink: Ink, radius: f64) -> Self {
+        Self { ink, radius, opacity: 1.0 }
+    }
+}
+
+/// A surface's look.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fill {
+    pub(super) ink: Ink,
+    pub(super) opacity: f64,
 }
 
 impl Sheet {
@@ -127,27 +141,28 @@ impl Sheet {
         }
     }
 
-    pub(super) fn rectangle(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), ink: &str, opacity: f64) {
+    /// A rectangle from its upper left corner.
+    pub(super) fn rectangle(&mut self, [x, y, width, height]: [f64; 4], fill: Fill) {
         self.scene.add(Primitive::Rect {
             x,
             y,
             width,
             height,
-            fill: Color::from(ink),
+            fill: Color::from(fill.ink),
             stroke: None,
             stroke_width: None,
-            opacity: (opacity < 1.0).then_some(opacity),
+            opacity: (fill.opacity < 1.0).then_some(fill.opacity),
         });
     }
 
     /// Rectangles x, y, width, height, each in its own colour.
     pub(super) fn rectangles(&mut self, cells: impl IntoIterator<Item = ([f64; 4], Color)>) {
         let (mut x, mut y, mut w, mut h, mut fills) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (cell, fill) in cells {
-            x.push(cell[0]);
-            y.push(cell[1]);
-            w.push(cell[2]);
-            h.push(cell[3]);
+        for ([left, top, width, height], fill) in cells {
+            x.push(left);
+            y.push(top);
+            w.push(width);
+            h.push(height);
             fills.push(fill);
         }
         self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
@@ -166,19 +181,19 @@ impl Sheet {
         });
     }
 
-    /// A text, always upright: the raster makes turned text bold.
+    /// A text on its base line, always upright: the raster makes turned text bold.
     pub(super) fn text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: Anchor) {
-        let anchor = match anchor {
-            Anchor::Start => TextAnchor::Start,
-            Anchor::Middle => TextAnchor::Middle,
-            Anchor::End => TextAnchor::End,
-        };
         let content = text.to_owned();
         self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None });
     }
 
-    /// What `draw` draws appears inside the rectangle only.
-    pub(super) fn clipped(&mut self, (x, y): (f64, f64), (width, height): (f64, f64), draw: impl FnOnce(&mut Self)) {
+    /// A text with the middle of its digits at this height.
+    pub(super) fn centred_text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: Anchor) {
+        self.text((x, y + 0.36 * f64::from(size)), text, size, anchor);
+    }
+
+    /// Shows what `draw` draws inside the rectangle only.
+    pub(super) fn clipped(&mut self, [x, y, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
         self.scene.defs.push(format!(
@@ -190,14 +205,6 @@ impl Sheet {
     }
 }
 
-/// A disc's look.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Dot {
-    pub(super) ink: Ink,
-    pub(super) radius: f64,
-    pub(super) opacity: f64,
-}
-
 /// Cuts a line into dashes.
 fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
     let mut dashes = Vec::new();
@@ -207,7 +214,7 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
         let length = libm::hypot(end_x - x, end_y - y);
         let mut done = 0.0;
         while done < length {
-            let at = |way: f64| (x + (end_x - x) * way / length, y + (end_y - y) * way / length);
+            let at = |done: f64| (x + (end_x - x) * done / length, y + (end_y - y) * done / length);
             let step = left.min(length - done);
             if draws {
                 if current.is_empty() {

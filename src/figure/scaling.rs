@@ -2,10 +2,10 @@
 
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
+use super::frame::{ABOVE, Entry, Frame, LEFT, LEGEND, Layout, LegendPlace, Mark, entry};
 use super::picture::{Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
 
-const PANEL: (f64, f64) = (300.0, 280.0);
+const NAME: &str = "scaling";
 /// Powers of the size that are drawn as guides, and their dashes.
 const GUIDES: [(i32, Stroke); 2] =
     [(1, Stroke::dashed(GREY, 1.4, (2.0, 3.0))), (2, Stroke::dashed(GREY, 1.4, (8.0, 4.0)))];
@@ -32,36 +32,27 @@ type LinesOf = fn(&Growth) -> &[Line];
 ///
 /// # Errors
 /// When there is nothing to draw.
-pub fn scaling(columns: &[Growth]) -> Result<Picture, FigureError> {
-    const NAME: &str = "scaling";
-    let (width, height) = (LEFT + PANEL.0, ABOVE + PANEL.1);
-    let mut sheet = Sheet::new(NAME, (columns.len() as f64 * width + LEGEND, 2.0 * height + UNDER));
+pub fn scaling(growths: &[Growth]) -> Result<Picture, FigureError> {
+    let columns = growths.len();
+    let heights = &[280.0; 2];
+    let layout = Layout { columns, width: 300.0, column_gap: LEFT, heights, row_gap: ABOVE, right: LEGEND };
+    let mut sheet = layout.sheet(NAME);
     let rows: [(&str, LinesOf); 2] =
         [("CPU time per slip (s)", |growth| &growth.costs), ("Steps and breaks per slip", |growth| &growth.counts)];
     for (row, (y_label, lines_of)) in rows.into_iter().enumerate() {
-        let values = columns.iter().flat_map(|growth| points(lines_of(growth))).map(|point| point.1);
+        let values = growths.iter().flat_map(|growth| points(lines_of(growth))).map(|point| point.1);
         let (low, high) = logarithmic_bounds(values).ok_or(FigureError::Empty { figure: NAME, what: "costs" })?;
-        for (column, growth) in columns.iter().enumerate() {
+        for (column, growth) in growths.iter().enumerate() {
             let lines = lines_of(growth);
             let Some((first, last)) = logarithmic_bounds(points(lines).map(|point| point.0)) else { continue };
-            let frame = Frame {
-                left: LEFT + column as f64 * width,
-                top: ABOVE + row as f64 * height,
-                width: PANEL.0,
-                height: PANEL.1,
-                x: Axis::logarithmic(&growth.label, first, last),
-                y: Axis::logarithmic(y_label, GUIDES_UNDER * low, high),
-            };
-            let is_last = row + 1 == rows.len();
+            let x = Axis::logarithmic(&growth.label, first, last);
+            let y = Axis::logarithmic(if column == 0 { y_label } else { "" }, GUIDES_UNDER * low, high);
+            let frame = layout.frame(row, column, x, y);
             draw(&mut sheet, &frame, lines);
-            frame.axes(&mut sheet, is_last);
-            if is_last {
-                frame.x_label(&mut sheet);
-            }
-            if column == 0 {
-                frame.y_label(&mut sheet);
-            }
-            if column + 1 == columns.len() {
+            frame.axes(&mut sheet);
+            frame.x_label(&mut sheet);
+            frame.y_label(&mut sheet);
+            if column + 1 == columns {
                 frame.legend(&mut sheet, LegendPlace::Beside, &legend(lines, row == 0));
             }
         }
@@ -73,10 +64,10 @@ fn points(lines: &[Line]) -> impl Iterator<Item = (f64, f64)> {
     lines.iter().flat_map(|(_, points)| points).copied()
 }
 
-fn legend(lines: &[Line], with_guides: bool) -> Vec<(Mark, String)> {
-    let lines = lines.iter().zip(INKS).map(|((name, _), ink)| (Mark::Line(curve(ink)), name.clone()));
+fn legend(lines: &[Line], with_guides: bool) -> Vec<Entry> {
+    let lines = lines.iter().zip(INKS).map(|((name, _), ink)| entry(Mark::Line(curve(ink)), name.as_str()));
     let guides = GUIDES.iter().filter(|_| with_guides);
-    lines.chain(guides.map(|&(power, stroke)| (Mark::Line(stroke), format!("slope {power}")))).collect()
+    lines.chain(guides.map(|&(power, stroke)| entry(Mark::Line(stroke), format!("slope {power}")))).collect()
 }
 
 const fn curve(ink: Ink) -> Stroke {
@@ -93,7 +84,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Line]) {
         }
         for ((_, points), ink) in lines.iter().zip(INKS) {
             frame.curve(sheet, points.iter().copied(), curve(ink));
-            frame.points(sheet, points.iter().copied(), Dot { ink, radius: 4.0, opacity: 1.0 });
+            frame.points(sheet, points.iter().copied(), Dot::solid(ink, 4.0));
         }
     });
 }

@@ -1,10 +1,10 @@
-//! Sets beside each other: in what they differ, what each is called, and the grid on which they lie.
+//! Sets compared: in what they differ, what each is called, and the grid on which they lie.
 
 use super::axis::{Axis, logarithmic_bounds};
 use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::SetSummary;
 
-/// Steps of an axis that differ by less than this share are even: whole numbers are rounded.
+/// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
 pub(super) const MICROMETRES: f64 = 1e6;
 
@@ -17,12 +17,39 @@ pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {
     Symbol::ALL.into_iter().filter(is_swept).collect()
 }
 
+/// Sets that differ in the modulation alone.
+pub(super) struct Modulations<'a> {
+    pub(super) modulated: Vec<&'a SetSummary>,
+    /// A set without modulation.
+    pub(super) free: Option<&'a SetSummary>,
+    /// Amplitudes of the modulated sets in m, ascending.
+    pub(super) amplitudes: Vec<f64>,
+    /// Periods of the modulated sets in s, ascending.
+    pub(super) periods: Vec<f64>,
+}
+
+impl<'a> Modulations<'a> {
+    /// `None` if another parameter differs.
+    pub(super) fn of(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Self> {
+        let sets: Vec<&SetSummary> = sets.collect();
+        if !swept(&sets).is_empty() {
+            return None;
+        }
+        let (modulated, free): (Vec<&SetSummary>, Vec<&SetSummary>) =
+            sets.into_iter().partition(|set| is_modulated(set));
+        let amplitudes = distinct(&modulated, |parameters| Some(parameters.modulation_amplitude));
+        let periods = distinct(&modulated, |parameters| parameters.modulation_period);
+        Some(Self { modulated, free: free.first().copied(), amplitudes, periods })
+    }
+}
+
+pub(super) fn is_modulated(set: &SetSummary) -> bool {
+    set.parameters.modulation_period.is_some()
+}
+
 /// The distinct values of a quantity, ascending.
-pub(super) fn distinct<'a>(
-    sets: impl IntoIterator<Item = &'a SetSummary>,
-    quantity: impl Fn(&Parameters) -> Option<f64>,
-) -> Vec<f64> {
-    let mut values: Vec<f64> = sets.into_iter().filter_map(|set| quantity(&set.parameters)).collect();
+pub(super) fn distinct(sets: &[&SetSummary], quantity: impl Fn(&Parameters) -> Option<f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = sets.iter().filter_map(|set| quantity(&set.parameters)).collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
     values
@@ -118,8 +145,8 @@ fn has_even_steps(values: &[f64]) -> bool {
     steps().all(|step| (step - mean).abs() <= EVEN * mean)
 }
 
-/// Periods as an axis: T, or 1/T if its steps are even and those of T are not; over those without modulation if that is
-/// known.
+/// Periods as an axis: T, or 1/T if its steps are even and those of T are not; in units of the mean interval without
+/// modulation if that is known.
 pub(super) struct Periods {
     pub(super) grid: Grid,
     pub(super) label: &'static str,

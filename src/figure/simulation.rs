@@ -1,23 +1,21 @@
-//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b, d).
+//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b,
+//! d).
 
 use super::FigureError;
 use super::axis::{Axis, bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, shade, shades};
-use super::frame::{ABOVE, Frame, LEFT, RIGHT, UNDER};
-use super::picture::{BLACK, Picture, Sheet, Stroke, snapped};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
+use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::picture::{BLACK, Picture, Stroke, snapped};
 use kuva::render::color::Color;
 
 const NAME: &str = "simulation";
-const WIDTH: f64 = 760.0;
+/// Of the panels and all that stands right of them.
+const WIDTH: f64 = 684.0;
 const TRACE_HEIGHT: f64 = 230.0;
 const MAP_HEIGHT: f64 = 260.0;
-/// Between the trace and the map, whose label stands there.
-const GAP: f64 = 52.0;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
-/// A PNG has two pixels per unit; more columns would not be seen.
-const COLUMNS_PER_UNIT: f64 = 1.0;
-/// Colours that an eye tells apart.
+/// Colours that an eye can distinguish.
 const LEVELS: f64 = 100.0;
 
 /// Fractions of attached contacts over time and blocks.
@@ -46,34 +44,31 @@ pub fn simulation(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>) ->
     let instants = instants.chain(map.iter().flat_map(|map| map.times).copied());
     let (first, last) =
         bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
-    let heights = trace.map(|_| TRACE_HEIGHT).into_iter().chain(map.map(|_| MAP_HEIGHT));
-    let height = heights.reduce(|above, below| above + GAP + below).unwrap_or_default();
-    let mut sheet = Sheet::new(NAME, (WIDTH, ABOVE + height + UNDER));
-    let mut frame = Frame {
-        left: LEFT,
-        top: ABOVE,
-        width: WIDTH - LEFT - if map.is_some() { COLOUR_BAR } else { RIGHT },
-        height: TRACE_HEIGHT,
-        x: Axis::linear("Time t (s)", first, last),
-        y: Axis::linear("", 0.0, 1.0),
-    };
+    let x = || Axis::linear("Time t (s)", first, last);
+
+    let heights: Vec<f64> = trace.map(|_| TRACE_HEIGHT).into_iter().chain(map.map(|_| MAP_HEIGHT)).collect();
+    let right = if map.is_some() { COLOUR_BAR } else { RIGHT };
+    let layout = Layout::column(WIDTH - right, &heights, ROW_GAP, right);
+    let mut sheet = layout.sheet(NAME);
     if let Some(trace) = trace {
         let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
-        frame.y = Axis::around("Shear force Fₛ (N)", least.min(0.0), most);
+        let frame = layout.frame(0, 0, x(), Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most));
         frame.clipped(&mut sheet, |sheet| frame.curve(sheet, thinned(trace, frame.width), TRACE));
-        frame.axes(&mut sheet, map.is_none());
+        frame.axes(&mut sheet);
         frame.y_label(&mut sheet);
+        frame.x_label(&mut sheet);
     }
     if let Some(map) = map {
-        frame.top += trace.map_or(0.0, |_| TRACE_HEIGHT + GAP);
-        frame.height = MAP_HEIGHT;
-        frame.y = Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES);
+        let y = Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES);
+        let frame = layout.frame(heights.len() - 1, 0, x(), y);
         frame.clipped(&mut sheet, |sheet| sheet.rectangles(cells(&frame, &map)));
-        frame.axes(&mut sheet, true);
+        frame.axes(&mut sheet);
         frame.y_label(&mut sheet);
-        colour_bar().draw(&mut sheet, &frame);
+        // As in Fig. 4: bright where all are attached.
+        let ticks = [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (1.0 - percent / 100.0, percent));
+        ColourBar::of_shades("detached contacts (%)", ticks).draw(&mut sheet, &frame);
+        frame.x_label(&mut sheet);
     }
-    frame.x_label(&mut sheet);
     Ok(sheet.finish())
 }
 
@@ -95,10 +90,10 @@ fn thinned(trace: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
     trace.chunks(samples).flat_map(extremes).collect()
 }
 
-/// Rectangles of the map: averages over the instants of a column, equal neighbours joined.
+/// Rectangles of the map: averages over the instants of a column one unit wide, equal neighbours joined.
 fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
-    let columns = ((frame.width * COLUMNS_PER_UNIT) as usize).min(map.times.len());
+    let columns = (frame.width as usize).min(map.times.len());
     let instants = map.times.len();
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (map.times[instants - 1] - map.times[0]) / (instants - 1) as f64;
@@ -119,18 +114,11 @@ fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
         let mut column = 0;
         for run in levels.chunk_by(|left, right| left == right) {
             let (left, right) = (left_of(column), left_of(column + run.len()));
-            // A hair over the next cell, which covers it: viewers that scale show no seams.
-            cells.push(([left, top, right - left + 0.5, bottom - top + 0.5], shade(run[0] / LEVELS)));
+            cells.push(([left, top, right - left + OVERLAP, bottom - top + OVERLAP], shade(run[0] / LEVELS)));
             column += run.len();
         }
     }
     cells
-}
-
-/// The colours beside a frame, in percent of detached contacts as in Fig. 4: bright where all are attached.
-fn colour_bar() -> ColourBar {
-    let ticks = [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (1.0 - percent / 100.0, percent.to_string()));
-    ColourBar { label: "detached contacts (%)", colours: shades(), ticks: ticks.to_vec() }
 }
 
 #[cfg(test)]
@@ -159,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_asked_for_is_drawn_and_labelled_once() {
+    fn the_requested_panels_are_drawn_and_labelled_once() {
         let trace = [(0.0, 1.0), (1.0, 2.0)];
         let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
         let (force, position, bar) = (">Shear force Fₛ (N)<", ">Position x (mm)<", ">detached contacts (%)<");

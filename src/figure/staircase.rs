@@ -1,90 +1,77 @@
-//! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and the
-//! locking index under it.
+//! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and
+//! the locking index under it.
 
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
-use super::picture::{Dot, GREY, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
-use super::sets::{Periods, amplitude, distinct, swept};
+use super::frame::{Entry, Frame, LEGEND, Layout, LegendPlace, Mark, ROW_GAP, entry};
+use super::picture::{Dot, Fill, GREY, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
+use super::sets::{Modulations, Periods, amplitude};
 use crate::reduce::SetSummary;
 
-const WIDTH: f64 = 840.0;
-/// Of the intervals and of the locking index.
-const HEIGHTS: [f64; 2] = [330.0, 170.0];
-/// Between the panels, where the lower one's label stands.
-const GAP: f64 = 52.0;
+const LAYOUT: Layout = Layout::column(542.0, &[330.0, 170.0], ROW_GAP, LEGEND);
 /// Least values of the period that make a staircase.
-const LEAST_PERIODS: usize = 24;
-/// Amplitudes that are told apart.
-const MOST_AMPLITUDES: usize = 3;
+const MIN_PERIODS: usize = 24;
+/// Amplitudes that are easily distinguished.
+const MAX_AMPLITUDES: usize = 3;
 /// From this ratio on, τ/T is drawn on a logarithmic axis.
 const WIDE: f64 = 6.0;
 /// Whole numbers whose lines do not merge.
-const MOST_LINES: f64 = 10.0;
+const MAX_LINES: f64 = 10.0;
 const WHOLE: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 const FREE: Stroke = Stroke::dashed(GREY, 1.6, (6.0, 4.0));
-const BAND: f64 = 0.3;
+/// Opacity of the boxes from quartile to quartile.
+const BOX: f64 = 0.3;
 
 /// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most
-/// 3 amplitudes; `None` for others. Periods are told over τ₀ if there is a set without modulation.
-pub fn staircase(sets: &[SetSummary]) -> Option<Picture> {
-    let modulated: Vec<&SetSummary> = sets.iter().filter(|set| set.parameters.modulation_period.is_some()).collect();
-    let amplitudes = distinct(modulated.iter().copied(), |parameters| Some(parameters.modulation_amplitude));
-    let periods = distinct(modulated.iter().copied(), |parameters| parameters.modulation_period);
-    let all: Vec<&SetSummary> = sets.iter().collect();
-    if periods.len() < LEAST_PERIODS || amplitudes.len() > MOST_AMPLITUDES || !swept(&all).is_empty() {
+/// 3 amplitudes; `None` for others. Periods are in units of τ₀ if there is a set without modulation.
+pub(super) fn staircase(sets: &[SetSummary]) -> Option<Picture> {
+    let sets = Modulations::of(sets.iter())?;
+    if sets.periods.len() < MIN_PERIODS || sets.amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }
-    let free = sets.iter().find(|set| set.parameters.modulation_period.is_none());
-    let free = free.and_then(|set| set.tau_mean).map(|tau| tau.value);
-    let periods = Periods::of(&periods, free);
+    let free = sets.free.and_then(|set| set.tau_mean).map(|tau| tau.value);
+    let periods = Periods::of(&sets.periods, free);
     let x = periods.grid.axis(periods.label);
-    let whole_periods = modulated.iter().filter_map(|set| quartiles(set)).flatten();
-    let frames = frames(&x, whole_periods)?;
+    let y = intervals_axis(sets.modulated.iter().filter_map(|set| quartiles(set)).flatten())?;
+    let frames = [LAYOUT.frame(0, 0, x.clone(), y), LAYOUT.frame(1, 0, x, Axis::sparse("Locking index", 0.0, 1.0))];
 
-    let mut sheet = Sheet::new("staircase", (WIDTH, ABOVE + HEIGHTS[0] + GAP + HEIGHTS[1] + UNDER));
+    let mut sheet = LAYOUT.sheet("staircase");
     frames[0].clipped(&mut sheet, |sheet| {
-        let y = &frames[0].y;
-        let lines = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MOST_LINES));
-        lines.for_each(|n| frames[0].curve(sheet, [(x.low, n), (x.high, n)], WHOLE));
+        let Frame { x, y, .. } = &frames[0];
+        let whole = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MAX_LINES));
+        whole.for_each(|n| frames[0].level(sheet, n, WHOLE));
         if let Some(free) = free {
-            frames[0].curve(sheet, x.even(200).map(|place| (place, free / periods.period(place))), FREE);
+            frames[0].curve(sheet, x.evenly_placed(200).map(|place| (place, free / periods.period(place))), FREE);
         }
     });
-    let mut entries = Vec::new();
-    for (&height, ink) in amplitudes.iter().zip(INKS) {
-        let such = modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
+    let mut entries: Vec<Entry> = Vec::new();
+    for (&height, ink) in sets.amplitudes.iter().zip(INKS) {
+        let of_height = sets.modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
         let places: Vec<(f64, &SetSummary)> =
-            such.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
+            of_height.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
         draw(&mut sheet, &frames, &periods, &places, ink);
-        entries.push((Mark::Dot(dot(ink)), amplitude(height)));
+        entries.push(entry(Mark::Dot(dot(ink)), amplitude(height)));
     }
-    entries.push((Mark::Patch(GREY, BAND), "25 to 75 % of slips".to_owned()));
-    entries.push((Mark::Line(WHOLE), "τ = nT".to_owned()));
-    if free.is_some() {
-        entries.push((Mark::Line(FREE), "τ₀ / T, Δ = 0".to_owned()));
-    }
-    for (panel, frame) in frames.iter().enumerate() {
-        frame.axes(&mut sheet, panel == 1);
+    entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
+    entries.push(entry(Mark::Line(WHOLE), "τ = nT"));
+    entries.extend(free.map(|_| entry(Mark::Line(FREE), "τ₀ / T, Δ = 0")));
+    for frame in &frames {
+        frame.axes(&mut sheet);
         frame.y_label(&mut sheet);
+        frame.x_label(&mut sheet);
     }
-    frames[1].x_label(&mut sheet);
     frames[0].legend(&mut sheet, LegendPlace::Beside, &entries);
     Some(sheet.finish())
 }
 
-/// The frames of the intervals and of the locking index.
-fn frames(x: &Axis, whole_periods: impl Iterator<Item = f64> + Clone) -> Option<[Frame; 2]> {
+/// The axis of τ/T.
+fn intervals_axis(ratios: impl Iterator<Item = f64> + Clone) -> Option<Axis> {
     let label = "Slip interval τ / T, median";
-    let (low, high) = bounds(whole_periods.clone())?;
-    let intervals = if high > WIDE * low {
-        let (low, high) = logarithmic_bounds(whole_periods)?;
-        Axis::logarithmic(label, low, high)
-    } else {
-        Axis::around(label, low, high)
-    };
-    let frame = |top, height, y| Frame { left: LEFT, top, width: WIDTH - LEFT - LEGEND, height, x: x.clone(), y };
-    let below = ABOVE + HEIGHTS[0] + GAP;
-    Some([frame(ABOVE, HEIGHTS[0], intervals), frame(below, HEIGHTS[1], Axis::few("Locking index", 0.0, 1.0))])
+    let (low, high) = bounds(ratios.clone())?;
+    if high <= WIDE * low {
+        return Some(Axis::rounded(label, low, high));
+    }
+    let (low, high) = logarithmic_bounds(ratios)?;
+    Some(Axis::logarithmic(label, low, high))
 }
 
 /// One amplitude: sets at their places.
@@ -92,8 +79,8 @@ fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f6
     frames[0].clipped(sheet, |sheet| {
         for (place, set) in places {
             if let Some([low, _, high]) = quartiles(set) {
-                let [left, top, width, height] = frames[0].box_of(periods.grid.cell_of(*place), (low, high));
-                sheet.rectangle((left, top), (width, height), ink, BAND);
+                let cell = frames[0].box_of(periods.grid.cell_of(*place), (low, high));
+                sheet.rectangle(cell, Fill { ink, opacity: BOX });
             }
         }
     });
@@ -107,7 +94,7 @@ fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f6
 }
 
 const fn dot(ink: Ink) -> Dot {
-    Dot { ink, radius: 3.0, opacity: 1.0 }
+    Dot::solid(ink, 3.0)
 }
 
 /// Quartiles of τ/T.

@@ -2,12 +2,12 @@
 
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{ABOVE, Frame, LEFT, LEGEND, LegendPlace, Mark, UNDER};
-use super::picture::{Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
+use super::frame::{Frame, LEFT, LEGEND, Layout, LegendPlace, Mark, entry};
+use super::picture::{Dot, Fill, GREY, INKS, Ink, Picture, Sheet, Stroke};
 
-const PANEL: (f64, f64) = (270.0, 360.0);
-/// What chance alone gives: a stripe.
-const CHANCE: (Ink, f64) = (GREY, 0.3);
+const NAME: &str = "work-precision";
+/// The stripe of errors that chance alone gives.
+const CHANCE: Fill = Fill { ink: GREY, opacity: 0.3 };
 
 /// Error and cost of a method at one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +18,12 @@ pub struct WorkPrecision {
     pub uncertainty: Option<(f64, f64)>,
     /// Cost, > 0.
     pub work: f64,
+}
+
+impl WorkPrecision {
+    fn is_usable(&self) -> bool {
+        self.error > 0.0 && self.work > 0.0
+    }
 }
 
 /// One kind of error.
@@ -31,18 +37,24 @@ pub struct ErrorPanel {
     pub methods: Vec<(String, Vec<WorkPrecision>)>,
 }
 
-/// Draws a panel beside the other for each kind of error, with a line per method through its settings in the given order;
-/// values that are not > 0 are left out.
+impl ErrorPanel {
+    fn usable(&self) -> impl Iterator<Item = &WorkPrecision> {
+        self.methods.iter().flat_map(|(_, points)| points).filter(|point| point.is_usable())
+    }
+}
+
+/// Draws panels side by side, one for each kind of error, with a line per method through its settings in the given
+/// order; values that are not > 0 are left out.
 ///
 /// # Errors
 /// When a panel, or the figure, has nothing left.
 pub fn work_precision(work_label: &str, panels: &[ErrorPanel]) -> Result<Picture, FigureError> {
-    const NAME: &str = "work-precision";
     let empty = || FigureError::Empty { figure: NAME, what: "errors and costs" };
-    let works = panels.iter().flat_map(usable).map(|point| point.work);
+    let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
-    let width = LEFT + PANEL.0;
-    let mut sheet = Sheet::new(NAME, (panels.len() as f64 * width + LEGEND, ABOVE + PANEL.1 + UNDER));
+    let columns = panels.len();
+    let layout = Layout { columns, width: 270.0, column_gap: LEFT, heights: &[360.0], row_gap: 0.0, right: LEGEND };
+    let mut sheet = layout.sheet(NAME);
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in panels.iter().flat_map(|panel| &panel.methods) {
         if !names.contains(&name.as_str()) {
@@ -52,52 +64,36 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel]) -> Result<Picture
     let ink_of = |name: &str| INKS[names.iter().position(|known| *known == name).unwrap_or(0) % INKS.len()];
     for (column, panel) in panels.iter().enumerate() {
         // Lower ends may be 0: they run out of the panel.
-        let ends = usable(panel).flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
+        let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance)).ok_or_else(empty)?;
-        let frame = Frame {
-            left: LEFT + column as f64 * width,
-            top: ABOVE,
-            width: PANEL.0,
-            height: PANEL.1,
-            x: Axis::logarithmic(&panel.label, low, high),
-            y: Axis::logarithmic(work_label, least, most),
-        };
+        let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
+        let frame = layout.frame(0, column, Axis::logarithmic(&panel.label, low, high), y);
         if let Some(by_chance) = panel.by_chance {
-            frame.stripe(&mut sheet, low, by_chance, CHANCE.0, CHANCE.1);
+            frame.stripe(&mut sheet, low, by_chance, CHANCE);
         }
         for (name, points) in &panel.methods {
             draw(&mut sheet, &frame, points, ink_of(name));
         }
-        frame.axes(&mut sheet, true);
+        frame.axes(&mut sheet);
         frame.x_label(&mut sheet);
-        if column == 0 {
-            frame.y_label(&mut sheet);
-        }
-        if column + 1 == panels.len() {
-            let lines = names.iter().map(|name| (Mark::Line(line(ink_of(name))), (*name).to_owned()));
-            let chance = panels.iter().any(|panel| panel.by_chance.is_some());
-            let chance = chance.then(|| (Mark::Patch(CHANCE.0, CHANCE.1), "by chance, 95 %".to_owned()));
+        frame.y_label(&mut sheet);
+        if column + 1 == columns {
+            let lines = names.iter().map(|name| entry(Mark::Line(line(ink_of(name))), *name));
+            let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
+            let chance = has_chance.then(|| entry(Mark::Patch(CHANCE), "by chance, 95 %"));
             frame.legend(&mut sheet, LegendPlace::Beside, &lines.chain(chance).collect::<Vec<_>>());
         }
     }
     Ok(sheet.finish())
 }
 
-fn is_usable(point: &WorkPrecision) -> bool {
-    point.error > 0.0 && point.work > 0.0
-}
-
-fn usable(panel: &ErrorPanel) -> impl Iterator<Item = WorkPrecision> {
-    panel.methods.iter().flat_map(|(_, points)| points).copied().filter(is_usable)
-}
-
 const fn line(ink: Ink) -> Stroke {
     Stroke::solid(ink, 1.8)
 }
 
-/// A method's settings, with what is uncertain about their errors.
+/// A method's settings, with the uncertainty of their errors.
 fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], ink: Ink) {
-    let points: Vec<WorkPrecision> = points.iter().copied().filter(is_usable).collect();
+    let points: Vec<&WorkPrecision> = points.iter().filter(|point| point.is_usable()).collect();
     let places = || points.iter().map(|point| (point.error, point.work));
     frame.clipped(sheet, |sheet| {
         frame.curve(sheet, places(), line(ink));
@@ -107,7 +103,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], ink: Ink) {
                 frame.curve(sheet, ends, Stroke::solid(ink, 1.2));
             }
         }
-        frame.points(sheet, places(), Dot { ink, radius: 4.0, opacity: 1.0 });
+        frame.points(sheet, places(), Dot::solid(ink, 4.0));
     });
 }
 

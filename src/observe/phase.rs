@@ -1,11 +1,11 @@
-//! Phase φ of an event against the modulation, and the window in which it is told.
+//! Phase φ of an event against the modulation, and the window in which it lies.
 
 use crate::model::theory::load_maximum_phase;
 use std::f64::consts::{PI, TAU};
 
 /// How far past Φ_max the window reaches, in rad, for η >= 1: a slip that inertia lets start a hair after the load's
 /// maximum stays there and does not jump to the bottom. For η > 1.014 the window so moved still holds φ_min (which lies
-/// 1.3 rad above Φ_max - 2π at η = 1.1 and further for larger η), so no slip above it is told a turn too high.
+/// 1.3 rad above Φ_max - 2π at η = 1.1 and further for larger η), so no slip above it is placed a turn too high.
 pub const OVERSHOOT: f64 = 0.5;
 
 /// Shift of a time from the nearest maximum of the modulation, 2π (t - m T)/T, in rad. Wrapped to (Φ_max - 2π, Φ_max]

@@ -21,7 +21,7 @@ pub struct Rupture {
 }
 
 impl Rupture {
-    /// The rupture that begins with this break, on a slider of so many blocks.
+    /// The rupture that begins with this break, on a slider of `blocks` blocks.
     pub fn new(first: &ContactEvent, blocks: usize) -> Self {
         let mut rupture = Self {
             first_time: first.time,

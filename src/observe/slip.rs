@@ -138,7 +138,7 @@ pub struct SlipObserver {
     spans: Vec<(f64, f64)>,
 }
 
-/// A rupture in progress, with what its force tells.
+/// A rupture in progress, with what is measured on its force.
 #[derive(Clone, Debug)]
 struct Active {
     rupture: Rupture,
@@ -154,7 +154,7 @@ struct Active {
 }
 
 impl Active {
-    /// Whether it is a slip or, with so many breaks at least, a precursor.
+    /// Whether it is a slip or, with at least this many breaks, a precursor.
     fn is_recorded(&self, precursor_size: u64) -> bool {
         self.rupture.size >= precursor_size || self.rupture.spans_slider()
     }

@@ -223,6 +223,6 @@ mod tests {
         // A hundred single slips at the same phase: sin(half) = 1.96 sqrt(1/200).
         let single = bin(&[[-0.9].as_slice(); 100]);
         assert!((width(single) - 2.0 * libm::asin(1.959_964 * 0.005_f64.sqrt())).abs() < 1e-6);
-        assert_eq!(bin(&[&[-0.9]]).phase_mean_low, None, "one slip tells nothing of its spread");
+        assert_eq!(bin(&[&[-0.9]]).phase_mean_low, None, "one slip says nothing about the spread");
     }
 }

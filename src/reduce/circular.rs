@@ -1,11 +1,11 @@
 //! Circular statistics: mean direction, resultant length, and the Rayleigh (Schuster) test against a uniform phase.
 //!
-//! p-value: Wilkie's approximation, exp(√(1 + 4n + 4(n² - R²)) - (1 + 2n)) with the resultant R (Wilkie, Appl. Stat. 32,
-//! 311 (1983); Zar, Biostatistical Analysis), is right to some percent except where few angles lie close together: it then
-//! overestimates, by 400 times for n = 3. There the saddle-point density of R (Daniels, Ann. Math. Stat. 25, 631 (1954)),
-//! normalised to one, is right to 10 %. Both fall with R and err upwards where they fail, so the smaller of the two is taken;
-//! for n = 2 the exact value. Checked against importance sampling down to p = 3e-5: within 10 %, but 15 % for n = 3 near
-//! p = 0.16.
+//! p-value: Wilkie's approximation, exp(√(1 + 4n + 4(n² - R²)) - (1 + 2n)) with the resultant R (Wilkie, Appl. Stat.
+//! 32, 311 (1983); Zar, Biostatistical Analysis), is accurate to a few percent except where few angles lie close
+//! together: there it is too large, by a factor of 400 for n = 3. There the saddle-point density of R (Daniels, Ann.
+//! Math. Stat. 25, 631 (1954)), normalised to one, is accurate to 10 %. Both fall with R and are too large where they
+//! fail, so we take the smaller of the two; for n = 2 the exact value. Checked against importance sampling down to p =
+//! 3e-5: within 10 %, but 15 % for n = 3 near p = 0.16.
 
 use super::sequence::Estimate;
 use std::f64::consts::{PI, TAU};
@@ -26,8 +26,9 @@ impl Estimate<2> {
         self.mean().map(|[x, y]| wrap(libm::atan2(y, x), top))
     }
 
-    /// p-value of the Rayleigh test: the probability of so long a resultant if the angles were uniform. Correlated angles
-    /// count as their effective number, rounded down: as many as they are would make any drift of the phase significant.
+    /// p-value of the Rayleigh test: the probability of a resultant at least this long if the angles were uniform.
+    /// Correlated angles count as their effective number, rounded down: by their plain number, any drift of the phase
+    /// would be significant.
     pub(super) fn rayleigh(&self) -> Option<f64> {
         #[expect(
             clippy::cast_possible_truncation,
@@ -43,22 +44,23 @@ impl Estimate<2> {
 #[must_use]
 pub fn wrap(angle: f64, top: f64) -> f64 {
     let wrapped = angle - TAU * ((angle - top) / TAU).ceil();
-    // Rounding may end a hair outside.
+    // Rounding may end just outside.
     if wrapped <= top - TAU { wrapped + TAU } else { wrapped.min(top) }
 }
 
-/// Above this number of angles Wilkie's approximation is right to 5 % down to p = 1e-4 and is taken alone.
-const MANY: u64 = 50;
+/// Up to this number of angles the saddle point is needed; above it Wilkie's approximation is accurate to 5 % down to
+/// p = 1e-4.
+const MAX_SADDLE_POINT: u64 = 50;
 
-/// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Right to 10 % down to 1e-4 (15 %
-/// for three angles near p = 0.16).
+/// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Accurate to 10 % down to
+/// 1e-4 (15 % for three angles near p = 0.16).
 #[must_use]
 pub fn rayleigh_probability(count: u64, length: f64) -> f64 {
     let n = count as f64;
     match count {
         0 | 1 => 1.0,
         2 => 2.0 / PI * libm::acos(length.clamp(0.0, 1.0)),
-        _ if count > MANY => wilkie(n, length),
+        _ if count > MAX_SADDLE_POINT => wilkie(n, length),
         _ => wilkie(n, length).min(saddle_point(n, length)),
     }
 }
@@ -83,7 +85,8 @@ fn saddle_point(n: f64, length: f64) -> f64 {
 
 /// Integral of the saddle-point density over ln κ from `from` on, by Simpson's rule.
 fn saddle_tail(n: f64, from: f64) -> f64 {
-    // For large κ the density falls as κ^(-(n-1)/2), n >= 3: after 30 e-folds nothing is left. Steps of 0.03 resolve n = 50.
+    // For large κ the density falls as κ^(-(n-1)/2), n >= 3: after 30 e-folds nothing is left. Steps of 0.03 resolve n
+    // = 50.
     const STEPS: u32 = 1200;
     const STEP: f64 = 0.03;
     let density = |step: u32| {
@@ -95,7 +98,7 @@ fn saddle_tail(n: f64, from: f64) -> f64 {
     STEP / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
 }
 
-/// What the saddle point needs of a von Mises distribution of concentration κ.
+/// A von Mises distribution of concentration κ, as the saddle point needs it.
 struct VonMises {
     /// Its mean resultant length A = I1/I0.
     length: f64,
@@ -107,7 +110,7 @@ struct VonMises {
 
 impl VonMises {
     fn at(concentration: f64) -> Self {
-        // From here the asymptotic series is good to 1e-6, and the power series has not lost digits in dA/dκ.
+        // From here on the asymptotic series is accurate to 1e-6; up to here the power series loses no digits in dA/dκ.
         const LARGE: f64 = 30.0;
         if concentration > LARGE {
             let u = 1.0 / concentration;
@@ -175,10 +178,10 @@ mod tests {
         assert_eq!(wrap(-PI, PI), PI);
     }
 
-    /// Values of importance sampling (2e6 resultants of von Mises angles, reweighted to uniform ones; standard errors below
-    /// 0.5 %), except n = 100: the large-sample series of Greenwood and Durand, Ann. Math. Stat. 26, 233 (1955).
+    /// Values of importance sampling (2e6 resultants of von Mises angles, reweighted to uniform ones; standard errors
+    /// below 0.5 %), except n = 100: the large-sample series of Greenwood and Durand, Ann. Math. Stat. 26, 233 (1955).
     #[test]
-    fn rayleigh_probability_is_right_to_ten_percent() {
+    fn rayleigh_probability_is_accurate_to_ten_percent() {
         for (count, length, expected) in RAYLEIGH {
             let probability = rayleigh_probability(count, length);
             assert!(
@@ -221,7 +224,8 @@ mod tests {
 
     #[test]
     fn the_rayleigh_test_of_correlated_phases_keeps_its_level() {
-        // Uniform phases that drift: each is the previous plus a normal step of 0.6 rad, memory exp(-0.18) of the vector.
+        // Uniform phases that drift: each is the previous plus a normal step of 0.6 rad, memory exp(-0.18) of the
+        // vector.
         let drift = |seed: u64| {
             let mut draws = Draws::new(seed);
             let jobs: Vec<Vec<f64>> = (0..16)

@@ -1,11 +1,11 @@
-//! Intervals that hold the true value in 95 of 100 repetitions.
+//! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 
 use super::moments::Moments;
 use super::sequence::Estimate;
 use crate::table::columns::{Cell, Column, Kind, Part};
 use std::f64::consts::PI;
 
-/// Share of repetitions in which an interval holds the true value.
+/// Share of repetitions in which an interval contains the true value.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// The ends of a 95 % confidence interval.
@@ -82,9 +82,9 @@ impl Estimate<2> {
     /// Of the resultant length R of unit vectors; `None` for fewer than two.
     ///
     /// The square of the length of a mean has the mean R² + s² + s'² and the variance 4 R² s² + 2 (s⁴ + s'⁴), with the
-    /// variances s² along and s'² across. The interval holds every R from which the found square is less than t standard
-    /// deviations away (score interval): it is R ± t s for long resultants (delta method), and needs no other rule near
-    /// R = 0, where a resultant is too long by chance.
+    /// variances s² along and s'² across. The interval contains every R from which the measured square is less than t
+    /// standard deviations away (score interval): it is R ± t s for long resultants (delta method), and also holds near
+    /// R = 0, where chance alone makes a resultant longer.
     pub(super) fn length_interval(&self) -> Option<Interval> {
         let ((length, along, across), t) = (self.polar()?, student(self.freedom()?));
         let unbiased = length * length - along - across;
@@ -95,9 +95,10 @@ impl Estimate<2> {
         Some(Interval { low: end(middle - root), high: end(middle + root) })
     }
 
-    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if no
-    /// direction is excluded; `None` for fewer than two. By the circular standard error, Fisher, Statistical Analysis of Circular Data (1993), Sec. 4.4.4,
-    /// whose (1 - ρ_2)/2 is the variance across the mean; holds as well for short resultants (Fieller's interval).
+    /// Of the mean direction of unit vectors, in rad about its representative in (`top` - 2π, `top`]: the whole turn if
+    /// no direction is excluded; `None` for fewer than two. By the circular standard error (Fisher, Statistical
+    /// Analysis of Circular Data (1993), Sec. 4.4.4), whose (1 - ρ_2)/2 is the variance across the mean; valid for
+    /// short resultants, too (Fieller's interval).
     pub(super) fn direction_interval(&self, top: f64) -> Option<Interval> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
         let sine = student(self.freedom()?) * across.sqrt();
@@ -111,7 +112,7 @@ fn student(freedom: f64) -> f64 {
     // Normal quantile; beyond the limit t differs from it by less than 1e-6.
     const NORMAL: f64 = 1.959_963_984_540_054;
     const LARGE: f64 = 3e6;
-    // Newton steps from the beginning of Fisher's expansion converge from below.
+    // Newton steps from the first terms of Fisher's expansion converge from below.
     const STEPS: u32 = 8;
     if freedom > LARGE {
         return NORMAL;
@@ -204,8 +205,8 @@ pub(super) mod tests {
         assert!((low - (432.0 - 2.0 * 12.706_205)).abs() < 1e-4 && (high - (432.0 + 2.0 * 12.706_205)).abs() < 1e-4);
     }
 
-    /// How often of 100 the intervals of length, direction and plain mean hold the true values, over repetitions of jobs
-    /// of angles about a mean of 0.7.
+    /// How often of 100 the intervals of length, direction and plain mean hold the true values, over repetitions of
+    /// jobs of angles about a mean of 0.7.
     fn coverage(
         (jobs, length): (usize, usize),
         resultant: f64,
@@ -239,7 +240,7 @@ pub(super) mod tests {
                 let found = coverage(size, resultant, |draws, length| {
                     (0..length).map(|_| draws.von_mises(concentration)).collect()
                 });
-                // 1000 repetitions tell coverage to 0.7 (standard error).
+                // 1000 repetitions give coverage to 0.7 (standard error).
                 assert!(found.iter().all(|held| (92.0..98.0).contains(held)), "{concentration}, {size:?}: {found:?}");
             }
         }
@@ -249,7 +250,8 @@ pub(super) mod tests {
     fn intervals_of_correlated_angles_cover() {
         for (memory, deviation) in [(0.5, 0.3), (0.5, 1.0), (0.8, 0.8)] {
             let resultant = libm::exp(-0.5 * deviation * deviation);
-            // At (2, 50) and (10, 20) fewer than 35 of the most correlated are effective, and lengths cover in 88 to 93 %.
+            // At (2, 50) and (10, 20) fewer than 35 of the most correlated are effective, and lengths cover in 88 to 93
+            // %.
             for size in SIZES.into_iter().skip(if memory > 0.6 { 2 } else { 0 }) {
                 let found = coverage(size, resultant, |draws, length| {
                     draws.autoregressive(memory, length).iter().map(|x| deviation * x).collect()

@@ -40,7 +40,7 @@ struct PhaseLimits {
     eta: f64,
     /// φ_min, in rad; `None` for η < 1.
     minimum: Option<f64>,
-    /// Upper end of the turn in which a mean phase is told, in rad. For η >= 1 the seam is in the middle of the gap between
+    /// Upper end of the turn in which a mean phase is given, in rad. For η >= 1 the seam is in the middle of the gap between
     /// Φ_max - 2π and φ_min, where no slip begins.
     top: f64,
 }

@@ -1,6 +1,6 @@
 //! Mean, standard deviation and quantiles, summed in the order of the rows.
 
-/// Running mean and standard deviation (Welford): loses no digits to a large mean.
+/// Running mean and standard deviation by the method of Welford, which keeps its digits beside a large mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
     count: u64,
@@ -42,7 +42,7 @@ impl Extend<f64> for Moments {
     }
 }
 
-/// Quantile of sorted values, linear between neighbours (as NumPy's default); `None` without values.
+/// Quantile of sorted values, interpolated linearly (NumPy's default); `None` without values.
 #[must_use]
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;

@@ -2,7 +2,7 @@
 
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
-/// Slips up to which all become points; of more, every k-th in table order, so that at most so many remain.
+/// Slips up to which all become points; of more, every k-th in table order remains.
 pub const MAX_POINTS: u64 = 20_000;
 
 /// A part of a run under a ramp of the modulation.

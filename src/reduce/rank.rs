@@ -9,14 +9,15 @@ pub(super) struct Sample<'a> {
     pub(super) inflation: f64,
 }
 
-/// Two-sided p-value of the test of Mann and Whitney, Ann. Math. Stat. 18, 50 (1947), in the normal limit with ties; `None`
-/// for an empty sample. The variance of U, (n1 n2)² (1/n1 + 1/n2 + 1/(n1 n2))/12, is taken with effective numbers.
+/// Two-sided p-value of the test of Mann and Whitney, Ann. Math. Stat. 18, 50 (1947), in the normal limit with ties;
+/// `None` for an empty sample. The variance of U, (n1 n2)² (1/n1 + 1/n2 + 1/(n1 n2))/12, is taken with effective
+/// numbers.
 pub(super) fn rank_test(first: Sample<'_>, second: Sample<'_>) -> Option<f64> {
     if first.values.is_empty() || second.values.is_empty() {
         return None;
     }
     let (n1, n2) = (first.values.len() as f64, second.values.len() as f64);
-    // The second sample goes first: it is the long one and may be sorted already.
+    // The second sample first: it is the longer one and may be sorted already.
     let mut all: Vec<(f64, bool)> = second.values.iter().map(|&value| (value, false)).collect();
     all.extend(first.values.iter().map(|&value| (value, true)));
     all.sort_by(|left, right| left.0.total_cmp(&right.0));
@@ -36,16 +37,16 @@ pub(super) fn rank_test(first: Sample<'_>, second: Sample<'_>) -> Option<f64> {
     Some(if variance > 0.0 { libm::erfc(excess.abs() / variance.sqrt() / SQRT_2) } else { 1.0 })
 }
 
-/// p-values adjusted for their number, after Holm, Scand. J. Stat. 6, 65 (1979): those below α are significant together at
-/// the level α.
+/// p-values adjusted for multiple tests, after Holm, Scand. J. Stat. 6, 65 (1979): those below α are significant at a
+/// family-wise level of α.
 pub(super) fn holm(values: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut order: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(index, value)| value.map(|value| (index, value))).collect();
     order.sort_by(|left, right| left.1.total_cmp(&right.1));
-    let (mut adjusted, mut least) = (vec![None; values.len()], 0.0_f64);
+    let (mut adjusted, mut lower_bound) = (vec![None; values.len()], 0.0_f64);
     for (rank, &(index, value)) in order.iter().enumerate() {
-        least = least.max((value * (order.len() - rank) as f64).min(1.0));
-        adjusted[index] = Some(least);
+        lower_bound = lower_bound.max((value * (order.len() - rank) as f64).min(1.0));
+        adjusted[index] = Some(lower_bound);
     }
     adjusted
 }

@@ -1,6 +1,6 @@
 //! The reduction of a results directory: jobs once, slips as often as memory asks for, five files committed together.
 //!
-//! Sets are told in the order of their parameters and rows are summed in table order (file names, then rows), so the same
+//! Sets stand in the order of their parameters and rows are summed in table order (file names, then rows), so the same
 //! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as
 //! much again for those of the set at hand; where the tables hold more, the slips are read again for the next sets.
 

@@ -1,13 +1,13 @@
-//! Values of a quantity slip by slip, job by job, and how sure their mean is.
+//! Values of a quantity slip by slip, job by job, and the uncertainty of their mean.
 //!
-//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of independent ones
-//! times 1 + 2 Σ_k ρ_k N_k/n = n/n_eff, with the autocorrelation ρ_k and the N_k pairs at lag k within jobs. The estimate is
-//! the Γ-method of U. Wolff, Comput. Phys. Commun. 156, 143 (2004): autocovariances pooled over the jobs about the mean of
-//! all, summed up to a lag at which what is left out and the noise of what is taken in balance (his automatic window,
-//! S = 1.5), and corrected for the mean being that of the same values. Counting pairs makes it exact for short jobs too: a job
-//! of one slip has none.
+//! Jobs of a set are independent, slips of a job are not. The variance of a mean of n values is that of independent
+//! ones times 1 + 2 Σ_k ρ_k N_k/n = n/n_eff, with the autocorrelation ρ_k and the N_k pairs at lag k within jobs. The
+//! estimate is the Γ-method of U. Wolff, Comput. Phys. Commun. 156, 143 (2004): autocovariances pooled over the jobs
+//! about the mean of all, summed up to the lag at which truncation error and noise balance (his automatic window, S =
+//! 1.5), and corrected for the bias of a mean estimated from the same values. Counting pairs makes it exact for short
+//! jobs, too: a job of one slip has none.
 
-/// Wolff's S: the correlation decays about so many times slower than the integrated time tells.
+/// Wolff's S: ratio of the decay time of the correlation to its integrated time.
 const DECAY: f64 = 1.5;
 
 /// Values of a quantity with D components, in the order of slips, and where jobs begin.
@@ -59,12 +59,12 @@ impl<const D: usize> Sequences<D> {
         let (mut correlated, mut weight, mut time) = (zeroth, 1.0, 0.5);
         for lag in 1.. {
             let pairs: usize = self.jobs().map(|job| job.len().saturating_sub(lag)).sum();
-            let weight_then = weight + 2.0 * pairs as f64 / n;
-            // From half the data on, the mean takes away more than it leaves.
-            if pairs == 0 || weight_then > 0.5 * n {
+            let wider = weight + 2.0 * pairs as f64 / n;
+            // Beyond half the data, subtracting the mean removes most of the correlation.
+            if pairs == 0 || wider > 0.5 * n {
                 break;
             }
-            weight = weight_then;
+            weight = wider;
             let lagged = self.products(lag);
             correlated.add(&lagged, 2.0);
             time += lagged.trace() / zeroth.trace();
@@ -72,11 +72,13 @@ impl<const D: usize> Sequences<D> {
                 break;
             }
         }
-        // Deviations from the mean of the same values: n <δδ> falls short of the variance by that of the mean, at each lag.
+        // Deviations from the mean of the same values: n <δδ> falls short of the variance by that of the mean, at each
+        // lag.
         let ratio = correlated.trace() / zeroth.trace();
         let inflation = (ratio / (1.0 - weight / n + ratio / n)).max(1.0);
         let independent = zeroth.times(n / (n - inflation));
-        // Right for independent values, n - 1, as for whole jobs as units, their number - 1.
+        // Exact in two limits: n - 1 for independent values, and the number of jobs - 1 if the slips of a job are
+        // equal.
         let freedom = n / weight - 1.0;
         Estimate {
             count: count as u64,
@@ -103,8 +105,8 @@ impl<const D: usize> Sequences<D> {
     }
 }
 
-/// Whether a window is wide enough: Wolff's g (his Eq. 52) is negative. `time` is the integrated autocorrelation time within
-/// the window, 1/2 for independent values.
+/// Whether a window is wide enough: Wolff's g (his Eq. 52) is negative. `time` is the integrated autocorrelation time
+/// within the window, 1/2 for independent values.
 fn is_wide(lag: f64, time: f64, n: f64) -> bool {
     if time <= 0.5 {
         return true;
@@ -178,7 +180,7 @@ impl<const D: usize> Estimate<D> {
         self.spread += other.spread;
     }
 
-    /// The same with a covariance of the sum that is known: `variance` in every direction.
+    /// The same with a known covariance of the sum: `variance` in every direction.
     pub(super) fn with_known_variance(mut self, variance: f64) -> Self {
         (0..D).for_each(|index| self.independent.0[index][index] = variance);
         self.correlated = self.independent;
@@ -195,8 +197,8 @@ impl<const D: usize> Estimate<D> {
         (self.count > 0).then(|| self.total.map(|sum| sum / self.count as f64))
     }
 
-    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which is
-    /// mostly noise where values are few, makes no interval narrower.
+    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which
+    /// is mostly noise where values are few, makes no interval narrower.
     pub(super) fn variance(&self, direction: &[f64; D]) -> f64 {
         let squared = self.count as f64 * self.count as f64;
         self.independent.along(direction).max(self.correlated.along(direction)) / squared
@@ -213,8 +215,8 @@ impl<const D: usize> Estimate<D> {
         (self.count > 0).then(|| self.count as f64 / self.inflation())
     }
 
-    /// Degrees of freedom of the variance, after Satterthwaite, Biometrics Bull. 2, 110 (1946); `None` for fewer than two
-    /// values. Infinite where the variance is known or nil.
+    /// Degrees of freedom of the variance, after Satterthwaite, Biometrics Bull. 2, 110 (1946); `None` for fewer than
+    /// two values. Infinite where the variance is known or zero.
     pub(super) fn freedom(&self) -> Option<f64> {
         let trace = self.independent.trace();
         let freedom = if self.spread > 0.0 { trace * trace / self.spread } else { f64::INFINITY };
@@ -282,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn one_value_has_no_variance_and_equal_values_none_to_speak_of() {
+    fn one_value_and_equal_values_have_no_variance() {
         let one = Sequences::of([[[0.3]]]).estimate();
         assert_eq!((one.mean(), one.effective(), one.freedom()), (Some([0.3]), Some(1.0), None));
         let equal = Sequences::of([[[0.5]; 3]]).estimate();

@@ -238,7 +238,7 @@ pub(super) mod tests {
         assert!((0.3..0.9).contains(&eta), "{eta}");
         // φ + η cos φ at even spacing, by bisection.
         let phases = (0..400).map(|step| {
-            // One after the other by most of a turn, so that no slip tells the next.
+            // One after the other by most of a turn, so that no slip predicts the next.
             let load = TAU * (f64::from(step * 163 % 400) / 400.0 - 0.5);
             let (mut low, mut high) = (-2.0 * TAU, 2.0 * TAU);
             for _ in 0..80 {

@@ -5,7 +5,7 @@ use super::moments::Moments;
 use crate::model::{Parameters, Symbol};
 use crate::table::columns::{Selected, Selection, Table, columns};
 
-/// What the jobs table tells about a set.
+/// What the jobs table says about a set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SetJobs {
     /// Id of the set, 32 hexadecimal characters.

@@ -1,4 +1,4 @@
-//! Scaling on the command line: tables, JSON and figure tell the same.
+//! Scaling on the command line: tables, JSON and figure agree.
 
 use crate::program::{Folder, json};
 
@@ -17,11 +17,14 @@ fn scaling_writes_what_it_prints() {
     assert_eq!(table.counts("Ns"), [20, 20, 20, 20, 20, 20, 80, 80]);
     assert_eq!(table.reals("tolerance"), [1e-6, 1e-10].repeat(4));
     for column in ["cpu_per_slip", "cpu_per_simulated_second", "cpu_per_step", "steps_per_slip", "breaks_per_slip"] {
-        let told: Vec<f64> = sizes.iter().map(|row| row[column].as_f64().unwrap()).collect();
-        assert_eq!(told.len(), 8);
-        for (told, stored) in told.into_iter().zip(table.reals(column)) {
+        let printed_value: Vec<f64> = sizes.iter().map(|row| row[column].as_f64().unwrap()).collect();
+        assert_eq!(printed_value.len(), 8);
+        for (printed_value, stored) in printed_value.into_iter().zip(table.reals(column)) {
             // The parser of the JSON may be off by the last bit.
-            assert!(told > 0.0 && (told - stored).abs() <= 1e-15 * stored, "{column}: {told} {stored}");
+            assert!(
+                printed_value > 0.0 && (printed_value - stored).abs() <= 1e-15 * stored,
+                "{column}: {printed_value} {stored}"
+            );
         }
     }
     let exponents = folder.file("cost/scaling-exponents.parquet");

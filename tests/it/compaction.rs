@@ -177,14 +177,14 @@ fn read(folder: &Path) -> Option<u64> {
 }
 
 #[test]
-fn readers_get_every_row_once_or_are_told_while_tables_are_compacted_and_after_kills() {
+fn readers_get_every_row_once_or_an_error_while_tables_are_compacted_and_after_kills() {
     let folder = Folder::new();
     folder.write("cheap.toml", &sweep(SEEDS));
     folder.write("fewer.toml", &sweep(FEWER_SEEDS));
     folder.ends(0, "run fewer.toml --out r --no-reduce");
     folder.ends(0, "compact r");
     folder.ends(0, "run cheap.toml --out r --no-reduce");
-    let (mut complete, mut told, mut kills, mut finished) = (0_u64, 0_u64, 0, 0);
+    let (mut complete, mut refused, mut kills, mut finished) = (0_u64, 0_u64, 0, 0);
     let before = hash(&folder, "r");
     let kept = folder.contents("r");
     let begin = Instant::now();
@@ -202,7 +202,7 @@ fn readers_get_every_row_once_or_are_told_while_tables_are_compacted_and_after_k
                         assert_eq!(rows, JOBS, "{table}");
                         complete += 1;
                     }
-                    None => told += 1,
+                    None => refused += 1,
                 }
             }
             if let Some(exit) = child.try_wait().unwrap() {
@@ -239,7 +239,7 @@ fn readers_get_every_row_once_or_are_told_while_tables_are_compacted_and_after_k
             }
         }
     }
-    println!("{kills} kills, {complete} complete reads, {told} told that a file is gone");
+    println!("{kills} kills, {complete} complete reads, {refused} were refused since a file is gone");
     assert!(kills > 3 && complete > 100, "{kills} {complete}");
     folder.ends(0, "compact r");
     assert_eq!(folder.parts("r", "jobs").len(), 1);

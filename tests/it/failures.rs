@@ -1,4 +1,4 @@
-//! Jobs that fail, in the built program: they stop no other, are told with their reason, and can be had again alone.
+//! Jobs that fail, in the built program: they stop no other, are reported with their reason, and can be run again alone.
 
 use crate::program::{FAILING, Folder, json};
 use std::collections::BTreeMap;
@@ -58,7 +58,7 @@ fn a_failing_job_becomes_a_row_with_its_reason_and_the_others_go_on() {
 }
 
 #[test]
-fn a_poison_job_is_told_as_a_command_that_fails_in_the_same_way() {
+fn a_poison_job_is_reported_as_a_command_that_fails_in_the_same_way() {
     let folder = Folder::new();
     folder.write("poison.toml", POISON);
     let ended = folder.ends(1, "run poison.toml --out r");
@@ -71,13 +71,13 @@ fn a_poison_job_is_told_as_a_command_that_fails_in_the_same_way() {
     }
 
     let failures = json(&folder.ends(1, "status r --json").stdout)["failures"].as_array().unwrap().clone();
-    let told_by_status = folder.ends(1, "status r").stdout;
+    let status_report = folder.ends(1, "status r").stdout;
     assert_eq!(failures.len(), 6);
     for failure in &failures {
         let [job_id, reason, command] = ["job_id", "reason", "command"].map(|key| failure[key].as_str().unwrap());
         assert_eq!(reasons[job_id], reason);
-        for told in [&ended.stderr, &told_by_status] {
-            assert!(told.contains(job_id) && told.contains(&format!("alone: {command}\n")), "{told}");
+        for report in [&ended.stderr, &status_report] {
+            assert!(report.contains(job_id) && report.contains(&format!("alone: {command}\n")), "{report}");
         }
         let alone = folder.ends(1, command.strip_prefix("stickslip ").unwrap());
         assert_eq!(alone.stderr, format!("error: {reason}\n"), "{command}");
@@ -100,7 +100,7 @@ fn the_command_of_a_job_is_that_job() {
         for job in sweep.jobs() {
             let command = sweep.command(&job);
             let ended = folder.run(&format!("{} --json", command.strip_prefix("stickslip ").unwrap()));
-            // The poison among them tells no id.
+            // The poison among them names no id.
             if ended.code == Some(0) {
                 compared += 1;
                 let job_id = sweep.job_id(&job.parameters).to_string();

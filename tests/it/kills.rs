@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 const ROUNDS: &str = "STICKSLIP_KILL_ROUNDS";
 const ROUNDS_BY_DEFAULT: u64 = 12;
 /// Numbers of committed parts at which a kill must have come.
-const LEAST_STAGES: usize = 3;
+const MIN_STAGES: usize = 3;
 /// Ways to run the sweep; a killed one may be followed by any other.
 const WAYS: [&str; 5] = [
     "--threads 2",
@@ -48,7 +48,7 @@ fn a_run_killed_at_random_instants_loses_and_doubles_nothing_and_ends_with_the_s
     };
     let (mut killed, mut tries, mut parts_at_kills) = (0, 0, BTreeSet::new());
     // Until the kills have met the sweep at several stages, as most rounds do.
-    while killed < rounds || parts_at_kills.len() < LEAST_STAGES {
+    while killed < rounds || parts_at_kills.len() < MIN_STAGES {
         tries += 1;
         assert!(tries < 4 * rounds, "of {tries} runs {killed} were killed, with so many parts: {parts_at_kills:?}");
         let round = killed;

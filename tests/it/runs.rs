@@ -228,7 +228,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
             assert!(ended.stderr.contains(&format!("{name}: damaged")), "{command}: {}", ended.stderr);
             assert!(ended.stderr.contains("stickslip verify"), "{}", ended.stderr);
         }
-        // The way out that the message tells.
+        // The way out that the message gives.
         folder.ends(4, "verify r");
         folder.ends(0, "verify r --repair");
         let report = json(&folder.ends(0, "run many.toml --out r --no-reduce --json").stdout);

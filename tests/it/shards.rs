@@ -40,16 +40,16 @@ fn a_shard_without_parts_that_ends_first_has_nothing_to_reduce_and_says_so() {
 }
 
 #[test]
-fn what_is_there_is_reduced_and_what_is_missing_is_told() {
+fn what_is_there_is_reduced_and_what_is_missing_is_reported() {
     let folder = Folder::new();
     folder.write("many.toml", MANY);
     let first = folder.ends(0, "run many.toml --out r --shard 1/2");
     let missing = json(&folder.ends(0, "status r --json").stdout)["jobs_missing"].as_u64().unwrap();
     assert!(missing > 4096, "{missing}");
-    let told = format!("reduced what is there: {missing} jobs in 3 parts are missing");
-    assert!(first.stderr.contains(&told), "{}", first.stderr);
+    let note = format!("reduced what is there: {missing} jobs in 3 parts are missing");
+    assert!(first.stderr.contains(&note), "{}", first.stderr);
     let reduced = folder.ends(0, "reduce r --json");
-    assert!(reduced.stderr.contains(&told), "{}", reduced.stderr);
+    assert!(reduced.stderr.contains(&note), "{}", reduced.stderr);
     assert_eq!(json(&reduced.stdout)["jobs"].as_u64(), Some(28_000 - missing));
 }
 

@@ -122,7 +122,7 @@ fn trace_and_map_agree_with_each_other_and_with_the_slips() {
     assert!(times.iter().zip(0..).all(|(time, sample)| *time == f64::from(sample) * 5e-5));
     assert!(attached.iter().all(|fraction| (0.0..=1.0).contains(fraction)));
     assert_eq!(attached[0], 1.0);
-    // The drive begins at F_S = 0. A leap tells the driven solution, without the free motion that dies away on its way: here
+    // The drive begins at F_S = 0. A leap reports the driven solution, without the free motion that dies away on its way: here
     // that of the start, seen to be 0.02 N.
     assert!(forces[0].abs() < 0.05, "{} N", forces[0]);
     // A slip lets go of nearly all contacts at once.

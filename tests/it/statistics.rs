@@ -23,7 +23,7 @@ use stickslip::solver::{Limits, Observer, Segment, Solver, simulate};
 struct Intervals(Vec<f64>);
 
 impl Intervals {
-    /// Of so many slips for each seed, with the default solver.
+    /// Of this many slips for each seed, with the default solver.
     fn of(parameters: &Parameters, seeds: u64, slips: u64) -> Self {
         let recording = Recording { slips, ..Recording::default() };
         let of_seed = |seed| {

@@ -1,6 +1,5 @@
 """A small sweep, run by the built program: two parameter sets, extended once, so that every table has several files."""
 
-import importlib.util
 import os
 import subprocess
 from pathlib import Path
@@ -27,15 +26,6 @@ slips = 6
 discard = 2
 precursors = true
 """
-
-
-def script(name):
-    """The module scripts/NAME.py."""
-    path = ROOT / "scripts" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""pandas, polars and DuckDB read a table folder with no option, again and again, while a run writes it and after a kill."""
+"""pandas, polars and DuckDB read a table folder without options while a run writes it, and after a kill."""
 
 import subprocess
 import time
@@ -29,7 +29,9 @@ SLIPS_OF_A_JOB = 2
 READERS = {
     "pandas": lambda folder: (len(table := pd.read_parquet(folder)), table["job_id"].nunique()),
     "polars": lambda folder: (len(table := pl.read_parquet(folder)), table["job_id"].n_unique()),
-    "duckdb": lambda folder: duckdb.sql(f"select count(*), count(distinct job_id) from '{folder}/*.parquet'").fetchall()[0],
+    "duckdb": lambda folder: duckdb.sql(
+        f"select count(*), count(distinct job_id) from '{folder}/*.parquet'"
+    ).fetchall()[0],
 }
 SECONDS = 5
 
@@ -41,7 +43,9 @@ def writer(program, tmp_path):
     sweep.write_text(SWEEP)
     slips = results / "tables" / "slips"
     run = subprocess.Popen(
-        [program, "run", sweep, "--out", results, "--threads", "1"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [program, "run", sweep, "--out", results, "--threads", "1"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
     begin = time.monotonic()
     while not list(slips.glob("*")):

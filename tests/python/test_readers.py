@@ -1,4 +1,4 @@
-"""pandas, polars and DuckDB read the tables of a sweep without any option, and find the same as the program's reduction."""
+"""pandas, polars and DuckDB read the tables of a sweep without options, and find what the reduction found."""
 
 import shutil
 
@@ -8,34 +8,32 @@ import pandas as pd
 import polars as pl
 import pyarrow.parquet as pq
 import pytest
-
-from conftest import script
+import read_duckdb
+import read_pandas
+import read_polars
 
 JOBS, SLIPS = 2 * 5, 2 * 5 * 6
 
 # The same sums in another order: some hundred roundings of 1e-16.
 TOLERANCE = 1e-12
 
-
-def reader(name):
-    """The module scripts/read_NAME.py."""
-    return script(f"read_{name}")
+READERS = pytest.mark.parametrize("reader", [read_pandas, read_duckdb, read_polars])
 
 
 def as_pandas(table):
     """Any reader's table by set_id, null as NaN."""
     if isinstance(table, pl.DataFrame):
-        # By way of plain rows: polars' own conversion needs pyarrow's types.
+        # Through plain rows: polars' own conversion needs pyarrow's types.
         table = pd.DataFrame(table.to_dicts())
     elif isinstance(table, duckdb.DuckDBPyRelation):
         table = table.df()
     return (table if table.index.name == "set_id" else table.set_index("set_id")).astype(float)
 
 
-@pytest.mark.parametrize("name", ["pandas", "duckdb", "polars"])
-def test_a_reader_finds_what_the_reduction_found(results, name):
+@READERS
+def test_a_reader_finds_what_the_reduction_found(results, reader):
     reduced = pd.read_parquet(results / "reduced" / "sets.parquet").set_index("set_id")
-    found = as_pandas(reader(name).sets(results)).reindex(reduced.index)
+    found = as_pandas(reader.sets(results)).reindex(reduced.index)
     assert len(reduced) == 2
     for column in ("tau_mean", "locking_index"):
         np.testing.assert_allclose(found[column], reduced[column].astype(float), rtol=TOLERANCE, atol=0)
@@ -43,11 +41,11 @@ def test_a_reader_finds_what_the_reduction_found(results, name):
     assert reduced["locking_index"].isna().sum() == 1, "null exactly without modulation"
 
 
-@pytest.mark.parametrize("name", ["pandas", "duckdb", "polars"])
-def test_a_reader_finds_the_units(results, name):
+@READERS
+def test_a_reader_finds_the_units(results, reader):
     fields = pq.read_schema(next((results / "tables" / "slips").iterdir()))
     in_fields = {field.name: field.metadata[b"unit"].decode() for field in fields}
-    units = reader(name).units(results)
+    units = reader.units(results)
     assert units == in_fields
     assert (units["V0"], units["interval"], units["phase"], units["n"]) == ("m/s", "s", "rad", "")
 
@@ -95,4 +93,4 @@ def test_tables_join_on_the_job(results):
         join '{results}/tables/jobs/*.parquet' as jobs using (job_id) group by job_id, jobs.slips
     """).fetchall()
     assert len(rows) == JOBS
-    assert all(told == counted for told, counted in rows)
+    assert all(in_jobs == counted for in_jobs, counted in rows)

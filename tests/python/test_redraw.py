@@ -1,16 +1,11 @@
-"""The script that redraws figures shows all reduced data, on what the program wrote."""
+"""The example that redraws figures shows all reduced data, on what the program wrote."""
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pandas as pd
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "scripts"))
-
-import redraw  # noqa: E402
+import redraw
 
 
 def drawn(axes):
@@ -32,9 +27,10 @@ def test_every_slip_and_every_set_is_drawn(results):
     assert above.get_lines()[0].get_ydata() == pytest.approx(sets["tau_50"] / sets["T"])
 
 
-def test_the_script_writes_its_figures(results, tmp_path):
-    script = ROOT / "scripts" / "redraw.py"
-    done = subprocess.run([sys.executable, script, results], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+def test_the_example_writes_its_figures(results, tmp_path):
+    done = subprocess.run(
+        [sys.executable, redraw.__file__, results], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["phase-eta.png", "staircase.png"]
     for name in done.stdout.split():

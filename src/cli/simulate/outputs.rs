@@ -13,7 +13,7 @@ use stickslip::table::file::{Footer, TableWriter};
 use stickslip::table::storage::Disk;
 
 /// More samples than this, of 24 bytes each, are a mistake.
-const MOST_SAMPLES: f64 = 1e8;
+const MAX_SAMPLES: f64 = 1e8;
 
 /// Refuses what could not be written, before anything runs.
 pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
@@ -39,9 +39,9 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     let cells = if maps { parameters.blocks } else { usize::from(traces) };
     let slips = recording.slips as f64 + recording.discard as f64;
     let time = (slips * predicted_interval(parameters)).min(longest);
-    if time / sample * cells as f64 > MOST_SAMPLES {
+    if time / sample * cells as f64 > MAX_SAMPLES {
         let problem =
-            format!("--sample {sample}: more than {MOST_SAMPLES:e} samples in about {time:.3} s; take a longer one");
+            format!("--sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one");
         return Err(UsageError(problem).into());
     }
     let is_picture = |path: &&PathBuf| matches!(extension(path), Some("svg" | "png"));
@@ -139,7 +139,7 @@ fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     write(&draft)
         .and_then(|()| Ok(std::fs::rename(&draft, path)?))
         .inspect_err(|_| {
-            // What remains of a draft is of no use; the first error is the one to tell.
+            // What remains of a draft is of no use; the first error is the one to report.
             let _ = std::fs::remove_file(&draft);
         })
         .with_context(|| format!("cannot write {}", path.display()))

@@ -1,10 +1,10 @@
 """Redraws two figures of a sweep from its reduced data, as a start for your own.
 
-    .venv/bin/python scripts/redraw.py results/fig3
+    .venv/bin/python python/examples/redraw.py results/fig3
 
-Writes into the folder where it runs: phase-eta.png, phases against eta with the back-bone (Fig. 3e), from
-reduced/points.parquet and reduced/backbone.parquet; staircase.png, intervals in periods against the period, a colour for
-each amplitude, from reduced/sets.parquet.
+Writes two files into the current folder: phase-eta.png, phases against eta with the back-bone (Fig. 3e), from
+reduced/points.parquet and reduced/backbone.parquet; staircase.png, intervals in periods against the period, a colour
+for each amplitude, from reduced/sets.parquet.
 """
 
 import sys

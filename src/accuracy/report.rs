@@ -1,4 +1,4 @@
-//! What a study leaves behind: tables as Parquet, everything as JSON, and the figures, put in place together.
+//! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures, put in place together.
 
 use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
@@ -9,8 +9,8 @@ use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, w
 use crate::model::Symbol;
 use crate::results::commit::{Commit, create_folder};
 use crate::table::arrow;
-use crate::table::columns::{Row, Table};
-use crate::table::file::{Footer, PROGRAM, TableWriter};
+use crate::table::columns::Table;
+use crate::table::file::{DatasetError, Footer, PROGRAM, TableWriter};
 use crate::table::storage::Storage;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -18,102 +18,118 @@ use std::path::{Path, PathBuf};
 /// Version of the JSON.
 const FORMAT: u32 = 3;
 
-/// The findings of a study as JSON.
-#[must_use]
-pub fn as_json(study: &Study, findings: &Findings) -> Value {
-    document(json!({
+/// The findings of a study, with a figure for each velocity.
+///
+/// # Errors
+/// When a figure cannot be drawn.
+pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>, AccuracyError> {
+    let settings = json!({
         "seeds": study.seeds,
         "first_drive_multiple": study.first_drive_multiple,
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
-        "methods": rows(&findings.methods),
-        "distances": rows(&findings.distances),
-    }))
-}
-
-/// Scaling as JSON.
-#[must_use]
-pub fn scaling_json(findings: &ScalingFindings) -> Value {
-    document(json!({
-        "sizes": rows(&findings.sizes),
-        "exponents": rows(&findings.exponents),
-    }))
-}
-
-/// The stability table as JSON.
-#[must_use]
-pub fn stability_json(cases: &[Stability]) -> Value {
-    document(json!({ "cases": rows(cases) }))
-}
-
-/// Adds what every document begins with.
-fn document(mut fields: Value) -> Value {
-    fields["format"] = FORMAT.into();
-    fields["program"] = PROGRAM.into();
-    fields["processor"] = cpu::processor().into();
-    fields
-}
-
-fn rows<R: Row>(rows: &[R]) -> Value {
-    rows.iter().map(arrow::json).collect()
-}
-
-/// Writes tables, JSON and figures into a folder, over those of an earlier study; returns the files.
-///
-/// # Errors
-/// When a file cannot be written.
-pub fn write(
-    storage: &dyn Storage,
-    folder: &Path,
-    study: &Study,
-    findings: &Findings,
-) -> Result<Vec<PathBuf>, AccuracyError> {
-    let mut output = Output::begin(storage, folder)?;
-    output.table(&findings.methods)?;
-    output.table(&findings.distances)?;
-    output.json("accuracy.json", &as_json(study, findings))?;
+    });
+    let mut report =
+        Report::new("accuracy", settings).table("methods", &findings.methods).table("distances", &findings.distances);
     for &velocity in &study.velocities {
-        output.picture(&format!("work-precision-V0-{velocity:e}"), &figure(velocity, findings)?)?;
+        report.pictures.push((format!("work-precision-V0-{velocity:e}"), work_precision_figure(velocity, findings)?));
     }
-    output.publish()
+    Ok(report)
 }
 
-/// Writes tables, JSON and figure of a scaling into a folder; returns the files.
+/// A scaling, with its figure.
 ///
 /// # Errors
-/// When a file cannot be written.
-pub fn write_scaling(
-    storage: &dyn Storage,
-    folder: &Path,
-    findings: &ScalingFindings,
-) -> Result<Vec<PathBuf>, AccuracyError> {
-    let mut output = Output::begin(storage, folder)?;
-    output.table(&findings.sizes)?;
-    output.table(&findings.exponents)?;
-    output.json("scaling.json", &scaling_json(findings))?;
-    output.picture("scaling", &scaling_figure(findings)?)?;
-    output.publish()
+/// When the figure cannot be drawn.
+pub fn scaling_report(findings: &ScalingFindings) -> Result<Report<'_>, AccuracyError> {
+    let mut report =
+        Report::new("scaling", json!({})).table("sizes", &findings.sizes).table("exponents", &findings.exponents);
+    report.pictures.push(("scaling".to_owned(), scaling_figure(findings)?));
+    Ok(report)
 }
 
-/// Writes the stability table into a folder; returns the files.
-///
-/// # Errors
-/// When a file cannot be written.
-pub fn write_stability(
-    storage: &dyn Storage,
-    folder: &Path,
-    rows: &[Stability],
-) -> Result<Vec<PathBuf>, AccuracyError> {
-    let mut output = Output::begin(storage, folder)?;
-    output.table(rows)?;
-    output.json("hard-cases.json", &stability_json(rows))?;
-    output.publish()
+/// The hard cases.
+#[must_use]
+pub fn stability_report(cases: &[Stability]) -> Report<'_> {
+    Report::new("hard-cases", json!({})).table("cases", cases)
 }
 
-/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those of
-/// the reference, in units of the distance that chance alone stays under.
-fn figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
+/// Writes a table into a file.
+type TableFile<'a> = Box<dyn Fn(&dyn Storage, &Path, &Footer) -> Result<(), DatasetError> + 'a>;
+
+/// Tables, JSON and figures of one command.
+pub struct Report<'a> {
+    /// Name of the file of the JSON.
+    name: &'static str,
+    json: Value,
+    /// Names and files.
+    tables: Vec<(&'static str, TableFile<'a>)>,
+    pictures: Vec<(String, Picture)>,
+}
+
+impl<'a> Report<'a> {
+    /// A report with these fields in its JSON, and those that every report has.
+    fn new(name: &'static str, mut json: Value) -> Self {
+        json["format"] = FORMAT.into();
+        json["program"] = PROGRAM.into();
+        json["processor"] = cpu::processor().into();
+        Self { name, json, tables: Vec::new(), pictures: Vec::new() }
+    }
+
+    /// Adds a table, whose rows become a field of the JSON, too.
+    fn table<R: Table>(mut self, field: &str, rows: &'a [R]) -> Self {
+        self.json[field] = rows.iter().map(arrow::json).collect();
+        let write = move |storage: &dyn Storage, file: &Path, footer: &Footer| {
+            let mut writer = TableWriter::create(storage, file, footer)?;
+            rows.iter().try_for_each(|row| writer.push(row))?;
+            writer.finish()
+        };
+        self.tables.push((R::NAME, Box::new(write)));
+        self
+    }
+
+    /// Settings and all rows.
+    #[must_use]
+    pub fn json(&self) -> &Value {
+        &self.json
+    }
+
+    /// Writes everything into a folder, over what an earlier command left there; returns the files.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
+        create_folder(storage, folder)?;
+        let staging = folder.join("staging");
+        let mut commit = Commit::begin(storage, &staging)?;
+        let mut files = Vec::new();
+        let footer = Footer::default().with("processor", &cpu::processor());
+        for (name, write) in &self.tables {
+            let file = folder.join(format!("{name}.parquet"));
+            write(storage, &commit.stage(&file), &footer)?;
+            files.push(file);
+        }
+        let mut documents = vec![(format!("{}.json", self.name), self.json.to_string().into_bytes())];
+        for (name, picture) in &self.pictures {
+            documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
+            documents.push((format!("{name}.png"), picture.png()?));
+        }
+        for (name, bytes) in documents {
+            let file = folder.join(name);
+            commit.stage_bytes(&file, &bytes)?;
+            files.push(file);
+        }
+        commit.publish()?;
+        // Empty now; should it not go, it does no harm.
+        let _ = std::fs::remove_dir(staging);
+        Ok(files)
+    }
+}
+
+/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those
+/// of the reference, in units of the distance that chance alone stays under.
+fn work_precision_figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s), * extrapolated from that per step";
     let breaks = lines(&findings.methods, velocity, |row| {
         let (error, largest) = (row.break_times.median?, row.break_times.largest?);
@@ -172,63 +188,6 @@ fn scaling_figure(findings: &ScalingFindings) -> Result<Picture, AccuracyError> 
     Ok(scaling(&columns)?)
 }
 
-fn staging(folder: &Path) -> PathBuf {
-    folder.join("staging")
-}
-
-/// Files on their way into a folder.
-struct Output<'a> {
-    storage: &'a dyn Storage,
-    folder: &'a Path,
-    commit: Commit<'a>,
-    files: Vec<PathBuf>,
-}
-
-impl<'a> Output<'a> {
-    fn begin(storage: &'a dyn Storage, folder: &'a Path) -> Result<Self, AccuracyError> {
-        create_folder(storage, folder)?;
-        let commit = Commit::begin(storage, &staging(folder))?;
-        Ok(Self { storage, folder, commit, files: Vec::new() })
-    }
-
-    fn place(&mut self, name: &str) -> PathBuf {
-        let file = self.folder.join(name);
-        self.files.push(file.clone());
-        file
-    }
-
-    fn table<R: Table>(&mut self, rows: &[R]) -> Result<(), AccuracyError> {
-        let footer = Footer::default().with("processor", &cpu::processor());
-        let file = self.place(&format!("{}.parquet", R::NAME));
-        let mut writer = TableWriter::create(self.storage, &self.commit.stage(&file), &footer)?;
-        for row in rows {
-            writer.push(row)?;
-        }
-        Ok(writer.finish()?)
-    }
-
-    fn bytes(&mut self, name: &str, bytes: &[u8]) -> Result<(), AccuracyError> {
-        let file = self.place(name);
-        Ok(self.commit.stage_bytes(&file, bytes)?)
-    }
-
-    fn json(&mut self, name: &str, value: &Value) -> Result<(), AccuracyError> {
-        self.bytes(name, value.to_string().as_bytes())
-    }
-
-    fn picture(&mut self, name: &str, picture: &Picture) -> Result<(), AccuracyError> {
-        self.bytes(&format!("{name}.svg"), picture.svg().as_bytes())?;
-        self.bytes(&format!("{name}.png"), &picture.png()?)
-    }
-
-    fn publish(self) -> Result<Vec<PathBuf>, AccuracyError> {
-        self.commit.publish()?;
-        // Empty now; should it not go, it does no harm.
-        let _ = std::fs::remove_dir(staging(self.folder));
-        Ok(self.files)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::breaks::BreakErrors;
@@ -283,11 +242,24 @@ mod tests {
         Findings { methods: vec![method, untested], distances: vec![distance] }
     }
 
+    fn sizes_of_two() -> Vec<SizeRow> {
+        let row = |blocks, tolerance| SizeRow {
+            parameters: Selected::new(Parameters { blocks, ..Parameters::default() }),
+            tolerance,
+            cost: cpu::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cpu::Cost::default() },
+            leaps_per_slip: 100.0,
+            breaks_per_slip: 3e3,
+            reattachments_per_slip: 3e3,
+        };
+        vec![row(70, 1e-10), row(70, 1e-6), row(140, 1e-10), row(140, 1e-6)]
+    }
+
     #[test]
     fn a_study_is_written_as_tables_json_and_figures() {
         let folder = tempfile::tempdir().unwrap();
         let study = Study { velocities: vec![1e-4], ..Study::quick() };
-        let files = write(&Disk, folder.path(), &study, &findings()).unwrap();
+        let findings = findings();
+        let files = study_report(&study, &findings).unwrap().write(&Disk, folder.path()).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(
             names,
@@ -313,14 +285,19 @@ mod tests {
     #[test]
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/results.md");
-        let documents = [
-            ("accuracy", as_json(&Study::quick(), &findings())),
-            ("accuracy --scaling", scaling_json(&ScalingFindings::default())),
-            ("accuracy --hard-cases", stability_json(&[])),
+        let (study, findings, scaling) = (
+            Study { velocities: vec![1e-4], ..Study::quick() },
+            findings(),
+            ScalingFindings { sizes: sizes_of_two(), ..ScalingFindings::default() },
+        );
+        let reports = [
+            ("accuracy", study_report(&study, &findings).unwrap()),
+            ("accuracy --scaling", scaling_report(&scaling).unwrap()),
+            ("accuracy --hard-cases", stability_report(&[])),
         ];
-        for (command, document) in documents {
+        for (command, report) in reports {
             let row = page.lines().find(|line| line.starts_with(&format!("| `{command}` |"))).unwrap();
-            for field in document.as_object().unwrap().keys() {
+            for field in report.json().as_object().unwrap().keys() {
                 assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
             }
         }
@@ -328,15 +305,7 @@ mod tests {
 
     #[test]
     fn a_scaling_is_drawn_whatever_the_order_of_its_rows_and_not_without_any() {
-        let row = |blocks, tolerance| SizeRow {
-            parameters: Selected::new(Parameters { blocks, ..Parameters::default() }),
-            tolerance,
-            cost: cpu::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cpu::Cost::default() },
-            leaps_per_slip: 100.0,
-            breaks_per_slip: 3e3,
-            reattachments_per_slip: 3e3,
-        };
-        let sizes = vec![row(70, 1e-10), row(70, 1e-6), row(140, 1e-10), row(140, 1e-6)];
+        let sizes = sizes_of_two();
         let svg = scaling_figure(&ScalingFindings { sizes, exponents: Vec::new() }).unwrap().svg();
         for name in ["tolerance 1e-6", "tolerance 1e-10", "steps, 1e-6", "steps, 1e-10", "breaks"] {
             assert_eq!(svg.matches(&format!(">{name}<")).count(), 1, "{name}");

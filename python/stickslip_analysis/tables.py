@@ -1,0 +1,58 @@
+"""Tables, reduced data and footers of what stickslip writes, as pandas frames. Columns are in docs/tables.md."""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pandas
+import pyarrow.parquet
+
+
+class MissingResult(Exception):
+    """A result that is not there, with the command that makes it."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The results directory of one sweep. Each table is read once; do not change the frames in place."""
+
+    directory: Path
+
+    @cache
+    def table(self, name: str) -> pandas.DataFrame:
+        """`slips`, `precursors` or `jobs`."""
+        return read(self.directory / "tables" / name, f"stickslip run sweeps/{self.directory.name}.toml")
+
+    @cache
+    def reduced(self, name: str) -> pandas.DataFrame:
+        """Reduced data, such as `sets`."""
+        return read(self.directory / "reduced" / f"{name}.parquet", f"stickslip reduce {self.directory}")
+
+    @cache
+    def slips(self) -> pandas.DataFrame:
+        """The slips with all parameters of their jobs, and `frequency` = 1/T in Hz and `periods` = interval/T."""
+        jobs, slips = self.table("jobs"), self.table("slips")
+        slips = slips.merge(jobs[["job_id", *jobs.columns.difference(slips.columns)]], on="job_id")
+        return slips.assign(frequency=(1 / slips["T"]).round(6), periods=slips["interval"] / slips["T"])
+
+
+def read(path: Path, remedy: str) -> pandas.DataFrame:
+    """A file, or all files of a folder; `remedy` is the command that makes them."""
+    if not path.exists():
+        raise MissingResult(f"{path} is missing: run `{remedy}`")
+    return pandas.read_parquet(path)
+
+
+def parameters(file: Path) -> dict:
+    """The parameters in the footer of what `stickslip simulate` wrote, by symbol; empty if there are none."""
+    footer = pyarrow.parquet.read_metadata(file).metadata or {}
+    return json.loads(footer.get(b"parameters", b"{}"))
+
+
+def select(frame: pandas.DataFrame, **values: float | str) -> pandas.DataFrame:
+    """The rows with these values in columns of these names; numbers agree to a part in a million."""
+    for column, value in values.items():
+        same = frame[column] == value if isinstance(value, str) else (frame[column] - value).abs() <= 1e-6 * abs(value)
+        frame = frame[same]
+    return frame

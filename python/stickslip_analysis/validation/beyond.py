@@ -1,0 +1,243 @@
+"""Questions that the paper leaves open: each a sweep, a figure and a finding, with its statistical error."""
+
+import math
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+import numpy
+import pandas
+
+from ..statistics import difference, jackknife, mean, near_whole, resultant_length, share
+from ..tables import Sweep, select
+from .document import Section
+from .intervals import SIZES, count_by_slip, of_same_jobs, without_modulation
+
+#: Locking index from which a set is called strongly locked here.
+STRONG = 0.8
+#: Periods in s up to which the locking index shows locking: near T = τ it is large for any narrow distribution of τ.
+SHORT = 0.04
+#: Frequencies in Hz of the sweeps of size, contacts and disorder.
+FREQUENCIES = (29, 58, 116)
+#: η from which the window of the phase holds φ_min (docs/model.md).
+WHOLE_WINDOW = 1.014
+
+
+def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
+    """Whether intervals follow a period that changes slowly, and whether they remember where it came from."""
+    title = f"Drag: the period changed slowly within one run, Δ = {amplitude}"
+    section = Section(title, f"`sweeps/{sweep}.toml`", sweep)
+    slips = Sweep(results / sweep).slips()
+    slips = slips[slips["interval"].notna() & (slips["onset"] < 2 * slips["ramp_time"])]
+    edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 13)
+    slips = slips.assign(is_up=slips["onset"] < slips["ramp_time"], bin=numpy.digitize(slips["T_onset"], edges[1:-1]))
+    near = share(near_whole(slips["interval"] / slips["T_onset"]), slips["seed"])
+    section.check(
+        "T changed during a run drags τ with it (page 3)",
+        "more than 0.5 of the intervals within 0.1 T of nT, while T changes",
+        near.text(),
+        near.low > 0.5,
+    )
+    differences = []
+    for (low, high), (_, mine) in zip(pairwise(edges), slips.groupby("bin"), strict=True):
+        up, down = mine[mine["is_up"]], mine[~mine["is_up"]]
+        differences.append(difference(down, up, "n"))
+        section.rows.append(
+            {
+                "T (ms)": f"{1e3 * low:.1f} to {1e3 * high:.1f}",
+                "median τ (ms), T up": f"{1e3 * up['interval'].median():.1f}",
+                "median τ (ms), T down": f"{1e3 * down['interval'].median():.1f}",
+                "mean n, T up": f"{up['n'].mean():.2f}",
+                "mean n, T down": f"{down['n'].mean():.2f}",
+                "n down − n up, paired by seed": differences[-1].text(2),
+            }
+        )
+    means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
+    whole = mean((means[False] - means[True]).groupby("seed").mean())
+    section.remark(
+        "Hysteresis: n while T goes down differs from n while T goes up, beyond its 95 % interval,"
+        f" in {sum(one.excludes_zero() for one in differences)} of {len(differences)} bins of T"
+        f" (by chance about {0.05 * len(differences):.1f}), and by {whole.text(3)} averaged over the bins.",
+        "So where T came from leaves a trace, of a small part of a period."
+        if whole.excludes_zero()
+        else "No memory of where T came from is seen: n is drawn again at each slip, and follows T alike up and down.",
+    )
+    return section
+
+
+DRAGS = (
+    partial(drag, sweep="drag", amplitude="1 µm"),
+    partial(drag, sweep="drag-strong", amplitude="3 µm"),
+)
+
+
+def locking_map(results: Path) -> Section:
+    """Where slips lock, over period and amplitude."""
+    section = Section("Arnold tongues: locking over period and amplitude", "`sweeps/locking-map.toml`", "locking-map")
+    sets = Sweep(results / "locking-map").reduced("sets")
+    for low, high in pairwise((0, 0.5, 1, 1.5, 2, 3, 5, 10, 20)):
+        mine = sets[(sets["eta"] >= low) & (sets["eta"] < high)]
+        if len(mine) < 2:
+            continue
+        short = mine[mine["T"] < SHORT]["locking_index"]
+        section.rows.append(
+            {
+                "η": f"{low:g} to {high:g}",
+                "sets": len(mine),
+                "share with locked phases": mean(mine["locked"].astype(float)).text(2),
+                f"mean locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text() if len(short) > 1 else "",
+                f"share of these above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
+            }
+        )
+    count = sets["intervals"].mean()
+    section.remark(
+        f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
+        f"A set without any locking has an index of {math.sqrt(math.pi / 4 / count):.2f} on average, as it has"
+        f" {count:.0f} intervals.",
+    )
+    # How well a tongue locks may depend on where τ without modulation lies between two multiples of T.
+    natural = without_modulation(Sweep(results / "fig2").slips())["interval"].mean()
+    tongues = sets[(sets["eta"] > 1) & (sets["eta"] < 3)]
+    beyond = (natural / tongues["T"]) % 1
+    quarters = [
+        mean(tongues["locking_index"][(beyond >= low) & (beyond < high)])
+        for low, high in pairwise((0, 0.25, 0.5, 0.75, 1))
+    ]
+    matters = max(one.low for one in quarters) > min(one.high for one in quarters)
+    section.remark(
+        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the interval without modulation,"
+        f" τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn"
+        f" the mean locking index is {', '.join(one.text(2) for one in quarters)}."
+    )
+    return section
+
+
+def stretches(holds: pandas.Series) -> str:
+    """The periods at which something holds, in ms: each run of neighbours by its ends. The index is in s."""
+    runs = (holds != holds.shift()).cumsum()
+    found = [run.index for _, run in holds.groupby(runs) if run.iloc[0]]
+    ends = [[f"{1e3 * end:.0f}" for end in (run[0], run[-1])] for run in found]
+    return "; ".join(first if first == last else f"{first} to {last}" for first, last in ends) or "none"
+
+
+def median_periods(slips: pandas.DataFrame) -> tuple[pandas.Series, pandas.Series]:
+    """Median of τ/T by T, and whether it is on a step: within 0.05 of a whole number."""
+    medians = slips.groupby("T")["periods"].median()
+    return medians, (medians - medians.round()).abs() < 0.05
+
+
+def staircase(results: Path) -> Section:
+    """How wide the steps of τ = nT are."""
+    section = Section(
+        "Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase"
+    )
+    slips = Sweep(results / "staircase").slips().dropna(subset="interval")
+    shares, rises = {}, []
+    for amplitude, mine in slips.groupby("Delta"):
+        medians, on_step = median_periods(mine)
+        shares[amplitude] = jackknife(lambda rows: median_periods(rows)[1].mean(), mine)
+        rises.append(f"{(medians[on_step].round().diff() > 0).sum()} times at {1e6 * amplitude:.1f} µm")
+        stated = "share of the periods T whose median τ is within 0.05 T of nT"
+        steps = {f"n = {n}: T (ms)": stretches(on_step & (medians.round() == n)) for n in range(1, 7)}
+        section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", stated: shares[amplitude].text(2)} | steps)
+    weakest, strongest = min(shares), max(shares)
+    widens = shares[strongest].low > shares[weakest].high
+    section.remark(
+        "By chance the share would be 0.1.",
+        f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude:"
+        f" {shares[weakest].text(2)} of the periods lie on one at {1e6 * weakest:.1f} µm,"
+        f" {shares[strongest].text(2)} at {1e6 * strongest:.1f} µm.",
+        f"As T grows n should fall from step to step; it rises again {', '.join(rises)}, over {slips['T'].nunique()}"
+        " periods: steps of neighbouring n overlap, since each slip draws its n.",
+        "Only steps of whole n are looked for; a median halfway between two means that slips take both in turn or at"
+        " random.",
+    )
+    return section
+
+
+def dependence(results: Path, *, sweep: str, column: str, what: str, digits: int = 0) -> Section:
+    """How interval and locking depend on a parameter of the interface."""
+    section = Section(f"Locking against {what}", f"`sweeps/{sweep}.toml`, Δ = 1 µm", sweep)
+    slips = Sweep(results / sweep).slips()
+    slips = slips.assign(disorder=slips["dfs"] / slips["fs"])
+    weakest = {}
+    for value, mine in slips.groupby(column):
+        still = select(mine, Delta=0.0)
+        tau = jackknife(lambda rows: 1e3 * rows["interval"].mean(), still)
+        spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), still)
+        lengths = {
+            f"resultant length of φ at {frequency} Hz": jackknife(
+                lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency)
+            )
+            for frequency in FREQUENCIES
+        }
+        shown = f"{value:.{digits}f}"
+        weakest[shown] = min(lengths.values(), key=lambda length: length.value)
+        section.rows.append(
+            {what: shown, "τ without modulation (ms)": tau.text(1), "its s.d. over mean": spread.text(2)}
+            | {head: length.text(2) for head, length in lengths.items()}
+        )
+    locked = [shown for shown, length in weakest.items() if length.low > 0.5]
+    where = "all of these values" if len(locked) == len(weakest) else ", ".join(locked) or "none of these values"
+    section.remark(
+        "The phases are locked at all three frequencies (resultant length above 0.5 beyond its 95 % interval)"
+        f" at {where}.",
+        "At its weakest the resultant length is "
+        + ", ".join(f"{length.text(2)} at {shown}" for shown, length in weakest.items())
+        + ".",
+    )
+    return section
+
+
+DEPENDENCES = (
+    partial(dependence, sweep="size", column="N", what="the number of blocks N"),
+    partial(dependence, sweep="contacts", column="Ns", what="the number of contacts per block N_s"),
+    partial(dependence, sweep="disorder", column="disorder", what="the disorder of the thresholds Δf_s/f_s", digits=3),
+)
+
+
+def choices(results: Path) -> Section:
+    """What would change if the model's choices were others."""
+    source = "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`"
+    section = Section("What the model's choices change", source, "choices")
+    sweep = Sweep(results / "choices")
+    slips = sweep.slips()
+    for name, values in (
+        ("no modulation", {"Delta": 0.0}),
+        ("29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
+        ("58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
+        ("Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
+    ):
+        tension, magnitude = (select(slips, break_on=rule, **values) for rule in ("tension", "magnitude"))
+        change = difference(tension, magnitude, "interval").scaled(1e3)
+        pairs = tension.merge(magnitude, on=["seed", "slip"], suffixes=("", "_other"))
+        same = (pairs["interval"] == pairs["interval_other"]).mean()
+        section.item(
+            f'`break_on = "tension"` instead of `"magnitude"`, {name}: mean τ differs by {change.text(3)} ms, paired'
+            " by seed;"
+            f" {100 * same:.0f} % of {len(pairs)} intervals are the same to the last bit."
+        )
+    still = select(slips, Delta=0.0, break_on="magnitude")
+    precursors = of_same_jobs(sweep.table("precursors"), still)
+    counts = (f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
+    section.item(
+        "`precursor_size`: precursors per slip without modulation, by the minimum number of breaks:"
+        f" {', '.join(counts)}."
+    )
+    phases = Sweep(results / "fig3").slips()
+    phases = phases[phases["eta"] > WHOLE_WINDOW]
+    past = phases["phase"] - numpy.arcsin(1 / phases["eta"])
+    section.item(
+        f"Window of the phase: {100 * (past > 0).mean():.2f} % of the slips of `fig3` at η > {WHOLE_WINDOW} lie past"
+        f" Φ_max, by at most {past.max():.3f} rad; the window reaches 0.5 rad past it."
+    )
+    startup = Sweep(results / "startup").reduced("startup")
+    p = startup[["interval_holm_p", "drop_holm_p"]].min(axis=1)
+    needed = startup["slip"][p < 0.05].max() + 1 if (p < 0.05).any() else 0
+    section.item(
+        f"Start-up (`discard`; F_S(0) = 0): over {startup['set_id'].nunique()} sets of {startup['jobs'].max()} seeds,"
+        " intervals and stress drops differ from those of slips 20 on (Mann-Whitney, Holm's correction, 5 %)"
+        f" in the first {needed} slips; from then on the smallest corrected p is"
+        f" {p[startup['slip'] >= needed].min():.2f}."
+    )
+    return section

@@ -1,0 +1,245 @@
+"""Statements 1 to 4 and 9: intervals between slips, precursors and stress drops.
+
+A criterion is the paper's where it gives a number, otherwise a choice.
+"""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy
+import pandas
+from scipy import signal, stats
+
+from ..statistics import difference, jackknife, locking_index, near_whole, share
+from ..tables import Sweep, select
+from .document import Section
+
+#: Minimum break counts at which precursors are counted; 20 is one block's worth.
+SIZES = (20, 30, 40, 60, 100)
+#: Time in s between the two peaks of the distribution of intervals without modulation.
+BETWEEN_PEAKS = 0.135
+
+
+def without_modulation(slips: pandas.DataFrame) -> pandas.DataFrame:
+    """Slips of disordered contacts without modulation."""
+    return select(slips[slips["dfs"] > 0], Delta=0.0)
+
+
+def of_same_jobs(rows: pandas.DataFrame, slips: pandas.DataFrame) -> pandas.DataFrame:
+    """The rows of the jobs that some slips are of."""
+    return rows[rows["job_id"].isin(slips["job_id"])]
+
+
+def peaks(intervals: pandas.Series) -> list[float]:
+    """Modes of a distribution of intervals, in s.
+
+    They are the maxima of a kernel density that rise above the valley beside them by 2 % of the highest. The width is
+    twice Silverman's, with the scale of the quartiles.
+    """
+    intervals = numpy.asarray(intervals.dropna())
+    quartiles = numpy.subtract(*numpy.quantile(intervals, [0.75, 0.25])) / 1.349
+    width = 0.9 * min(intervals.std(), quartiles) * len(intervals) ** -0.2
+    grid = numpy.linspace(intervals.min() - 3 * width, intervals.max() + 3 * width, 2000)
+    # Half the width in the tails would show single slips; twice the width in the core hides nothing that is 5 ms apart.
+    density = stats.gaussian_kde(intervals, bw_method=2 * width / intervals.std())(grid)
+    found, _ = signal.find_peaks(density, prominence=0.02 * density.max())
+    return list(grid[found])
+
+
+def count_by_slip(slips: pandas.DataFrame, precursors: pandas.DataFrame, size: int) -> pandas.Series:
+    """Precursors of at least `size` breaks before each slip."""
+    large = precursors[precursors["size"] >= size].groupby(["job_id", "slip"]).size()
+    return large.reindex(slips.set_index(["job_id", "slip"]).index, fill_value=0)
+
+
+def stick_slip(results: Path) -> Section:
+    """Statement 1."""
+    section = Section("1. Stick-slip is regular but stochastic", "`sweeps/fig2.toml`, Δ = 0 (Fig. 1d, 2d)", "fig2")
+    sweep = Sweep(results / "fig2")
+    slips = without_modulation(sweep.slips())
+    spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), slips)
+    section.check(
+        "intervals are stochastic",
+        "s.d. over mean from 0.05 to 0.3",
+        spread.text(),
+        spread.low > 0.05 and spread.high < 0.3,
+    )
+    modes = peaks(slips["interval"])
+    later = share(slips["interval"] >= BETWEEN_PEAKS, slips["seed"])
+    section.check(
+        "their distribution has two peaks",
+        "two modes",
+        f"modes at {', '.join(f'{mode:.3f}' for mode in modes)} s; share of the later peak {later.text()}",
+        len(modes) == 2,
+    )
+    first, second = slips[slips["interval"] < BETWEEN_PEAKS], slips[slips["interval"] >= BETWEEN_PEAKS]
+    more = difference(second, first, "precursors")
+    section.check(
+        "the peaks differ in the number of precursors",
+        "interval of the difference excludes 0",
+        f"{first['precursors'].mean():.2f} in the first, {more.text(2)} more in the second",
+        more.low > 0,
+    )
+    precursors = of_same_jobs(sweep.table("precursors"), slips)
+    counts = {size: count_by_slip(slips, precursors, size) for size in SIZES}
+    two_or_three = {size: count.isin([2, 3]).mean() for size, count in counts.items()}
+    best = max(two_or_three, key=two_or_three.get)
+    section.check(
+        "mainly two or three precursors per slip",
+        "at some minimum size, more than half of the slips have two or three",
+        f"{two_or_three[best]:.2f} of the slips at {best} breaks or more, mean {counts[best].mean():.2f}",
+        two_or_three[best] > 0.5,
+    )
+    drops = share(slips["drops_before"].isin([2, 3]), slips["seed"])
+    section.check(
+        "... as drops of F_S, what the experiment sees (Fig. 1d)",
+        "more than half of the slips have two or three drops of at least 0.5 N, 0.1 % of the peak force",
+        f"{drops.text(2)}, mean {slips['drops_before'].mean():.2f}; the largest before a slip is"
+        f" {slips['largest_drop_before'].median():.1f} N in the median, a slip {slips['drop'].median():.0f} N",
+        drops.low > 0.5,
+    )
+    counted = {f"precursors of at least {size} breaks": count for size, count in counts.items()}
+    counted["drops of F_S of at least 0.5 N"] = slips["drops_before"]
+    for what, count in counted.items():
+        shares = {f"share of slips with {number}": f"{(count == number).mean():.2f}" for number in range(6)}
+        section.rows.append(
+            {"": what, "mean per slip": f"{count.mean():.2f}"} | shares | {"more": f"{(count > 5).mean():.2f}"}
+        )
+    cut = 0.5 * slips["drop"].median()
+    seen = slips["drop_during"] >= cut
+    false = slips["largest_drop_before"] >= cut
+    section.remark(
+        f"A detector that sees only F_S and counts a drop of at least {cut:.0f} N (half of the median stress drop) as"
+        f" a slip finds {100 * seen.mean():.1f} % of the {len(slips)} slips, and counts {false.sum()} other drops as"
+        f" slips: precision {seen.sum() / (seen.sum() + false.sum()):.3f}."
+    )
+    return section
+
+
+def identical_contacts(results: Path) -> Section:
+    """Statement 2."""
+    section = Section("2. Identical contacts keep the distribution broad", "`sweeps/fig2.toml`, Δ = 0 (Fig. 2d, red)")
+    slips = Sweep(results / "fig2").slips()
+    identical, disordered = (
+        jackknife(lambda rows: 1e3 * rows["interval"].std(), rows)
+        for rows in (select(slips, Delta=0.0, dfs=0.0), without_modulation(slips))
+    )
+    section.check(
+        "a broad distribution is retained when all contacts are identical",
+        "s.d. of τ at least half of that with disorder",
+        f"{identical.text(1)} ms; with disorder {disordered.text(1)} ms",
+        identical.low > 0.5 * disordered.high,
+    )
+    return section
+
+
+def integer_multiples(results: Path) -> Section:
+    """Statement 3."""
+    section = Section("3. Intervals are integer multiples of the period", "`sweeps/fig2.toml`, Δ = 1 µm (Fig. 2e, f)")
+    sweep = Sweep(results / "fig2")
+    slips, precursors = sweep.slips(), sweep.table("precursors")
+    still = without_modulation(slips)
+    for frequency in (29, 58):
+        rows = select(slips, frequency=frequency, Delta=1e-6).dropna(subset="periods")
+        index = jackknife(lambda rows: locking_index(rows["periods"]), rows)
+        chance = locking_index(still["interval"] * frequency)
+        near = share(near_whole(rows["periods"]), rows["seed"])
+        section.check(
+            f"τ locks at {frequency} Hz",
+            "locking index > 0.7",
+            f"{index.text()}, without modulation {chance:.3f}; within 0.1 T of nT: {near.text()} (by chance 0.2)",
+            index.low > 0.7,
+        )
+    for what, intervals, column in (
+        (
+            "intervals between precursors lock at {} Hz: from the largest precursor to its slip",
+            lead_times(sweep),
+            "lead",
+        ),
+        ("... between successive precursors of any size, {} Hz", precursors, "interval"),
+    ):
+        for frequency in (29, 58):
+            index, chance = (
+                jackknife(lambda rows: locking_index(rows[column] * frequency), rows)
+                for rows in (select(intervals, T=1 / frequency), of_same_jobs(intervals, still))
+            )
+            section.check(
+                what.format(frequency),
+                "locking index > 0.5, and larger than without modulation",
+                f"{index.text()}, without modulation {chance.text()}",
+                index.low > max(chance.high, 0.5),
+            )
+    section.remark(
+        "Precursors of a few dozen breaks come in bursts a few milliseconds apart, with or without modulation, and"
+        " such short intervals count as near zero periods: hence the large index without modulation.",
+        "The largest precursor of each slip has no such neighbour.",
+    )
+    return section
+
+
+def lead_times(sweep: Sweep) -> pandas.DataFrame:
+    """The largest precursor of each slip, with the time `lead` in s from its onset to the slip's."""
+    precursors, slips = sweep.table("precursors"), sweep.table("slips")
+    largest = precursors.loc[precursors.groupby(["job_id", "slip"])["size"].idxmax()]
+    pairs = largest.merge(slips[["job_id", "slip", "onset"]], on=["job_id", "slip"], suffixes=("", "_of_slip"))
+    return pairs.assign(lead=pairs["onset_of_slip"] - pairs["onset"])
+
+
+def many_periods(results: Path) -> Section:
+    """Statement 4."""
+    section = Section("4. τ = nT over a broad range of loading", "`sweeps/fig3.toml` (Fig. 3c)", "fig3-tau-T")
+    sweep = Sweep(results / "fig3")
+    slips = sweep.slips().merge(sweep.reduced("sets")[["set_id", "locked"]], on="set_id")
+    slips = slips[(slips["eta"] >= 1) & slips["interval"].notna()]
+    slips = slips.assign(near=near_whole(slips["periods"]))
+    whole, locked = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["locked"]]))
+    section.check(
+        "data fall on lines τ = nT",
+        "over all sets with η > 1, more than 0.2 of the intervals within 0.1 T of nT (0.2 is chance)",
+        whole.text(),
+        whole.low > 0.2,
+    )
+    section.check(
+        "... once locked", "of the locked sets, more than 0.5 of the intervals", locked.text(), locked.low > 0.5
+    )
+    for low, high in pairwise((1, 2, 4, 10, 30, 100, 1001)):
+        mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
+        near = share(mine["near"], mine["set_id"])
+        section.rows.append(
+            {
+                "η": f"{low} to {min(high, 1000)}",
+                "sets": near.units,
+                "share of slips in locked sets": f"{mine['locked'].mean():.2f}",
+                "within 0.1 T of nT": near.text(),
+            }
+        )
+    return section
+
+
+def stress_drops(results: Path) -> Section:
+    """Statement 9."""
+    section = Section("9. Stress drops synchronise in part", "`sweeps/fig2.toml`")
+    slips = Sweep(results / "fig2").slips()
+    still = without_modulation(slips).dropna(subset="interval")
+
+    def of_n(rows: pandas.DataFrame) -> pandas.Series:
+        """The mean drop of the slips with the same n, of each slip."""
+        return rows.groupby("n")["drop"].transform("mean")
+
+    def explained(rows: pandas.DataFrame) -> float:
+        return of_n(rows).var() / rows["drop"].var()
+
+    for frequency in (29, 58):
+        rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="n")
+        free = still.assign(n=(still["interval"] * frequency).round())
+        locked, chance = jackknife(explained, rows), jackknife(explained, free)
+        within = jackknife(lambda rows: (rows["drop"] - of_n(rows)).std(), rows)
+        section.check(
+            f"partial synchronisation of stress drops ({frequency} Hz)",
+            "the number n of periods explains more of the drops' variance than the same binning of τ does without"
+            " modulation",
+            f"{locked.text(2)}, without modulation {chance.text(2)};"
+            f" s.d. {rows['drop'].std():.1f} N, within one n {within.text(1)} N",
+            locked.low > chance.high,
+        )
+    return section

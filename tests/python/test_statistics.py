@@ -1,0 +1,99 @@
+"""Statistics on data whose answer is known, and paired comparisons of two sets."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from stickslip_analysis import statistics
+from stickslip_analysis.compare_sets import compare
+from stickslip_analysis.tables import Sweep
+
+
+def slips(generator, effect, seeds=12, each=20):
+    """Slips whose intervals have a part that belongs to the seed, an effect and noise."""
+    seed = np.repeat(np.arange(seeds), each)
+    own = np.random.default_rng(99).normal(0, 0.01, seeds)[seed]
+    return pd.DataFrame({"seed": seed, "interval": 0.11 + own + effect + generator.normal(0, 0.002, seed.size)})
+
+
+def covers(estimate, truth):
+    return estimate.low <= truth <= estimate.high
+
+
+def assert_95_percent(covered):
+    """The share of intervals that cover the truth is 95 % within three standard errors."""
+    assert abs(np.mean(covered) - 0.95) < 3 * np.sqrt(0.95 * 0.05 / len(covered)), np.mean(covered)
+
+
+def test_the_difference_of_means_is_that_of_the_paired_t_test():
+    generator = np.random.default_rng(1)
+    a, b = slips(generator, 0.001), slips(generator, 0)
+    found = statistics.difference(a, b, "interval")
+    means = [rows.groupby("seed")["interval"].mean() for rows in (a, b)]
+    low, high = stats.ttest_rel(*means).confidence_interval(0.95)
+    # Sums in another order.
+    assert [found.value, found.low, found.high] == pytest.approx(
+        [means[0].mean() - means[1].mean(), low, high], rel=1e-9
+    )
+    assert found.units == 12
+    unpaired = stats.ttest_ind(*means).confidence_interval(0.95)
+    assert found.high - found.low < 0.2 * (unpaired.high - unpaired.low), "what belongs to the seed drops out"
+
+
+def test_only_common_seeds_count():
+    generator = np.random.default_rng(2)
+    a, b = slips(generator, 0), slips(generator, 0)
+    fewer = a[a["seed"] < 7]
+    assert statistics.difference(fewer, b, "interval") == statistics.difference(fewer, b[b["seed"] < 7], "interval")
+    with pytest.raises(ValueError, match="1 values of seed are common"):
+        statistics.difference(a[a["seed"] == 0], b, "interval")
+
+
+@pytest.mark.parametrize("statistic", [pd.Series.mean, statistics.locking_index])
+def test_intervals_of_differences_cover_the_truth_as_often_as_they_claim(statistic):
+    # Of Gaussian periods the locking index is exp(-2 pi^2 sd^2).
+    means, spreads = (11.05, 11), (0.1, 0.13)
+    truths = means if statistic is pd.Series.mean else np.exp(-2 * np.pi**2 * np.square(spreads))
+    seed = np.repeat(np.arange(16), 20)
+
+    def covered(repetition):
+        generator = np.random.default_rng(repetition)
+        sets = [
+            pd.DataFrame({"seed": seed, "periods": generator.normal(mean, spread, seed.size)})
+            for mean, spread in zip(means, spreads)
+        ]
+        return covers(statistics.difference(*sets, "periods", statistic), truths[0] - truths[1])
+
+    assert_95_percent([covered(repetition) for repetition in range(300)])
+
+
+def test_jackknife_intervals_cover_the_truth_as_often_as_they_claim():
+    """Slips share an offset of their seed: an interval that took slips as independent would cover half as often."""
+    generator = np.random.default_rng(1)
+    seed = np.arange(8).repeat(30)
+
+    def covered():
+        x = 5 + generator.normal(size=8)[seed] + generator.normal(size=seed.size)
+        return covers(statistics.jackknife(lambda rows: rows["x"].mean(), pd.DataFrame({"seed": seed, "x": x})), 5)
+
+    assert_95_percent([covered() for _ in range(400)])
+
+
+def test_the_locking_index_of_a_set_is_that_of_its_slips(results):
+    sweep = Sweep(results)
+    reduced = sweep.reduced("sets").set_index("set_id")["locking_index"].dropna()
+    found = sweep.slips().dropna(subset="periods").groupby("set_id")["periods"].apply(statistics.locking_index)
+    assert len(reduced) == 1
+    # The same sums in another order.
+    pd.testing.assert_series_equal(found, reduced, rtol=1e-12, check_names=False)
+
+
+def test_sets_of_a_sweep_are_compared_by_their_ids(results):
+    sets = pd.read_parquet(results / "reduced" / "sets.parquet").sort_values("Delta", ignore_index=True)
+    found = compare(results, sets["set_id"][1], sets["set_id"][0])
+    assert set(found) == {"interval", "mean_friction"}, "the locking index needs two modulated sets"
+    # As many slips for each seed.
+    for column, reduced in (("interval", sets["tau_mean"]), ("mean_friction", sets["mean_friction"])):
+        assert found[column].value == pytest.approx(reduced[1] - reduced[0], rel=1e-9)
+        assert found[column].units == 5
