@@ -105,7 +105,7 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
         Distance { value, low: low.max(0.0), high, floor }
     };
     let ([wasserstein, kolmogorov], [mean, deviation]) = ([0, 1].map(distance), [2, 3].map(bias));
-    Some(Distances { wasserstein, kolmogorov, mean, deviation })
+    Some(Distances { mean, deviation, wasserstein, kolmogorov })
 }
 
 /// Differences of two sorted samples: Wasserstein-1, Kolmogorov-Smirnov, of the means, of the standard deviations.
