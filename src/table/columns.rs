@@ -420,6 +420,7 @@ pub(crate) mod tests {
         const MEANING: &'static str = "One row per reading";
     }
 
+    #[cfg(feature = "sweeps")]
     pub(crate) fn readings() -> [Readings; 2] {
         let modulated =
             Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.01), ..Parameters::default() };
