@@ -65,7 +65,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
         }
     }
-    let findings = study.run(&mut |next| output::tell(next))?;
+    let findings = study.run(&mut |next| output::report(next))?;
     let files = accuracy::write(&Disk, &arguments.out, &study, &findings)?;
     if arguments.json {
         output::json(&accuracy::as_json(&study, &findings))?;
@@ -78,7 +78,7 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
 
 fn run_scaling(arguments: &Arguments) -> Result<Exit> {
     let scaling = if arguments.quick { Scaling::quick() } else { Scaling::full() };
-    let findings = scaling.run(&mut |next| output::tell(next))?;
+    let findings = scaling.run(&mut |next| output::report(next))?;
     let files = accuracy::write_scaling(&Disk, &arguments.out, &findings)?;
     if arguments.json {
         output::json(&scaling_json(&findings))?;
@@ -92,7 +92,7 @@ fn run_scaling(arguments: &Arguments) -> Result<Exit> {
 fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
     let mut rows = Vec::new();
     for case in hard_cases() {
-        output::tell(&format!("{}: {}", case.threat, case.name()));
+        output::report(&format!("{}: {}", case.threat, case.name()));
         rows.push(case.run());
     }
     let files = accuracy::write_stability(&Disk, &arguments.out, &rows)?;

@@ -15,7 +15,7 @@ use super::startup::startup;
 use crate::model::{Symbol, Value};
 use crate::results::commit::{Commit, alone, create_folder};
 use crate::results::layout::Layout;
-use crate::results::part::committed_files;
+use crate::results::parts::committed_files;
 use crate::results::tables::{jobs, slips};
 use crate::table::file::{DatasetError, Footer, Reader, TableWriter, files};
 use crate::table::storage::{Storage, StorageError};

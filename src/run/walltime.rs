@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Least time set aside for ending, in s: for the last commits and for those who wait.
-const LEAST_RESERVE: f64 = 0.5;
+const MIN_RESERVE: f64 = 0.5;
 /// More is set aside where commits are slow: so many times the slowest.
 const COMMITS_IN_RESERVE: f64 = 3.0;
 
@@ -95,7 +95,7 @@ impl Walltime {
     /// Time left but for what is set aside, in s.
     fn left(&self) -> Option<f64> {
         let end = self.end?;
-        let reserve = LEAST_RESERVE.max(COMMITS_IN_RESERVE * self.state().slowest_commit);
+        let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.state().slowest_commit);
         Some(end.saturating_duration_since(Instant::now()).as_secs_f64() - reserve)
     }
 
