@@ -1,8 +1,8 @@
 //! Commit: whole files appear under their names at once, in a given order, and survive a power cut.
 //!
-//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the new one
-//! as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two which
-//! prepare the same files at once never write into each other's.
+//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the new
+//! one as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two
+//! which prepare the same files at once never write into each other's.
 
 use crate::results::layout::Layout;
 use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};

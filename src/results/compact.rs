@@ -1,14 +1,14 @@
 //! Compaction: the files of many parts become few large ones, by putting them one after the other in plan order.
 //!
-//! [`PARTS_PER_FILE`] consecutive parts of an extension go into one file of each table, which is named after them. Parts that
-//! are missing, or have failed jobs that may be run again, are left out, so the file ends before them and the next begins
-//! after them. Contract: names and bytes are a function of which parts are done and whole, not of how it came to that:
-//! threads, shards, kills, or earlier compactions. Memory: one row group.
+//! [`PARTS_PER_FILE`] consecutive parts of an extension go into one file of each table, which is named after them.
+//! Parts that are missing, or have failed jobs that may be run again, are left out, so the file ends before them and
+//! the next begins after them. Contract: names and bytes are a function of which parts are done and whole, not of how
+//! it came to that: threads, shards, kills, or earlier compactions. Memory: one row group.
 //!
-//! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all tables
-//! at once: who lists a table sees all rows once, before and after. Names hold checksums, so a reader that has listed the
-//! old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step leaves the old
-//! tables or the new ones.
+//! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all
+//! tables at once: who lists a table sees all rows once, before and after. Names hold checksums, so a reader that has
+//! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step
+//! leaves the old tables or the new ones.
 
 use crate::results::commit::create_folder;
 use crate::results::error::ResultsError;

@@ -183,8 +183,8 @@ impl Log {
     }
 }
 
-/// Goes through the events of all logs, in order of the beginnings of their runs. What a killed run left half-written is
-/// passed over.
+/// Goes through the events of all logs, in order of the beginnings of their runs. What a killed run left half-written
+/// is passed over.
 fn read(storage: &dyn Storage, layout: &Layout, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
     let folder = layout.logs();
     for name in storage.list(&folder)? {

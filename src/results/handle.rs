@@ -12,8 +12,8 @@ use std::fmt;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked for,
-/// since other processes may be at work on it.
+/// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
+/// for, since other processes may be at work on it.
 #[derive(Clone)]
 pub struct Results<'a> {
     storage: &'a dyn Storage,
@@ -162,8 +162,8 @@ impl<'a> Results<'a> {
         self.sweeps[part.epoch].job_id(&part.jobs[position].parameters).to_string()
     }
 
-    /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a folder, and
-    /// the sync after it leaves names that are seen but would not survive a power cut.
+    /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
+    /// folder, and the sync after it leaves names that are seen but would not survive a power cut.
     ///
     /// # Errors
     /// When a folder cannot be synced.

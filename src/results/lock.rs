@@ -1,15 +1,16 @@
-//! Locks: which process runs a shard, so that none is run twice at once and that of a dead process can be taken over; and
-//! who has a directory to itself, to change what is committed.
+//! Locks: which process runs a shard, so that none is run twice at once and that of a dead process can be taken over;
+//! and who has a directory to itself, to change what is committed.
 //!
 //! A lock is one of the operating system on `run/lock/<name>`, and a heartbeat in that file: host, process, and a count
-//! that grows as long as the process lives. Within one host the lock alone decides. Other hosts may not see it, as network
-//! file systems can be mounted without; there a heartbeat that grows is a living process's, and one that stands still for
-//! [`TIMEOUT`] a dead one's. No clocks are compared. Contract: a lock saves double work, and no more. Should two
-//! processes run the same shard, as after a suspended one was taken for dead, they write the same bytes, each under staged
-//! names of its own.
+//! that grows as long as the process lives. Within one host the lock alone decides. Other hosts may not see it, as
+//! network file systems can be mounted without; there a heartbeat that grows is a living process's, and one that stands
+//! still for [`TIMEOUT`] a dead one's. No clocks are compared. Contract: a lock saves double work, and no more. Should
+//! two processes run the same shard, as after a suspended one was taken for dead, they write the same bytes, each under
+//! staged names of its own.
 //!
-//! Who wants a directory alone takes a lock of its own and then looks that no shard is locked; a run locks its shard and
-//! then looks that nobody has the directory alone. So at least one of two that begin at once sees the other, and leaves.
+//! Who wants a directory alone takes a lock of its own and then looks that no shard is locked; a run locks its shard
+//! and then looks that nobody has the directory alone. So at least one of two that begin at once sees the other, and
+//! leaves.
 
 use crate::results::commit::{create_folder, token};
 use crate::results::error::ResultsError;
@@ -172,8 +173,8 @@ fn stays_locked(storage: &dyn Storage, layout: &Layout, name: &str) -> Result<bo
     Ok(false)
 }
 
-/// Whether a process has a lock: by the operating system, or by a heartbeat of another host that is recent, as far as the
-/// hosts' clocks agree.
+/// Whether a process has a lock: by the operating system, or by a heartbeat of another host that is recent, as far as
+/// the hosts' clocks agree.
 fn is_locked(storage: &dyn Storage, layout: &Layout, name: &str) -> Result<bool, StorageError> {
     let file = layout.locks().join(name);
     if !storage.exists(&file)? {

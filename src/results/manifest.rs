@@ -1,8 +1,8 @@
 //! The manifest: what the tables of a directory belong to, and which sweeps were run in it.
 //!
-//! Opening a directory with a sweep is where mismatches are refused, before anything is written: a directory of something
-//! else, another model, solver or recording, other versions. A sweep that differs in its axes or conditions alone is added
-//! as a further *extension*; results of values that it no longer has are kept.
+//! Opening a directory with a sweep is where mismatches are refused, before anything is written: a directory of
+//! something else, another model, solver or recording, other versions. A sweep that differs in its axes or conditions
+//! alone is added as a further *extension*; results of values that it no longer has are kept.
 
 #[cfg(test)]
 mod tests;
@@ -38,8 +38,8 @@ pub(super) struct Manifest {
     model_version: u32,
     rng_scheme: String,
     plan_version: u32,
-    /// The id of a job with the model's defaults under this solver and recording: another once a default has changed that a
-    /// sweep file may leave out.
+    /// The id of a job with the model's defaults under this solver and recording: another once a default has changed
+    /// that a sweep file may leave out.
     identity: String,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,

@@ -73,8 +73,8 @@ impl Results<'_> {
         self.layout().table(table).join(TableFile::of_part(part.epoch, part.index).to_string())
     }
 
-    /// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done. Parts with failed
-    /// jobs are never compacted.
+    /// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done. Parts with
+    /// failed jobs are never compacted.
     ///
     /// # Errors
     /// When its file in `jobs` cannot be read, or has other jobs than the part.
@@ -107,8 +107,8 @@ impl Results<'_> {
     /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have.
     ///
     /// # Errors
-    /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then counts
-    /// as before, or as done, but never as half done.
+    /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
+    /// counts as before, or as done, but never as half done.
     pub fn commit(&self, staging: &Path, part: &Part, outcomes: &BTreeMap<usize, Outcome>) -> Result<(), ResultsError> {
         let sweep = &self.sweeps()[part.epoch];
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
@@ -157,8 +157,8 @@ impl Results<'_> {
 /// The jobs of a part, those that were run with their outcomes.
 type Jobs<'a> = Vec<(JobLabel, Option<&'a Outcome>)>;
 
-/// Files of a table that count beside these of `jobs`: those with the rows of the same parts. A run killed in between leaves
-/// the slips of a part without its jobs.
+/// Files of a table that count beside these of `jobs`: those with the rows of the same parts. A run killed in between
+/// leaves the slips of a part without its jobs.
 ///
 /// # Errors
 /// As [`files`].

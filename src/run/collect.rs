@@ -63,8 +63,8 @@ impl<'a, 'e> Collector<'a, 'e> {
         Self { share, staging, walltime, events, report, open: HashMap::new() }
     }
 
-    /// Runs the jobs of the share, until they are done, the flag turns true, the time is over, or something fails that is not
-    /// a job. Returns whether all were run.
+    /// Runs the jobs of the share, until they are done, the flag turns true, the time is over, or something fails that
+    /// is not a job. Returns whether all were run.
     pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");

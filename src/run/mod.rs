@@ -7,8 +7,9 @@
 //! collect.rs on the calling thread: outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
-//! What is done is what is committed, so a run that was killed goes on by looking which part files are missing. Contract:
-//! the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a job in flight.
+//! What is done is what is committed, so a run that was killed goes on by looking which part files are missing.
+//! Contract: the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a
+//! job in flight.
 
 mod collect;
 mod shard;
@@ -74,8 +75,8 @@ impl Events<'_> {
 /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
 ///
 /// # Errors
-/// When the directory belongs to something else or another process has it, or the disk fails. What was committed is kept, and
-/// the same command goes on from there.
+/// When the directory belongs to something else or another process has it, or the disk fails. What was committed is
+/// kept, and the same command goes on from there.
 pub fn run(
     storage: &dyn Storage,
     sweep: &Sweep,

@@ -62,8 +62,8 @@ impl<'a> Share<'a> {
         self.shard.parts(self.results.plan().parts())
     }
 
-    /// Looks at every part, and visits those that are done with their failed jobs and the reasons. Parts that are missing and
-    /// no longer asked for are left out.
+    /// Looks at every part, and visits those that are done with their failed jobs and the reasons. Parts that are
+    /// missing and no longer asked for are left out.
     pub fn overview(&self, mut visit: impl FnMut(&Part, BTreeMap<usize, String>)) -> Result<Overview, ResultsError> {
         let mut overview = Overview::default();
         for part in self.parts() {
@@ -85,7 +85,8 @@ impl<'a> Share<'a> {
         Ok(overview)
     }
 
-    /// The jobs to be run, in the order of the plan, looked up part by part; without the parts that would not end in time.
+    /// The jobs to be run, in the order of the plan, looked up part by part; without the parts that would not end in
+    /// time.
     pub fn jobs(
         &'a self,
         walltime: &'a Walltime,

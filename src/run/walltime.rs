@@ -1,9 +1,9 @@
 //! Walltime: which parts a run may still start so that it ends in time, with all that it started committed.
 //!
-//! A part is started if, at the pace so far (measured over predicted cost), it and all that is under way end in time. Parts
-//! that would not are passed over, and cheaper ones after them are taken. The pace is that of the jobs that have ended; of
-//! earlier runs in the directory before the first; and 1 before any. Should a job take longer after all, it is interrupted
-//! at the end, and whole parts are kept.
+//! A part is started if, at the pace so far (measured over predicted cost), it and all that is under way end in time.
+//! Parts that would not are passed over, and cheaper ones after them are taken. The pace is that of the jobs that have
+//! ended; of earlier runs in the directory before the first; and 1 before any. Should a job take longer after all, it
+//! is interrupted at the end, and whole parts are kept.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

@@ -1,7 +1,8 @@
 //! Checksums: a file holds the SHA-256 of its own bytes, so that any changed bit of it is found.
 //!
-//! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the footer
-//! under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of its pages.
+//! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the
+//! footer under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of
+//! its pages.
 
 use crate::table::file::DatasetError;
 use crate::table::storage::{Storage, StorageError};

@@ -1,5 +1,5 @@
-//! The files of each part, alone or compacted with its neighbours: in all tables or in none, as they were written, with the
-//! rows of its jobs. And what else lies among them.
+//! The files of each part, alone or compacted with its neighbours: in all tables or in none, as they were written, with
+//! the rows of its jobs. And what else lies among them.
 
 use super::rows::{Files, check_rows};
 use super::{Problem, Remedy, Verification, problem_of};

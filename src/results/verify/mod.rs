@@ -1,4 +1,5 @@
-//! Verification: every file whole and in its place, every job there once; what is damaged is named, and can be taken away.
+//! Verification: every file whole and in its place, every job there once; what is damaged is named, and can be taken
+//! away.
 //!
 //! ```text
 //! manifest.rs    manifest and sweep files, which restore each other
@@ -6,8 +7,8 @@
 //! rows.rs        the rows of all tables held against each other
 //! ```
 //!
-//! Reading changes nothing. A repair moves what is damaged to `run/quarantine/` and restores what can be restored; the next
-//! run does the rest. Memory: the names of the files.
+//! Reading changes nothing. A repair moves what is damaged to `run/quarantine/` and restores what can be restored; the
+//! next run does the rest. Memory: the names of the files.
 
 mod files;
 mod manifest;
@@ -143,8 +144,8 @@ impl<'a> Results<'a> {
     /// Takes away what is damaged, so that the next run makes it again.
     ///
     /// # Errors
-    /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the same
-    /// can be tried again.
+    /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the
+    /// same can be tried again.
     pub fn repair(storage: &'a dyn Storage, root: &Path) -> Result<Repaired, ResultsError> {
         // Reports what is no results directory before anything is written.
         let (results, _) = Self::examine(storage, root)?;

@@ -1,5 +1,5 @@
-//! Rows of all tables held against each other: the planned jobs in their order, each with as many slips and precursors as
-//! the jobs table says.
+//! Rows of all tables held against each other: the planned jobs in their order, each with as many slips and precursors
+//! as the jobs table says.
 
 use crate::results::tables;
 use crate::table::file::{Batch, DatasetError, Reader};

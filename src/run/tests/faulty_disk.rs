@@ -1,7 +1,7 @@
 //! A disk in memory that fails at the n-th operation of a kind, and knows what a power cut would leave.
 //!
-//! Names and bytes are kept twice: as processes see them, and as they lie on the disk. A file's bytes get there when it is
-//! synced, the names in a folder when the folder is.
+//! Names and bytes are kept twice: as processes see them, and as they lie on the disk. A file's bytes get there when it
+//! is synced, the names in a folder when the folder is.
 
 use super::fault::{Fault, Operation};
 use crate::table::storage::{Lock, Sink, Storage, StorageError, StoredFile};

@@ -1,4 +1,5 @@
-//! Compaction and repair on a disk that dies at each operation in turn, on one that cannot exchange folders, and beside a run.
+//! Compaction and repair on a disk that dies at each operation in turn, on one that cannot exchange folders, and beside
+//! a run.
 
 use super::{faulty, fine};
 use crate::observe::Measurements;
