@@ -20,7 +20,7 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep: canonical parameters, solver and what is recorded, known by a hash of all three |
 //! | part | consecutive jobs of the plan, committed together |
-//! | shard | a share of the parts, run by one process beside others; a claim keeps it from being run twice at once |
+//! | shard | a share of the parts, run by one process beside others; a lock keeps it from being run twice at once |
 //! | set | all jobs that differ in the seed alone |
 
 #[cfg(feature = "sweeps")]

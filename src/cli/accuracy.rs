@@ -65,14 +65,14 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
         }
     }
-    let findings = study.run(&mut |next| output::tell(next))?;
+    let findings = study.run(&mut |next| output::report(next))?;
     write_and_print(arguments, &study_report(&study, &findings)?, &study_text(&study, &findings))?;
     Ok(Exit::Done)
 }
 
 fn run_scaling(arguments: &Arguments) -> Result<Exit> {
     let scaling = if arguments.quick { Scaling::quick() } else { Scaling::full() };
-    let findings = scaling.run(&mut |next| output::tell(next))?;
+    let findings = scaling.run(&mut |next| output::report(next))?;
     write_and_print(arguments, &scaling_report(&findings)?, &scaling_text(&findings))?;
     Ok(Exit::Done)
 }
@@ -80,7 +80,7 @@ fn run_scaling(arguments: &Arguments) -> Result<Exit> {
 fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
     let mut rows = Vec::new();
     for case in hard_cases() {
-        output::tell(&format!("{}: {}", case.threat, case.name()));
+        output::report(&format!("{}: {}", case.threat, case.name()));
         rows.push(case.run());
     }
     write_and_print(arguments, &stability_report(&rows), &stability_text(&rows))?;

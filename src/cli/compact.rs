@@ -1,4 +1,4 @@
-//! `stickslip compact`: the files of many parts become few large sorted ones.
+//! `stickslip compact`: the files of many parts become few large ones.
 
 use super::exit::Exit;
 use super::output;
@@ -6,16 +6,17 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
+use stickslip::results::Results;
 use stickslip::results::compact::Compacted;
 use stickslip::table::storage::Disk;
 
-/// Make few large sorted files of the tables of a results directory, the same bytes whatever its history
+/// Make few large files of the tables of a results directory, the same bytes whatever its history
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   stickslip compact results/fig3
 
-The directory can be run, extended and compacted again afterwards.")]
+The directory can be run, extended and compacted again afterwards. Parts with failed jobs keep their own files.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
@@ -36,7 +37,7 @@ struct Report {
 }
 
 pub fn compact(arguments: &Arguments) -> Result<Exit> {
-    let compacted = stickslip::run::compact(&Disk, &arguments.directory)?;
+    let compacted = Results::read(&Disk, &arguments.directory)?.compact()?;
     if arguments.json {
         output::json(&Report { format: FORMAT, compacted })?;
     } else {
@@ -45,6 +46,7 @@ pub fn compact(arguments: &Arguments) -> Result<Exit> {
                 "compacted",
                 format!("{} with {}", output::count(compacted.parts, "part"), output::count(compacted.jobs, "job")),
             ),
+            ("left out", format!("{} with failed jobs", output::count(compacted.failed_parts, "part"))),
             ("files", format!("{}, {:.1} MB", compacted.files, compacted.bytes as f64 / 1e6)),
             ("changed", if compacted.changed { "yes" } else { "no, all was compact" }.to_owned()),
         ])?;

@@ -1,10 +1,7 @@
 //! Exit codes, and which error ends with which.
 
 use stickslip::reduce::ReduceError;
-use stickslip::results::compact::CompactError;
-use stickslip::results::manifest::DirectoryError;
-use stickslip::results::verify::RepairError;
-use stickslip::run::{RunError, UpkeepError};
+use stickslip::results::{ErrorKind, ResultsError};
 use stickslip::solver::SimulationError;
 use stickslip::sweep::SweepError;
 use stickslip::table::file::DatasetError;
@@ -46,31 +43,11 @@ impl Exit {
                 _ => Self::Failed,
             });
         }
-        if let Some(error) = cause.downcast_ref::<RunError>() {
-            return match error {
-                RunError::Directory(error) => Self::of_cause(error),
-                RunError::Dataset(error) => Self::of_cause(error),
-                RunError::Upkeep(error) => Self::of_cause(error),
-                RunError::Locked { .. } | RunError::Threads { .. } => Some(Self::Usage),
-                RunError::Storage(_) => None,
-            };
-        }
-        if let Some(error) = cause.downcast_ref::<UpkeepError>() {
-            return match error {
-                UpkeepError::Directory(error) | UpkeepError::Repair(RepairError::Directory(error)) => {
-                    Self::of_cause(error)
-                }
-                UpkeepError::Compact(error) | UpkeepError::Repair(RepairError::Compact(error)) => Self::of_cause(error),
-                UpkeepError::Repair(RepairError::Storage(_)) | UpkeepError::Storage(_) => None,
-                UpkeepError::Running { .. } | UpkeepError::Busy(_) => Some(Self::Usage),
-                UpkeepError::Damaged { .. } => Some(Self::Damaged),
-            };
-        }
-        if let Some(error) = cause.downcast_ref::<CompactError>() {
-            return match error {
-                CompactError::Dataset(error) => Self::of_cause(error),
-                CompactError::NoExchange(_) => Some(Self::Usage),
-                CompactError::Storage(_) => None,
+        if let Some(error) = cause.downcast_ref::<ResultsError>() {
+            return match error.kind {
+                ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
+                ErrorKind::Damaged => Some(Self::Damaged),
+                ErrorKind::Disk => None,
             };
         }
         if let Some(error) = cause.downcast_ref::<ReduceError>() {
@@ -78,14 +55,6 @@ impl Exit {
                 ReduceError::Dataset(error) => Self::of_cause(error),
                 ReduceError::NoJobs { .. } => Some(Self::Usage),
                 ReduceError::Storage(_) => None,
-            };
-        }
-        if let Some(error) = cause.downcast_ref::<DirectoryError>() {
-            return match error {
-                DirectoryError::Damaged { .. } | DirectoryError::Sweep(_) => Some(Self::Damaged),
-                DirectoryError::Dataset(error) => Self::of_cause(error),
-                DirectoryError::Storage(_) | DirectoryError::Busy(_) => None,
-                _ => Some(Self::Usage),
             };
         }
         match cause.downcast_ref::<DatasetError>() {

@@ -63,7 +63,7 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => completions::completions(&arguments),
     };
     let exit = ended.unwrap_or_else(|error| {
-        output::tell(&format!("error: {}", message(&error)));
+        output::report(&format!("error: {}", message(&error)));
         Exit::of(&error)
     });
     ExitCode::from(exit as u8)

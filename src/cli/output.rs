@@ -13,7 +13,7 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 /// Writes a line to standard error. That nobody can read it must not end a run.
-pub fn tell(line: &str) {
+pub fn report(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 

@@ -40,9 +40,9 @@ impl Progress {
         }
     }
 
-    pub fn show(&mut self, event: RunEvent<'_>) {
+    pub fn show(&mut self, event: &RunEvent) {
         match event {
-            RunEvent::Started { jobs, predicted_cost, jobs_there, threads } => {
+            &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, .. } => {
                 self.jobs = jobs;
                 self.predicted = predicted_cost;
                 self.say(&format!(
@@ -56,24 +56,24 @@ impl Progress {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
             }
-            RunEvent::JobDone { predicted_cost, .. } => self.advance(predicted_cost),
+            RunEvent::JobDone { predicted_cost, .. } => self.advance(*predicted_cost),
             RunEvent::JobFailed { job_id, reason, command, predicted_cost, .. } => {
                 self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
-                self.advance(predicted_cost);
+                self.advance(*predicted_cost);
             }
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished parts are kept"),
-            RunEvent::OutOfTime => self.say("the time suffices for no more than what is under way"),
-            RunEvent::PartCommitted { .. } => {}
+            RunEvent::OutOfTime => self.say("not enough time left to start another part"),
             RunEvent::Finished(_) => self.bar.finish_and_clear(),
+            _ => {}
         }
     }
 
     /// A line that stays.
     fn say(&self, line: &str) {
         if self.is_terminal {
-            self.bar.suspend(|| output::tell(line));
+            self.bar.suspend(|| output::report(line));
         } else {
-            output::tell(line);
+            output::report(line);
         }
     }
 
@@ -89,7 +89,7 @@ impl Progress {
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            output::tell(&format!("{:.0} %: {text}", 100.0 * share));
+            output::report(&format!("{:.0} %: {text}", 100.0 * share));
         }
     }
 }

@@ -7,9 +7,8 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use stickslip::figure::draw_all;
 use stickslip::reduce::{self, ReductionSummary};
+use stickslip::results::Results;
 use stickslip::results::layout::Layout;
-use stickslip::results::manifest::Directory;
-use stickslip::table::file::Footer;
 use stickslip::table::storage::Disk;
 
 /// Reduce the tables of a results directory to Fig. 3-style data
@@ -34,43 +33,45 @@ pub struct PlotArguments {
 }
 
 pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
-    let directory = Directory::read(&Disk, &arguments.directory)?;
-    let summary = reduce_directory(&directory)?;
+    let results = Results::read(&Disk, &arguments.directory)?;
+    let summary = reduce_results(&results)?;
     if arguments.json {
         output::json(&summary)?;
     } else {
-        output::pairs(&described(&summary, directory.layout()))?;
+        output::pairs(&summary_lines(&summary, results.layout()))?;
     }
-    tell_missing(&directory)?;
+    report_missing(&results)?;
     Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
 }
 
 pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
-    let directory = Directory::read(&Disk, &arguments.directory)?;
-    for path in draw_all(&Disk, directory.layout())? {
+    let results = Results::read(&Disk, &arguments.directory)?;
+    for path in draw_all(&Disk, results.layout())? {
         output::print(&format!("{}\n", path.display()))?;
     }
     Ok(Exit::Done)
 }
 
 /// Reduces a directory, with its current sweep in the footers.
-pub fn reduce_directory(directory: &Directory) -> Result<ReductionSummary> {
-    let sweep = &directory.sweeps()[directory.current()];
-    Ok(reduce::reduce(&Disk, directory.layout(), &Footer::default().with_sweep(sweep))?)
+pub fn reduce_results(results: &Results<'_>) -> Result<ReductionSummary> {
+    Ok(reduce::reduce(results.storage(), results.layout(), &results.footer(results.current()))?)
 }
 
 /// Says which jobs were not there to be reduced.
-pub fn tell_missing(directory: &Directory) -> Result<()> {
-    let status = stickslip::run::status(&Disk, directory)?;
-    if status.jobs_missing > 0 {
-        let (jobs, parts) = (output::count(status.jobs_missing, "job"), output::count(status.parts_missing, "part"));
-        output::tell(&format!("reduced what is there: {jobs} in {parts} are missing; stickslip run goes on with them"));
+pub fn report_missing(results: &Results<'_>) -> Result<()> {
+    let overview = stickslip::run::status(results)?.overview;
+    if overview.jobs_missing > 0 {
+        let (jobs, parts) =
+            (output::count(overview.jobs_missing, "job"), output::count(overview.parts_missing, "part"));
+        output::report(&format!(
+            "reduced what is there: {jobs} in {parts} are missing; stickslip run goes on with them"
+        ));
     }
     Ok(())
 }
 
 /// A reduction in brief.
-pub fn described(summary: &ReductionSummary, layout: &Layout) -> Vec<(&'static str, String)> {
+pub fn summary_lines(summary: &ReductionSummary, layout: &Layout) -> Vec<(&'static str, String)> {
     let shown = |path: &Path| path.display().to_string();
     vec![
         ("jobs", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),

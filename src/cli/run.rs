@@ -13,7 +13,7 @@ use std::time::Duration;
 use stickslip::figure::draw_all;
 use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
-use stickslip::results::manifest::Directory;
+use stickslip::results::Results;
 use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
 use stickslip::table::storage::Disk;
@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Run failed jobs again
     #[arg(long)]
     retry_failed: bool,
-    /// Leave it at the tables
+    /// Skip reduction and figures
     #[arg(long)]
     no_reduce: bool,
     /// Print the report as JSON
@@ -118,10 +118,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         output::json(&Report { format: FORMAT, report })?;
     } else {
-        output::pairs(&described(&report))?;
+        output::pairs(&summary_lines(&report))?;
     }
     if report.stopped {
-        output::tell(&way_on(&report, arguments.walltime.is_some()));
+        output::report(&resume_hint(&report, arguments.walltime.is_some()));
         return Ok(Exit::Stopped);
     }
     if !arguments.no_reduce {
@@ -129,7 +129,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
-        output::tell(&format!("{failed} failed; their reasons stand in tables/jobs. --retry-failed runs them again."));
+        output::report(&format!("{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."));
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
@@ -137,29 +137,29 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 
 /// Reduces and draws what is there: other shards may be at work still.
 fn reduce_and_draw(root: &Path, arguments: &Arguments) -> Result<()> {
-    let directory = Directory::read(&Disk, root)?;
-    let layout = directory.layout();
-    let summary = match reduce::reduce_directory(&directory) {
+    let results = Results::read(&Disk, root)?;
+    let layout = results.layout();
+    let summary = match reduce::reduce_results(&results) {
         Err(error) if matches!(error.downcast_ref(), Some(ReduceError::NoJobs { .. })) => {
-            output::tell("no part is committed yet, so there is nothing to reduce");
+            output::report("no part is committed yet, so there is nothing to reduce");
             return Ok(());
         }
         summary => summary?,
     };
     let figures = draw_all(&Disk, layout)?;
     if !arguments.json {
-        output::pairs(&reduce::described(&summary, layout))?;
+        output::pairs(&reduce::summary_lines(&summary, layout))?;
         for path in figures {
             output::print(&format!("figure  {}\n", path.display()))?;
         }
     }
-    if arguments.shard.is_some() { reduce::tell_missing(&directory) } else { Ok(()) }
+    if arguments.shard.is_some() { reduce::report_missing(&results) } else { Ok(()) }
 }
 
 /// What to do after a run that stopped early.
-fn way_on(report: &RunReport, has_walltime: bool) -> String {
+fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
     let left = output::count(report.jobs_left, "job");
-    let way = match report.time_wanted {
+    let hint = match report.time_wanted {
         Some(time) if report.jobs_run == 0 => {
             let time = output::duration(time);
             format!("No part fits into this time, the cheapest takes about {time}: give a longer --walltime.")
@@ -169,10 +169,10 @@ fn way_on(report: &RunReport, has_walltime: bool) -> String {
         }
         _ => "The same command goes on.".to_owned(),
     };
-    format!("stopped with {left} left; finished parts are kept. {way}")
+    format!("stopped with {left} left; finished parts are kept. {hint}")
 }
 
-fn described(report: &RunReport) -> Vec<(&'static str, String)> {
+fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     let mut pairs = vec![
         ("jobs run", format!("{}, {} failed", report.jobs_run, report.jobs_failed)),
         ("parts committed", report.parts_committed.to_string()),

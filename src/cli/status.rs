@@ -5,7 +5,7 @@ use super::output;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use stickslip::results::manifest::Directory;
+use stickslip::results::Results;
 use stickslip::run::Failure;
 use stickslip::table::storage::Disk;
 
@@ -22,36 +22,36 @@ pub struct Arguments {
 }
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let directory = Directory::read(&Disk, &arguments.directory)?;
-    let status = stickslip::run::status(&Disk, &directory)?;
+    let status = stickslip::run::status(&Results::read(&Disk, &arguments.directory)?)?;
+    let overview = status.overview;
     if arguments.json {
         output::json(&status)?;
     } else {
-        let left = match (status.jobs_missing, status.time_left) {
+        let left = match (overview.jobs_missing, status.time_left) {
             (0, _) => "nothing left to run".to_owned(),
             (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
-            (_, None) => format!("{} of CPU time predicted", output::duration(status.predicted_cost_missing)),
+            (_, None) => format!("{} of CPU time predicted", output::duration(overview.predicted_cost_missing)),
         };
         let running = if status.running.is_empty() { "nothing".to_owned() } else { status.running.join(", ") };
-        let kept = match status.jobs_kept {
+        let kept = match overview.jobs_kept {
             0 => String::new(),
             kept => format!(", {kept} of them kept of values that the sweep no longer has"),
         };
         output::pairs(&[
             ("sweep", status.name.clone()),
-            ("jobs done", format!("{}{kept}", status.jobs_done)),
-            ("jobs failed", status.jobs_failed.to_string()),
-            ("jobs missing", status.jobs_missing.to_string()),
-            ("parts", format!("{} done, {} missing", status.parts_done, status.parts_missing)),
+            ("jobs done", format!("{}{kept}", overview.jobs_done)),
+            ("jobs failed", overview.jobs_failed.to_string()),
+            ("jobs missing", overview.jobs_missing.to_string()),
+            ("parts", format!("{} done, {} missing", overview.parts_done, overview.parts_missing)),
             ("running", running),
             ("time left", left),
         ])?;
         for Failure { job_id, reason, command } in &status.failures {
             output::print(&format!("failed  {job_id}: {reason}\n  alone: {command}\n"))?;
         }
-        if status.jobs_failed > status.failures.len() as u64 {
+        if overview.jobs_failed > status.failures.len() as u64 {
             output::print("failed  and more: see outcome and reason in tables/jobs\n")?;
         }
     }
-    Ok(if status.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
+    Ok(if overview.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
 }

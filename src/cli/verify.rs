@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::verify::{Problem, Verification};
 use stickslip::table::storage::Disk;
@@ -15,7 +16,7 @@ use stickslip::table::storage::Disk;
 #[command(after_help = "\
 Examples:
   stickslip verify results/fig3
-  stickslip verify results/fig3 --repair     then `run` makes anew what was taken away
+  stickslip verify results/fig3 --repair     then `run` makes again what was taken away
 
 Nothing is changed without --repair. Exit code 4: something is damaged.")]
 pub struct Arguments {
@@ -45,17 +46,14 @@ struct Report<'a> {
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let root = &arguments.directory;
-    let verification = if arguments.repair {
-        stickslip::run::repair(&Disk, root)?.verification
-    } else {
-        stickslip::run::verify(&Disk, root)?
-    };
+    let verification =
+        if arguments.repair { Results::repair(&Disk, root)?.verification } else { Results::verify(&Disk, root)? };
     let repaired = arguments.repair && verification.wants_repair();
     let commands = commands(root, &verification, !arguments.repair);
     if arguments.json {
         output::json(&Report { verification: &verification, repaired, commands })?;
     } else {
-        describe(&verification, &commands, repaired)?;
+        print_summary(&verification, &commands, repaired)?;
     }
     Ok(if verification.whole || arguments.repair { Exit::Done } else { Exit::Damaged })
 }
@@ -67,8 +65,8 @@ fn commands(root: &Path, verification: &Verification, with_repair: bool) -> Vec<
         commands.push(format!("stickslip verify {} --repair", quoted(root)));
     }
     let layout = Layout::new(root);
-    for &epoch in &verification.epochs {
-        commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(epoch)), quoted(root)));
+    for &extension in &verification.extensions {
+        commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(extension)), quoted(root)));
     }
     if verification.wants_compaction() {
         commands.push(format!("stickslip compact {}", quoted(root)));
@@ -89,7 +87,7 @@ fn quoted(path: &Path) -> String {
     }
 }
 
-fn describe(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
+fn print_summary(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
     for problem in &verification.problems {
         output::print(&format!("{}: {}{}\n", problem.path.display(), problem.problem, jobs_of(problem)))?;
     }

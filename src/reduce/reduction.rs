@@ -16,7 +16,7 @@ use crate::model::{Symbol, Value};
 use crate::observe::Slip;
 use crate::results::commit::{Commit, alone, create_folder};
 use crate::results::layout::Layout;
-use crate::results::part::committed_files;
+use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
 use crate::table::columns::{Selected, Table, columns};
 use crate::table::file::{DatasetError, Footer, TableWriter, files, read_rows};

@@ -1,19 +1,19 @@
 //! Commit: whole files appear under their names at once, in a given order, and survive a power cut.
 //!
-//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the new one
-//! as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two which
-//! prepare the same files at once never write into each other's.
+//! Stage, fsync, rename, fsync the folder. Contract: at every instant a target is absent, or the old file, or the new
+//! one as a whole; a file is there only if all those staged before it are. Staged names are a commit's own, so that two
+//! which prepare the same files at once never write into each other's.
 
 use crate::results::layout::Layout;
 use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
 use std::ffi::OsString;
 use std::hash::{BuildHasher, RandomState};
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How long to wait for another process that does the same, such as a reduction.
-const LONGEST_WAIT: Duration = Duration::from_mins(10);
+const MAX_WAIT: Duration = Duration::from_mins(10);
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {
@@ -49,8 +49,9 @@ impl<'a> Commit<'a> {
     /// When it cannot be written.
     pub fn stage_bytes(&mut self, target: &Path, bytes: &[u8]) -> Result<(), StorageError> {
         let staged = self.stage(target);
-        let mut file = self.storage.create(&staged).map_err(StorageError::at("create", &staged))?;
-        file.write_all(bytes).and_then(|()| file.sync()).map_err(StorageError::at("write", &staged))
+        let mut file = self.storage.create(&staged)?;
+        file.write(bytes)?;
+        file.sync()
     }
 
     /// Moves the staged files to their targets, in the order in which they were staged.
@@ -59,9 +60,8 @@ impl<'a> Commit<'a> {
     /// When a move fails; the files before it are in their places.
     pub fn publish(mut self) -> Result<(), StorageError> {
         for (staged, target) in &self.staged {
-            self.storage.rename(staged, target).map_err(StorageError::at("move a finished file here", target))?;
-            let folder = target.parent().unwrap_or(Path::new("."));
-            self.storage.sync_folder(folder).map_err(StorageError::at("sync", folder))?;
+            self.storage.rename(staged, target)?;
+            self.storage.sync_folder(target.parent().unwrap_or(Path::new(".")))?;
         }
         self.staged.clear();
         Ok(())
@@ -77,8 +77,28 @@ impl Drop for Commit<'_> {
     }
 }
 
+/// Moves a file, if it is there, under a name that is free.
+///
+/// # Errors
+/// When that fails.
+pub(super) fn move_away(storage: &dyn Storage, from: &Path, to: &Path) -> Result<(), StorageError> {
+    if !storage.exists(from)? {
+        return Ok(());
+    }
+    let mut free = to.to_owned();
+    let mut number = 0;
+    while storage.exists(&free)? {
+        number += 1;
+        free = to.with_added_extension(number.to_string());
+    }
+    let folders = || [free.parent(), from.parent()].into_iter().flatten();
+    folders().try_for_each(|folder| create_folder(storage, folder))?;
+    storage.rename(from, &free)?;
+    folders().try_for_each(|folder| storage.sync_folder(folder))
+}
+
 /// A text that no other process or commit has.
-pub(crate) fn token() -> String {
+pub(super) fn token() -> String {
     format!("{:016x}", RandomState::new().hash_one(std::process::id()))
 }
 
@@ -90,32 +110,13 @@ pub(crate) fn token() -> String {
 pub fn alone(storage: &dyn Storage, layout: &Layout, writer: &str) -> Result<Lock, StorageError> {
     create_folder(storage, &layout.locks())?;
     let file = layout.locks().join(writer);
-    let lock = wait_for_lock(storage, &file, LONGEST_WAIT)?;
+    let lock = wait_for_lock(storage, &file, MAX_WAIT)?;
     if matches!(lock, Lock::Taken) {
-        let held = io::Error::new(ErrorKind::WouldBlock, "another process holds it; try again when it has ended");
+        let held = io::Error::new(io::ErrorKind::WouldBlock, "another process holds it; try again when it has ended");
         return Err(StorageError::at("lock", &file)(held));
     }
     clear(storage, &layout.staging(writer))?;
     Ok(lock)
-}
-
-/// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a folder, and the
-/// sync after it leaves names that are seen but would not survive a power cut.
-///
-/// # Errors
-/// When a folder cannot be synced.
-pub fn settle(storage: &dyn Storage, layout: &Layout) -> Result<(), StorageError> {
-    for above in layout.root().ancestors().skip(1) {
-        // Most are not ours, and who made the folders in them synced them if that is possible at all.
-        let _ = storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
-    }
-    for folder in layout.result_folders() {
-        match storage.sync_folder(&folder) {
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            synced => synced.map_err(StorageError::at("sync", &folder))?,
-        }
-    }
-    Ok(())
 }
 
 /// Creates a folder and its parents, and brings the names of the new ones to the disk.
@@ -123,16 +124,15 @@ pub fn settle(storage: &dyn Storage, layout: &Layout) -> Result<(), StorageError
 /// # Errors
 /// When that fails.
 pub fn create_folder(storage: &dyn Storage, folder: &Path) -> Result<(), StorageError> {
-    if storage.exists(folder).map_err(StorageError::at("look up", folder))? {
+    if storage.exists(folder)? {
         return Ok(());
     }
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Some(parent) = parent {
         create_folder(storage, parent)?;
     }
-    storage.create_folder(folder).map_err(StorageError::at("create", folder))?;
-    let parent = parent.unwrap_or(Path::new("."));
-    storage.sync_folder(parent).map_err(StorageError::at("sync", parent))
+    storage.create_folder(folder)?;
+    storage.sync_folder(parent.unwrap_or(Path::new(".")))
 }
 
 /// Removes whatever a killed run left in a staging folder.
@@ -140,11 +140,7 @@ pub fn create_folder(storage: &dyn Storage, folder: &Path) -> Result<(), Storage
 /// # Errors
 /// When something cannot be removed.
 pub fn clear(storage: &dyn Storage, staging: &Path) -> Result<(), StorageError> {
-    for name in storage.list(staging).map_err(StorageError::at("list", staging))? {
-        let left = staging.join(name);
-        storage.remove(&left).map_err(StorageError::at("remove", &left))?;
-    }
-    Ok(())
+    storage.list(staging)?.into_iter().try_for_each(|name| storage.remove(&staging.join(name)))
 }
 
 #[cfg(test)]

@@ -1,46 +1,36 @@
-//! Compaction: the files of many parts become few large sorted ones, the same bytes whatever the history.
+//! Compaction: the files of many parts become few large ones, by putting them one after the other in plan order.
 //!
-//! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all tables
-//! at once: who lists a table sees all rows once, before and after. Names hold the seals of the files, so a reader that has
+//! [`PARTS_PER_FILE`] consecutive parts of an extension go into one file of each table, which is named after them.
+//! Parts that are missing, or have failed jobs that may be run again, are left out, so the file ends before them and
+//! the next begins after them. Contract: names and bytes are a function of which parts are done and whole, not of how
+//! it came to that: threads, shards, kills, or earlier compactions. Memory: one row group.
+//!
+//! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all
+//! tables at once: who lists a table sees all rows once, before and after. Names hold checksums, so a reader that has
 //! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step
-//! leaves the tables of before or of after.
+//! leaves the old tables or the new ones.
 
-use crate::results::commit::{Commit, create_folder};
-use crate::results::compaction::Compaction;
-use crate::results::layout::{Layout, part_file, part_name};
-use crate::results::manifest::Directory;
-use crate::results::merge::Merge;
-use crate::results::part::{failures, label};
+use crate::results::commit::create_folder;
+use crate::results::error::ResultsError;
+use crate::results::events::RunEvent;
+use crate::results::handle::Results;
+use crate::results::layout::{Layout, TableFile};
 use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
-use crate::sweep::Plan;
+use crate::results::verify::Remedy;
+use crate::sweep::Part;
 use crate::table::columns::Table;
-use crate::table::file::{DatasetError, Footer, footer};
-use crate::table::storage::{Storage, StorageError};
+use crate::table::file::{Reader, TableWriter};
+use crate::table::storage::StorageError;
 use serde::Serialize;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::ops::RangeInclusive;
+use std::path::Path;
 
+/// Parts of a compacted file at most: some 2 million rows of slips or jobs, 16 row groups.
+const PARTS_PER_FILE: u64 = 512;
 /// Name of the staging folder, which only one process uses at a time.
 const WRITER: &str = "compact";
-
-/// Tables that cannot be compacted. Nothing was changed.
-#[derive(Debug, thiserror::Error)]
-pub enum CompactError {
-    /// A file operation failed.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// A table cannot be read or written.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The file system cannot exchange folders.
-    #[error(
-        "{}: this file system cannot exchange two folders in one step, so readers would see an unfinished table; nothing \
-         was changed. Copy the directory to a local disk and compact it there",
-        .0.display()
-    )]
-    NoExchange(PathBuf),
-}
 
 /// What a compaction made.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -55,252 +45,192 @@ pub struct Compacted {
     pub files: u64,
     /// Their bytes.
     pub bytes: u64,
+    /// Parts with failed jobs, which keep their own files.
+    pub failed_parts: u64,
 }
 
-/// What is left out of the old compacted files.
-#[derive(Clone, Debug, Default)]
-pub struct Without {
-    /// Names of parts.
-    pub parts: BTreeSet<String>,
-    /// Ids of jobs that belong to no part.
-    pub jobs: HashSet<String>,
-    /// Files that cannot be read.
-    pub files: BTreeSet<PathBuf>,
-}
-
-impl Without {
-    /// Whether all is kept.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.parts.is_empty() && self.jobs.is_empty() && self.files.is_empty()
-    }
-}
-
-/// Compacts the parts that are done. Parts that are left out count as missing then, unless they have files of their own. The
-/// caller sees to it that the tables are
-/// whole and that nobody else writes. Files that are left out go to `quarantine`, if it is given.
-///
-/// # Errors
-/// When a file cannot be read or written, or the file system cannot do it. The tables are then as before.
-pub fn compact(
-    storage: &dyn Storage,
-    directory: &Directory,
-    without: &Without,
-    quarantine: Option<&Path>,
-) -> Result<Compacted, CompactError> {
-    let directory = &directory.clone().compacted_as(directory.compaction().without(&without.parts));
-    let layout = directory.layout();
-    let staging = layout.staging(WRITER);
-    storage.remove_folder(&staging).map_err(StorageError::at("remove", &staging))?;
-    let sources = Sources::of(storage, directory, without)?;
-    if without.is_empty() && sources.is_compact(storage, directory)? {
-        if Compaction::records(storage, layout).ok().flatten().unwrap_or_default() != [directory.compaction().clone()] {
-            publish(storage, layout, &staging, vec![directory.compaction().clone()])?;
-            storage.remove_folder(&staging).map_err(StorageError::at("remove", &staging))?;
-        }
-        return Ok(described(storage, directory.compaction(), layout, sources.jobs, false)?);
-    }
-    create_folder(storage, &staging)?;
-    probe(storage, &staging)?;
-    let new = Layout::new(&staging);
-    let mut compaction = sources.compaction.clone();
-    if compaction.part_count() > 0 {
-        let mut build =
-            Build { storage, directory, sources: &sources, without, new: &new, compaction: &mut compaction };
-        build.table::<SlipRow<'_>>()?;
-        if directory.records_precursors() {
-            build.table::<PrecursorRow<'_>>()?;
-        }
-        let rows = build.table::<JobRow>()?;
-        if rows != sources.jobs {
-            let problem = format!("{rows} jobs were read where the plan has {}", sources.jobs);
-            return Err(DatasetError::damaged(&layout.table(tables::JOBS))(problem).into());
-        }
-    }
-    for table in directory.tables() {
-        let folder = new.table(table);
-        create_folder(storage, &folder)?;
-        storage.sync_folder(&folder).map_err(StorageError::at("sync", &folder))?;
-    }
-    exchange(storage, layout, &staging, &compaction)?;
-    if let Some(quarantine) = quarantine {
-        for file in &without.files {
-            if let Ok(inside) = file.strip_prefix(layout.tables()) {
-                move_away(storage, &new.tables().join(inside), &quarantine.join(inside))?;
-            }
-        }
-    }
-    storage.remove_folder(&staging).map_err(StorageError::at("remove", &staging))?;
-    Ok(described(storage, &compaction, layout, sources.jobs, true)?)
-}
-
-/// Moves a file, if it is there, under a name that is free.
-///
-/// # Errors
-/// When that fails.
-pub fn move_away(storage: &dyn Storage, from: &Path, to: &Path) -> Result<(), StorageError> {
-    let exists = |path: &Path| storage.exists(path).map_err(StorageError::at("look up", path));
-    if !exists(from)? {
-        return Ok(());
-    }
-    let mut free = to.to_owned();
-    let mut number = 0;
-    while exists(&free)? {
-        number += 1;
-        free = to.with_added_extension(number.to_string());
-    }
-    for folder in [free.parent(), from.parent()].into_iter().flatten() {
-        create_folder(storage, folder)?;
-    }
-    storage.rename(from, &free).map_err(StorageError::at("move a file here", &free))?;
-    for folder in [free.parent(), from.parent()].into_iter().flatten() {
-        storage.sync_folder(folder).map_err(StorageError::at("sync", folder))?;
-    }
-    Ok(())
-}
-
-/// What goes into the compacted files.
-struct Sources {
-    /// The parts that have files of their own.
-    parts: Vec<String>,
-    /// All parts, with no files yet.
-    compaction: Compaction,
-    /// Their jobs.
+/// Consecutive parts that make one file of each table.
+struct Chunk {
+    extension: usize,
+    parts: RangeInclusive<u64>,
     jobs: u64,
-    /// Ids of the jobs of parts that are left out.
-    dropped: HashSet<String>,
 }
 
-impl Sources {
-    fn of(storage: &dyn Storage, directory: &Directory, without: &Without) -> Result<Self, DatasetError> {
-        let mut sources =
-            Self { parts: Vec::new(), compaction: Compaction::default(), jobs: 0, dropped: without.jobs.clone() };
-        for part in Plan::new(directory.sweeps()).parts() {
-            if without.parts.contains(&part_name(&part)) {
-                let sweep = &directory.sweeps()[part.epoch];
-                sources.dropped.extend((0..part.jobs.len()).map(|job| label(sweep, &part, job).0.job_id));
+impl Chunk {
+    const fn begin(&self) -> (usize, u64) {
+        (self.extension, *self.parts.start())
+    }
+
+    fn goes_on_with(&self, part: &Part) -> bool {
+        (self.extension, self.parts.end() + 1) == (part.epoch, part.index)
+    }
+
+    /// Whether a file holds these parts, compacted.
+    fn is(&self, file: &TableFile) -> bool {
+        file.is_compacted() && (file.extension, file.parts()) == (self.extension, self.parts.clone())
+    }
+}
+
+/// Files of a table, by extension and first part.
+type TableFiles = BTreeMap<(usize, u64), TableFile>;
+
+/// Which files a compaction makes, and which it leaves alone.
+#[derive(Default)]
+struct CompactionPlan {
+    chunks: Vec<Chunk>,
+    /// Parts with failed jobs, by extension and number.
+    failed: Vec<(usize, u64)>,
+}
+
+impl Results<'_> {
+    /// Compacts the parts that are done and have no failed jobs.
+    ///
+    /// # Errors
+    /// When a shard is being run, something is damaged, or the file system cannot do it. The tables are then as before.
+    pub fn compact(&self) -> Result<Compacted, ResultsError> {
+        self.compact_by(PARTS_PER_FILE)
+    }
+
+    pub(crate) fn compact_by(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
+        self.exclusively(|| {
+            let problems = Self::verify(self.storage(), self.layout().root())?.problems;
+            if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
+                return Err(ResultsError::damaged(&problem.path, problem.problem));
             }
-            if let Some(failed) = failures(storage, directory, &part)? {
-                sources.jobs += part.jobs.len() as u64;
-                sources.compaction.add(part.epoch, part.index, failed);
-                if !directory.compaction().holds(part.epoch, part.index) {
-                    sources.parts.push(part_file(&part));
+            let staging = self.layout().staging(WRITER);
+            self.storage().remove_folder(&staging)?;
+            let plan = self.plan_compaction(parts_per_file)?;
+            let mut there = self.table_files(tables::JOBS)?;
+            there.retain(|_, file| file.is_compacted());
+            let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
+            let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
+            if changed {
+                self.build(&plan, &staging)?;
+            }
+            Ok(self.report_compaction(&plan, changed)?)
+        })
+    }
+
+    /// Goes through the plan for runs of parts that can be compacted.
+    fn plan_compaction(&self, parts_per_file: u64) -> Result<CompactionPlan, ResultsError> {
+        let done = self.done_parts()?;
+        let mut plan = CompactionPlan::default();
+        for part in self.plan().parts() {
+            let Some(failures) = self.failures(&done, &part)? else { continue };
+            let jobs = part.jobs.len() as u64;
+            match plan.chunks.last_mut() {
+                _ if !failures.is_empty() => plan.failed.push((part.epoch, part.index)),
+                Some(chunk) if chunk.goes_on_with(&part) && !part.index.is_multiple_of(parts_per_file) => {
+                    chunk.parts = *chunk.parts.start()..=part.index;
+                    chunk.jobs += jobs;
                 }
+                _ => plan.chunks.push(Chunk { extension: part.epoch, parts: part.index..=part.index, jobs }),
             }
         }
-        Ok(sources)
+        Ok(plan)
     }
 
-    /// Whether nothing is left to be done: every part is compacted, under the sweep that was asked for last.
-    fn is_compact(&self, storage: &dyn Storage, directory: &Directory) -> Result<bool, DatasetError> {
-        let Some(file) = directory.compaction().of_table(tables::JOBS).first() else {
-            return Ok(self.parts.is_empty());
-        };
-        let path = directory.layout().table(tables::JOBS).join(file);
-        let sweep = &directory.sweeps()[directory.current()];
-        Ok(self.parts.is_empty() && footer(storage, &path)?.get("sweep").is_some_and(|text| text == sweep.text()))
+    fn table_files(&self, table: &str) -> Result<TableFiles, StorageError> {
+        let names = self.storage().list(&self.layout().table(table))?;
+        let files = names.iter().filter_map(|name| TableFile::parse(name.to_str()?));
+        Ok(files.map(|file| ((file.extension, file.first), file)).collect())
     }
-}
 
-/// New tables on their way.
-struct Build<'a> {
-    storage: &'a dyn Storage,
-    directory: &'a Directory,
-    sources: &'a Sources,
-    without: &'a Without,
-    new: &'a Layout,
-    compaction: &'a mut Compaction,
-}
-
-impl Build<'_> {
-    /// Writes one table; gives the number of its rows.
-    fn table<R: Table>(&mut self) -> Result<u64, CompactError> {
-        let (layout, name) = (self.directory.layout(), R::NAME);
-        let folder = self.new.table(name);
-        create_folder(self.storage, &folder)?;
-        let old = |file: &String| layout.table(name).join(file);
-        let sorted = self.directory.compaction().of_table(name).iter().map(old);
-        let merge = Merge {
-            storage: self.storage,
-            table: std::marker::PhantomData::<fn(&R)>,
-            footer: &Footer::default().with_sweep(&self.directory.sweeps()[self.directory.current()]),
-            scratch: self.new.root(),
-            takes: &|job| !self.sources.dropped.contains(job),
-        };
-        let merged = merge.write(
-            self.sources.parts.iter().map(old).collect(),
-            sorted.filter(|path| !self.without.files.contains(path)).collect(),
-            &folder,
-        )?;
-        self.compaction.files.insert(name.to_owned(), merged.names);
-        Ok(merged.rows)
+    /// Builds the new tables, and puts them in the place of the old ones, which then lie in the staging folder.
+    fn build(&self, plan: &CompactionPlan, staging: &Path) -> Result<(), ResultsError> {
+        let storage = self.storage();
+        create_folder(storage, staging)?;
+        self.probe_exchange(staging)?;
+        let (old, new) = (self.layout(), Layout::new(staging));
+        self.concatenate::<SlipRow<'_>>(plan, &new)?;
+        if self.sweep().recording().precursors {
+            self.concatenate::<PrecursorRow<'_>>(plan, &new)?;
+        }
+        let files = self.concatenate::<JobRow>(plan, &new)?;
+        for folder in [&new.tables(), staging] {
+            storage.sync_folder(folder)?;
+        }
+        storage.exchange(&old.tables(), &new.tables())?;
+        for folder in [old.root(), staging] {
+            storage.sync_folder(folder)?;
+        }
+        self.begin_log()?.write(&RunEvent::Compacted { files })?;
+        Ok(storage.remove_folder(staging)?)
     }
-}
 
-/// Tries the exchange on two empty folders before anything is built.
-fn probe(storage: &dyn Storage, staging: &Path) -> Result<(), CompactError> {
-    let [one, other] = ["one", "other"].map(|name| staging.join(name));
-    for folder in [&one, &other] {
-        create_folder(storage, folder)?;
-    }
-    match storage.exchange(&one, &other) {
-        Err(error) if error.kind() == ErrorKind::Unsupported => Err(CompactError::NoExchange(staging.to_owned())),
-        exchanged => Ok(exchanged.map_err(StorageError::at("exchange folders with", &other))?),
-    }
-}
-
-/// Puts the new tables in the place of the old ones, which then lie in the staging folder.
-fn exchange(
-    storage: &dyn Storage,
-    layout: &Layout,
-    staging: &Path,
-    compaction: &Compaction,
-) -> Result<(), DatasetError> {
-    let (old, new) = (layout.tables(), Layout::new(staging).tables());
-    create_folder(storage, &old)?;
-    for folder in [&new, staging] {
-        storage.sync_folder(folder).map_err(StorageError::at("sync", folder))?;
-    }
-    // Both, so that whichever tables are there after a kill, there is a record that fits. A damaged one fits none.
-    let before = match Compaction::records(storage, layout) {
-        Ok(records) => records.unwrap_or_else(|| vec![Compaction::default()]),
-        Err(_) => Vec::new(),
-    };
-    let both = before.into_iter().filter(|before| before != compaction).chain([compaction.clone()]).collect();
-    publish(storage, layout, staging, both)?;
-    storage.exchange(&old, &new).map_err(StorageError::at("exchange folders with", &old))?;
-    for folder in [layout.root(), staging] {
-        storage.sync_folder(folder).map_err(StorageError::at("sync", folder))?;
-    }
-    publish(storage, layout, staging, vec![compaction.clone()])
-}
-
-fn publish(
-    storage: &dyn Storage,
-    layout: &Layout,
-    staging: &Path,
-    records: Vec<Compaction>,
-) -> Result<(), DatasetError> {
-    let mut commit = Commit::begin(storage, staging)?;
-    Compaction::stage(&mut commit, layout, records)?;
-    Ok(commit.publish()?)
-}
-
-fn described(
-    storage: &dyn Storage,
-    compaction: &Compaction,
-    layout: &Layout,
-    jobs: u64,
-    changed: bool,
-) -> Result<Compacted, StorageError> {
-    let mut compacted = Compacted { changed, parts: compaction.part_count(), jobs, ..Compacted::default() };
-    for (table, files) in &compaction.files {
-        for file in files {
-            let path = layout.table(table).join(file);
-            let length = storage.open(&path).and_then(|file| file.metadata()).map(|metadata| metadata.len());
-            compacted.bytes += length.map_err(StorageError::at("read", &path))?;
-            compacted.files += 1;
+    /// Tries the exchange on two empty folders before anything is built.
+    fn probe_exchange(&self, staging: &Path) -> Result<(), ResultsError> {
+        let [one, other] = ["one", "other"].map(|name| staging.join(name));
+        for folder in [&one, &other] {
+            create_folder(self.storage(), folder)?;
+        }
+        match self.storage().exchange(&one, &other) {
+            Err(error) if error.kind() == ErrorKind::Unsupported => Err(ResultsError::refused(
+                staging,
+                "this file system cannot exchange two folders in one step, so readers would see an unfinished table; \
+                 nothing was changed. Copy the directory to a local disk and compact it there",
+            )),
+            exchanged => Ok(exchanged?),
         }
     }
-    Ok(compacted)
+
+    /// Makes the files of one table; returns the names of those that are compacted.
+    fn concatenate<R: Table>(&self, plan: &CompactionPlan, new: &Layout) -> Result<Vec<String>, ResultsError> {
+        let (storage, name) = (self.storage(), R::NAME);
+        let (old_folder, new_folder) = (self.layout().table(name), new.table(name));
+        let old = self.table_files(name)?;
+        create_folder(storage, &new_folder)?;
+        let keep = |file: &TableFile| {
+            let file = file.to_string();
+            storage.link(&old_folder.join(&file), &new_folder.join(&file)).map(|()| file)
+        };
+        for file in plan.failed.iter().filter_map(|part| old.get(part)) {
+            keep(file)?;
+        }
+        let mut names = Vec::new();
+        for chunk in &plan.chunks {
+            // Files of earlier compactions lie within one chunk, as parts never leave them one by one.
+            let sources = old.range(chunk.begin()..=(chunk.extension, *chunk.parts.end()));
+            let sources: Vec<&TableFile> = sources.map(|(_, file)| file).collect();
+            if let [file] = sources[..]
+                && chunk.is(file)
+            {
+                names.push(keep(file)?);
+                continue;
+            }
+            let staged = new_folder.join("new");
+            let mut writer = TableWriter::<R>::create(storage, &staged, &self.footer(chunk.extension))?;
+            let mut rows = 0;
+            let paths = sources.iter().map(|file| old_folder.join(file.to_string())).collect();
+            for batch in Reader::new(storage, paths) {
+                let batch = batch?;
+                rows += batch.rows.num_rows() as u64;
+                writer.copy(&batch, 0..batch.rows.num_rows())?;
+            }
+            if name == tables::JOBS && rows != chunk.jobs {
+                let problem = format!("{rows} jobs were read where the plan has {}", chunk.jobs);
+                return Err(ResultsError::damaged(&old_folder, problem));
+            }
+            let file = TableFile::compacted(chunk.extension, &chunk.parts, &writer.seal()?).to_string();
+            storage.rename(&staged, &new_folder.join(&file))?;
+            names.push(file);
+        }
+        storage.sync_folder(&new_folder)?;
+        Ok(names)
+    }
+
+    fn report_compaction(&self, plan: &CompactionPlan, changed: bool) -> Result<Compacted, StorageError> {
+        let mut compacted = Compacted { changed, failed_parts: plan.failed.len() as u64, ..Compacted::default() };
+        for chunk in &plan.chunks {
+            compacted.parts += chunk.parts.end() - chunk.parts.start() + 1;
+            compacted.jobs += chunk.jobs;
+        }
+        for table in self.tables() {
+            for file in self.table_files(table)?.into_values().filter(TableFile::is_compacted) {
+                compacted.bytes += self.storage().length(&self.layout().table(table).join(file.to_string()))?;
+                compacted.files += 1;
+            }
+        }
+        Ok(compacted)
+    }
 }

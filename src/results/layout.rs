@@ -1,20 +1,23 @@
-//! Layout of a results directory: where everything lies, and how parts are called.
+//! Layout of a results directory: where everything lies, and which parts a file holds, by its name.
 //!
 //! ```text
-//! results/<name>/tables/{slips,precursors,jobs}/part-EEE-IIIIII.parquet   committed files only, at every instant
-//!                tables/{slips,precursors,jobs}/compact-IIIIII-SEAL.parquet  what was compacted
+//! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
+//!                tables/{slips,precursors,jobs}/compact-EEE-FFFFFF-LLLLLL-CHECKSUM.parquet  what was compacted
 //!                reduced/  figures/                                      made from the tables
 //!                run/manifest.json  sweep-EEE.toml                       what the tables belong to
-//!                run/compacted.json                                      what the compacted files hold
 //!                run/{staging,lock,log}/                                 of no use once nothing runs
 //!                run/quarantine/                                         damaged files that a repair took away
 //! ```
 //!
+//! EEE is the number of the extension, FFFFFF that of the first part in the file and LLLLLL that of the last.
 //! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
 //! folders: a stray file of any name there breaks some reader.
 
 use crate::results::tables;
 use crate::sweep::Part;
+use crate::table::file::FILE_EXTENSION;
+use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Folder of the tables.
@@ -89,16 +92,10 @@ impl Layout {
         self.run().join(MANIFEST)
     }
 
-    /// Copy of the sweep file of an epoch.
+    /// Copy of the sweep file of an extension.
     #[must_use]
-    pub fn sweep(&self, epoch: usize) -> PathBuf {
-        self.run().join(format!("sweep-{epoch:03}.toml"))
-    }
-
-    /// Record of what the compacted files hold.
-    #[must_use]
-    pub fn compacted(&self) -> PathBuf {
-        self.run().join("compacted.json")
+    pub fn sweep(&self, extension: usize) -> PathBuf {
+        self.run().join(format!("sweep-{extension:03}.toml"))
     }
 
     /// Where a repair puts what is damaged.
@@ -126,57 +123,89 @@ impl Layout {
     }
 }
 
-/// What the names of parts begin with.
-const PART: &str = "part-";
-/// What the names of compacted files begin with.
-const COMPACT: &str = "compact-";
-/// How the names of table files end.
-pub const EXTENSION: &str = "parquet";
-/// Characters of the seal in the name of a compacted file: other bytes, another name.
-const SEAL_CHARACTERS: usize = 16;
+/// Characters of the checksum in the name of a compacted file: other bytes, another name.
+const CHECKSUM_CHARACTERS: usize = 16;
 
 /// Name of a part, which is that of its file in every table.
 #[must_use]
 pub fn part_name(part: &Part) -> String {
-    name_of(part.epoch, part.index)
+    part_name_of(part.epoch, part.index)
 }
 
-/// Name of a part by epoch and number.
+/// Name of a part by its extension and its number.
 #[must_use]
-pub fn name_of(epoch: usize, index: u64) -> String {
-    format!("{PART}{epoch:03}-{index:06}")
+pub fn part_name_of(extension: usize, index: u64) -> String {
+    format!("part-{extension:03}-{index:06}")
 }
 
-/// Epoch and number of the part of this name; `None` if it names none.
-#[must_use]
-pub fn named_part(name: &str) -> Option<(usize, u64)> {
-    let (epoch, index) = name.strip_prefix(PART)?.split_once('-')?;
-    let (epoch, index) = (epoch.parse().ok()?, index.parse().ok()?);
-    (name == name_of(epoch, index)).then_some((epoch, index))
+/// Name of a table file, which says whose rows it holds: those of one part, or of consecutive parts of an extension.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TableFile {
+    /// Number of the extension.
+    pub extension: usize,
+    /// Number of the first part.
+    pub first: u64,
+    /// Number of the last part.
+    pub last: u64,
+    /// How the file's checksum begins, if it is compacted.
+    pub checksum: Option<String>,
 }
 
-/// Name of the file of a part.
-#[must_use]
-pub fn part_file(part: &Part) -> String {
-    file_of(&part_name(part))
+impl TableFile {
+    /// The file of a part of its own.
+    #[must_use]
+    pub const fn of_part(extension: usize, index: u64) -> Self {
+        Self { extension, first: index, last: index, checksum: None }
+    }
+
+    /// The compacted file of these parts with this checksum.
+    #[must_use]
+    pub fn compacted(extension: usize, parts: &RangeInclusive<u64>, checksum: &str) -> Self {
+        let checksum = Some(checksum.chars().take(CHECKSUM_CHARACTERS).collect());
+        Self { extension, first: *parts.start(), last: *parts.end(), checksum }
+    }
+
+    /// What a name says; `None` if it is not that of a table file.
+    #[must_use]
+    pub fn parse(name: &str) -> Option<Self> {
+        let stem = name.strip_suffix(FILE_EXTENSION)?.strip_suffix('.')?;
+        let file = match *stem.split('-').collect::<Vec<_>>() {
+            ["part", extension, index] => Self::of_part(extension.parse().ok()?, index.parse().ok()?),
+            ["compact", extension, first, last, checksum] => {
+                Self::compacted(extension.parse().ok()?, &(first.parse().ok()?..=last.parse().ok()?), checksum)
+            }
+            _ => return None,
+        };
+        (file.to_string() == name && file.first <= file.last).then_some(file)
+    }
+
+    /// Whether it holds several parts, or was meant to.
+    #[must_use]
+    pub const fn is_compacted(&self) -> bool {
+        self.checksum.is_some()
+    }
+
+    /// Names of its parts.
+    pub fn part_names(&self) -> impl Iterator<Item = String> + use<> {
+        let extension = self.extension;
+        self.parts().map(move |index| part_name_of(extension, index))
+    }
+
+    /// Numbers of its parts.
+    #[must_use]
+    pub const fn parts(&self) -> RangeInclusive<u64> {
+        self.first..=self.last
+    }
 }
 
-/// Name of the file of the part of this name.
-#[must_use]
-pub fn file_of(part: &str) -> String {
-    format!("{part}.{EXTENSION}")
-}
-
-/// Name of a compacted file with this number and [seal](crate::table::checksum).
-#[must_use]
-pub fn compacted_file(number: usize, seal: &str) -> String {
-    format!("{COMPACT}{number:06}-{}.{EXTENSION}", &seal[..SEAL_CHARACTERS])
-}
-
-/// Whether a name is that of a compacted file.
-#[must_use]
-pub fn is_compacted(name: &str) -> bool {
-    name.starts_with(COMPACT) && Path::new(name).extension().is_some_and(|extension| extension == EXTENSION)
+impl fmt::Display for TableFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { extension, first, last, checksum } = self;
+        match checksum {
+            None => write!(f, "{}.{FILE_EXTENSION}", part_name_of(*extension, *first)),
+            Some(checksum) => write!(f, "compact-{extension:03}-{first:06}-{last:06}-{checksum}.{FILE_EXTENSION}"),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -184,12 +213,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_parts_read_back_and_others_are_none() {
-        for part in [(0, 0), (7, 123_456), (1000, 1_234_567)] {
-            assert_eq!(named_part(&name_of(part.0, part.1)), Some(part));
+    fn names_of_table_files_read_back_and_others_are_none() {
+        for (extension, first, last) in [(0, 0, 0), (7, 123_456, 123_457), (1000, 1_234_567, 1_234_567)] {
+            let compacted = TableFile::compacted(extension, &(first..=last), &"0123456789abcdef".repeat(4));
+            for file in [TableFile::of_part(extension, first), compacted] {
+                assert_eq!(TableFile::parse(&file.to_string()), Some(file));
+            }
         }
-        for name in ["part-0-0", "part-000-000001 (copy)", "part-000-+00001", "compact-000000-0", "part-000", ""] {
-            assert_eq!(named_part(name), None, "{name}");
+        for name in [
+            "part-0-0.parquet",
+            "part-000-000001 (copy).parquet",
+            "part-000-+00001.parquet",
+            "part-000-000001",
+            "compact-000-000000-0123456789abcdef.parquet",
+            "compact-000-000002-000001-0123456789abcdef.parquet",
+            "compact-000-000000-000001-0123456789abcdef0.parquet",
+            "part-000.parquet",
+            "",
+        ] {
+            assert_eq!(TableFile::parse(name), None, "{name}");
         }
     }
 }

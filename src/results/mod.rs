@@ -3,18 +3,27 @@
 //! ```text
 //! tables.rs                   what is written: slips, precursors, jobs
 //! commit.rs                   files that appear whole or not at all
-//! layout.rs, manifest.rs      a directory, and which sweeps it belongs to
-//! part.rs                     the rows of some jobs, in all tables at once
-//! merge.rs -> compact.rs      all of them, sorted; compaction.rs records which parts they are
-//! verify/                     what is damaged, and its repair
+//! layout.rs, manifest.rs      where everything lies, and which sweeps it belongs to
+//! handle.rs                   a directory that fits this program
+//!   parts.rs                  which parts are done, and the rows of one, in all tables at once
+//!   lock.rs                   who runs a shard, and who has the directory to himself
+//!   events.rs                 what happens, and its log
+//!   compact.rs                many parts in one file
+//!   verify/                   what is damaged, and its repair
+//! error.rs                    why a directory cannot be used or changed
 //! ```
 
 pub mod commit;
 pub mod compact;
-pub mod compaction;
+pub mod error;
+pub mod events;
+pub mod handle;
 pub mod layout;
+pub mod lock;
 pub mod manifest;
-pub mod merge;
-pub mod part;
+pub mod parts;
 pub mod tables;
 pub mod verify;
+
+pub use error::{ErrorKind, ResultsError};
+pub use handle::Results;

@@ -1,14 +1,13 @@
 //! The collector: hands jobs to the workers, puts their outcomes together into parts, and commits them.
 
+use crate::results::ResultsError;
 use crate::results::layout::part_name;
-use crate::results::part::{self, Outcome};
-use crate::run::log::{Entry, Log};
-use crate::run::survey::{Scope, Task};
+use crate::results::parts::Outcome;
+use crate::run::share::{PartJob, Share};
 use crate::run::walltime::Walltime;
-use crate::run::{Kernel, RunError, RunEvent, RunReport};
+use crate::run::{Events, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Part};
-use crate::table::file::DatasetError;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
@@ -27,12 +26,12 @@ const WAITING_PER_THREAD: usize = 4;
 /// What the workers send.
 enum Message {
     Ended {
-        task: Task,
+        job: PartJob,
         outcome: Outcome,
         wall: f64,
     },
     /// The plan could not be continued, since a part could not be looked up.
-    Broken(DatasetError),
+    Broken(ResultsError),
 }
 
 /// A part of which some jobs are still out.
@@ -40,45 +39,43 @@ struct OpenPart {
     part: Arc<Part>,
     outcomes: BTreeMap<usize, Outcome>,
     again: bool,
-    predicted: f64,
-    measured: f64,
+    predicted_cost: f64,
+    measured_cost: f64,
 }
 
-pub(super) struct Collector<'a> {
-    scope: Scope<'a>,
+pub(super) struct Collector<'a, 'e> {
+    share: &'a Share<'a>,
     staging: &'a Path,
     walltime: &'a Walltime,
-    log: &'a mut Log,
+    events: &'a mut Events<'e>,
     report: &'a mut RunReport,
-    progress: &'a mut dyn FnMut(RunEvent<'_>),
     open: HashMap<(usize, u64), OpenPart>,
 }
 
-impl<'a> Collector<'a> {
+impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
-        scope: Scope<'a>,
+        share: &'a Share<'a>,
         staging: &'a Path,
         walltime: &'a Walltime,
-        log: &'a mut Log,
+        events: &'a mut Events<'e>,
         report: &'a mut RunReport,
-        progress: &'a mut dyn FnMut(RunEvent<'_>),
     ) -> Self {
-        Self { scope, staging, walltime, log, report, progress, open: HashMap::new() }
+        Self { share, staging, walltime, events, report, open: HashMap::new() }
     }
 
-    /// Runs the tasks of the scope, until they are done, the flag turns true, the time is over, or something fails that is
-    /// not a job. Tells whether all were run.
-    pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, RunError> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|source| RunError::Threads { threads, source })?;
+    /// Runs the jobs of the share, until they are done, the flag turns true, the time is over, or something fails that
+    /// is not a job. Returns whether all were run.
+    pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+            let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
+            ResultsError::refused(self.share.results.layout().root(), problem)
+        })?;
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let tasks = self.scope.tasks(self.walltime).take_while(|_| !interrupt.load(Ordering::Relaxed));
+        let jobs = self.share.jobs(self.walltime).take_while(|_| !interrupt.load(Ordering::Relaxed));
         pool.in_place_scope(|workers| {
-            workers.spawn(move |_| tasks.par_bridge().for_each(|task| work(task, kernel, interrupt, &sender)));
+            workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, &sender)));
             let collected = self.collect(&receiver, stop, interrupt);
             interrupt.store(true, Ordering::Relaxed);
             // Frees workers that wait to send.
@@ -92,20 +89,20 @@ impl<'a> Collector<'a> {
         receiver: &Receiver<Message>,
         stop: &AtomicBool,
         interrupt: &AtomicBool,
-    ) -> Result<bool, RunError> {
-        let mut is_told = false;
+    ) -> Result<bool, ResultsError> {
+        let mut is_out_of_time = false;
         loop {
             let must_end = stop.load(Ordering::Relaxed) || self.walltime.is_over();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
-                (self.progress)(RunEvent::Stopping);
+                self.events.send(&RunEvent::Stopping)?;
             }
-            if !is_told && self.walltime.refused().is_some() {
-                is_told = true;
-                (self.progress)(RunEvent::OutOfTime);
+            if !is_out_of_time && self.walltime.refused().is_some() {
+                is_out_of_time = true;
+                self.events.send(&RunEvent::OutOfTime)?;
             }
             match receiver.recv_timeout(STOP_POLL) {
-                Ok(Message::Ended { task, outcome, wall }) => self.take(&task, outcome, wall)?,
-                Ok(Message::Broken(error)) => return Err(error.into()),
+                Ok(Message::Ended { job, outcome, wall }) => self.take(&job, outcome, wall)?,
+                Ok(Message::Broken(error)) => return Err(error),
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Ok(!interrupt.load(Ordering::Relaxed) && self.walltime.refused().is_none());
@@ -114,32 +111,33 @@ impl<'a> Collector<'a> {
         }
     }
 
-    fn take(&mut self, task: &Task, outcome: Outcome, wall: f64) -> Result<(), RunError> {
-        let job = &task.part.jobs[task.position];
+    fn take(&mut self, of: &PartJob, outcome: Outcome, wall: f64) -> Result<(), ResultsError> {
+        let job = &of.part.jobs[of.position];
         let predicted_cost = job.cost;
         self.walltime.ended(predicted_cost, wall);
-        match &outcome {
-            Ok(result) => (self.progress)(RunEvent::JobDone { slips: result.slips.len(), predicted_cost, wall }),
-            Err(reason) => {
-                let sweep = &self.scope.directory.sweeps()[task.part.epoch];
-                let (job_id, command) = (sweep.job_id(&job.parameters).to_string(), sweep.command(job));
-                let failed = RunEvent::JobFailed { job_id: &job_id, reason, command: &command, predicted_cost, wall };
-                (self.progress)(failed);
-                self.log.write(Entry::Failed { job_id, reason: reason.clone(), command })?;
-            }
-        }
-        let key = (task.part.epoch, task.part.index);
+        let event = match &outcome {
+            Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost, wall },
+            Err(reason) => RunEvent::JobFailed {
+                job_id: self.share.results.job_id(&of.part, of.position),
+                reason: reason.clone(),
+                command: self.share.results.sweeps()[of.part.epoch].command(job),
+                predicted_cost,
+                wall,
+            },
+        };
+        self.events.send(&event)?;
+        let key = (of.part.epoch, of.part.index);
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
-            part: Arc::clone(&task.part),
+            part: Arc::clone(&of.part),
             outcomes: BTreeMap::new(),
-            again: task.again,
-            predicted: 0.0,
-            measured: 0.0,
+            again: of.again,
+            predicted_cost: 0.0,
+            measured_cost: 0.0,
         });
-        open.outcomes.insert(task.position, outcome);
-        open.predicted += predicted_cost;
-        open.measured += wall;
-        if open.outcomes.len() == task.together
+        open.outcomes.insert(of.position, outcome);
+        open.predicted_cost += predicted_cost;
+        open.measured_cost += wall;
+        if open.outcomes.len() == of.together
             && let Some(whole) = self.open.remove(&key)
         {
             self.commit(&whole)?;
@@ -147,37 +145,36 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    fn commit(&mut self, whole: &OpenPart) -> Result<(), RunError> {
+    fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
-        part::commit(self.scope.storage, self.scope.directory, self.staging, &whole.part, &whole.outcomes)?;
+        self.share.results.commit(self.staging, &whole.part, &whole.outcomes)?;
         self.walltime.committed(begin.elapsed().as_secs_f64());
-        let (name, jobs) = (part_name(&whole.part), whole.outcomes.len());
+        let (part, jobs) = (part_name(&whole.part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
-        let (predicted, measured) = (whole.predicted, whole.measured);
+        let OpenPart { predicted_cost, measured_cost, .. } = *whole;
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
-        // A part that others committed since the survey is not in the count.
+        // A part that others committed since the overview is not in the count.
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
         if whole.again {
             report.jobs_failed = report.jobs_failed.saturating_sub(jobs as u64);
         }
         report.jobs_failed += failed as u64;
-        report.predicted_cost += predicted;
-        report.measured_cost += measured;
-        (self.progress)(RunEvent::PartCommitted { part: &name, jobs, failed });
-        Ok(self.log.write(Entry::Part { part: name, jobs, failed, predicted, measured })?)
+        report.predicted_cost += predicted_cost;
+        report.measured_cost += measured_cost;
+        Ok(self.events.send(&RunEvent::PartCommitted { part, jobs, failed, predicted_cost, measured_cost })?)
     }
 }
 
 /// Runs one job and sends its outcome. That nobody listens any more means that the run has ended.
-fn work(task: Result<Task, DatasetError>, kernel: &Kernel<'_>, interrupt: &AtomicBool, sender: &SyncSender<Message>) {
-    let message = match task {
+fn work(job: Result<PartJob, ResultsError>, kernel: &Kernel<'_>, interrupt: &AtomicBool, sender: &SyncSender<Message>) {
+    let message = match job {
         Err(error) => Message::Broken(error),
-        Ok(task) => {
+        Ok(job) => {
             let begin = Instant::now();
-            let Some(outcome) = outcome(&task.part.jobs[task.position], kernel, interrupt) else { return };
-            Message::Ended { task, outcome, wall: begin.elapsed().as_secs_f64() }
+            let Some(outcome) = outcome(&job.part.jobs[job.position], kernel, interrupt) else { return };
+            Message::Ended { job, outcome, wall: begin.elapsed().as_secs_f64() }
         }
     };
     let _ = sender.send(message);

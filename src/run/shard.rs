@@ -1,8 +1,8 @@
 //! Shards: a share of the parts for each of several runs that work side by side on one directory.
 //!
-//! Parts are dealt in the order of the plan, each to the shard with the least predicted cost so far. Contract: a function of
-//! the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on, and changes
-//! nothing that was dealt before; no two shards differ by more than the costliest part.
+//! Parts are dealt in the order of the plan, each to the shard with the least predicted cost so far. Contract: a
+//! function of the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on,
+//! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
 use crate::sweep::Part;
 use std::cmp::Reverse;

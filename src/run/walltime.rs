@@ -1,15 +1,15 @@
 //! Walltime: which parts a run may still start so that it ends in time, with all that it started committed.
 //!
-//! A part is started if, at the pace so far (measured over predicted cost), it and all that is under way end in time. Parts
-//! that would not are passed over, and cheaper ones after them are taken. The pace is that of the jobs that have ended; of
-//! earlier runs in the directory before the first; and 1 before any. Should a job take longer after all, it is interrupted
-//! at the end, and whole parts are kept.
+//! A part is started if, at the pace so far (measured over predicted cost), it and all that is under way end in time.
+//! Parts that would not are passed over, and cheaper ones after them are taken. The pace is that of the jobs that have
+//! ended; of earlier runs in the directory before the first; and 1 before any. Should a job take longer after all, it
+//! is interrupted at the end, and whole parts are kept.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Least time set aside for ending, in s: for the last commits and for those who wait.
-const LEAST_RESERVE: f64 = 0.5;
+const MIN_RESERVE: f64 = 0.5;
 /// More is set aside where commits are slow: so many times the slowest.
 const COMMITS_IN_RESERVE: f64 = 3.0;
 
@@ -95,7 +95,7 @@ impl Walltime {
     /// Time left but for what is set aside, in s.
     fn left(&self) -> Option<f64> {
         let end = self.end?;
-        let reserve = LEAST_RESERVE.max(COMMITS_IN_RESERVE * self.state().slowest_commit);
+        let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.state().slowest_commit);
         Some(end.saturating_duration_since(Instant::now()).as_secs_f64() - reserve)
     }
 

@@ -53,27 +53,30 @@ impl<'a> Plan<'a> {
     }
 
     /// The jobs that an epoch owns, those that are in no earlier sweep, in grid order.
-    pub(super) fn jobs(self, epoch: usize) -> impl Iterator<Item = Job> + Send + use<'a> {
+    pub(super) fn jobs(self, epoch: usize) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
         let (earlier, sweep) = (&self.epochs[..epoch], &self.epochs[epoch]);
         sweep.jobs().filter(move |job| !earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
     }
 
+    /// The parts of an epoch, in order.
+    pub fn parts_of(self, epoch: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
+        let mut source = self.jobs(epoch);
+        (0..).map_while(move |index| {
+            let (mut jobs, mut cost) = (Vec::new(), 0.0);
+            while cost < PART_COST
+                && jobs.len() < PART_JOBS
+                && let Some(job) = source.next()
+            {
+                cost += job.cost;
+                jobs.push(job);
+            }
+            (!jobs.is_empty()).then_some(Part { epoch, index, jobs, cost })
+        })
+    }
+
     /// The parts of all epochs, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
-        (0..self.epochs.len()).flat_map(move |epoch| {
-            let mut source = self.jobs(epoch);
-            (0..).map_while(move |index| {
-                let (mut jobs, mut cost) = (Vec::new(), 0.0);
-                while cost < PART_COST
-                    && jobs.len() < PART_JOBS
-                    && let Some(job) = source.next()
-                {
-                    cost += job.cost;
-                    jobs.push(job);
-                }
-                (!jobs.is_empty()).then_some(Part { epoch, index, jobs, cost })
-            })
-        })
+        (0..self.epochs.len()).flat_map(move |epoch| self.parts_of(epoch))
     }
 
     /// Walks through the plan and adds up.

@@ -87,7 +87,7 @@ impl Sweep {
     }
 
     /// The jobs in grid order.
-    pub fn jobs(&self) -> impl Iterator<Item = Job> + Send + '_ {
+    pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         self.admitted().map(|Point { parameters, .. }| {
             let cost = predicted_cost(&parameters, &self.recording, self.solver);
             Job { parameters, cost }
@@ -149,7 +149,7 @@ impl Sweep {
     }
 
     /// The points that are jobs, in canonical form.
-    pub(super) fn admitted(&self) -> impl Iterator<Item = Point> + Send + '_ {
+    pub(super) fn admitted(&self) -> impl Iterator<Item = Point> + Clone + Send + '_ {
         self.walk(self.axes.iter().map(Axis::len).collect()).filter(|point| self.admits(point))
     }
 
@@ -160,7 +160,7 @@ impl Sweep {
     }
 
     /// Walks through so many rows of each axis, past points that repeat an earlier one. Yields canonical points.
-    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Send + '_ {
+    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         (0..counts.iter().product()).filter_map(move |number: u64| {
             let mut rest = number;

@@ -1,7 +1,8 @@
-//! Seals: a file tells the SHA-256 of its own bytes, so that any changed bit of it is found.
+//! Checksums: a file holds the SHA-256 of its own bytes, so that any changed bit of it is found.
 //!
-//! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the footer
-//! under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of its pages.
+//! In a table file the hash is over the whole file, with zeros in the place of its 64 characters, which stand in the
+//! footer under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of
+//! its pages.
 
 use crate::table::file::DatasetError;
 use crate::table::storage::{Storage, StorageError};
@@ -13,12 +14,12 @@ use std::fmt::Write as _;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The footer's key of the seal.
+/// The footer's key of the checksum.
 pub const FOOTER_KEY: &str = "seal";
-/// What stands in its place while the hash is taken.
+/// What is in its place while the hash is taken.
 pub const PLACEHOLDER: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// How the format writes a key of 4 and a text of 64 characters. No sweep file may hold such control characters.
-const MARK: &[u8] = b"\x18\x04seal\x18\x40";
+const ENCODED_KEY: &[u8] = b"\x18\x04seal\x18\x40";
 /// Bytes after the footer: its length in four of them, and [`MAGIC`].
 const END: usize = 8;
 /// First and last bytes of a file.
@@ -38,26 +39,26 @@ pub fn hexadecimal(hash: &[u8]) -> String {
 
 /// Where the hash stands in bytes that end a file.
 fn place(end: &[u8]) -> Option<usize> {
-    let mark = end.windows(MARK.len()).position(|bytes| bytes == MARK)?;
-    let place = mark + MARK.len();
+    let mark = end.windows(ENCODED_KEY.len()).position(|bytes| bytes == ENCODED_KEY)?;
+    let place = mark + ENCODED_KEY.len();
     (place + PLACEHOLDER.len() <= end.len()).then_some(place)
 }
 
-/// Seals a file whose footer comes last: `hasher` has seen all bytes before it. Gives the seal.
+/// Puts the checksum into a footer, which comes last in a file: `hasher` has seen all bytes before it. Returns it.
 pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
     let place = place(footer)?;
     hasher.update(&*footer);
-    let seal = hexadecimal(&hasher.finalize());
-    footer[place..place + PLACEHOLDER.len()].copy_from_slice(seal.as_bytes());
-    Some(seal)
+    let checksum = hexadecimal(&hasher.finalize());
+    footer[place..place + PLACEHOLDER.len()].copy_from_slice(checksum.as_bytes());
+    Some(checksum)
 }
 
-/// Reads a file and compares its bytes with its seal, which it gives.
+/// Reads a file and compares its bytes with its checksum, which it returns.
 ///
 /// # Errors
-/// When the file cannot be read, is no sealed table file, or is not as it was written.
+/// When the file cannot be read, is no table file with a checksum, or is not as it was written.
 pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError> {
-    let file = storage.open(path).map_err(StorageError::at("read", path))?;
+    let file = storage.open(path)?;
     let compared = compare(file).map_err(StorageError::at("read", path))?;
     compared.map_err(|problem| DatasetError::damaged(path)(problem))
 }
@@ -81,8 +82,8 @@ fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str
     file.seek(SeekFrom::Start(begin))?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
-    let Some(place) = place(&bytes) else { return Ok(Err("it has no seal")) };
-    let seal = bytes[place..place + PLACEHOLDER.len()].to_owned();
+    let Some(place) = place(&bytes) else { return Ok(Err("it has no checksum")) };
+    let written = bytes[place..place + PLACEHOLDER.len()].to_owned();
     bytes[place..place + PLACEHOLDER.len()].copy_from_slice(PLACEHOLDER.as_bytes());
 
     let mut hasher = Sha256::new();
@@ -98,24 +99,24 @@ fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str
     }
     hasher.update(&bytes);
     let expected = hexadecimal(&hasher.finalize());
-    Ok(if expected.as_bytes() == seal { Ok(expected) } else { Err("its bytes are not those that were written") })
+    Ok(if expected.as_bytes() == written { Ok(expected) } else { Err("its bytes are not those that were written") })
 }
 
 /// A value with the SHA-256 of the rest of its text.
 #[derive(Serialize)]
-struct Sealed<'a, T> {
+struct Checksummed<'a, T> {
     #[serde(flatten)]
     value: &'a T,
     sha256: String,
 }
 
-/// A value as JSON with a seal: the same text for the same value.
+/// A value as JSON with a checksum: the same text for the same value.
 ///
 /// # Errors
 /// When the value has no form as a JSON object.
 pub fn to_json<T: Serialize>(value: &T) -> serde_json::Result<String> {
     let sha256 = hexadecimal(&Sha256::digest(serde_json::to_string_pretty(value)?));
-    Ok(serde_json::to_string_pretty(&Sealed { value, sha256 })? + "\n")
+    Ok(serde_json::to_string_pretty(&Checksummed { value, sha256 })? + "\n")
 }
 
 /// The value of such a text.
@@ -124,7 +125,7 @@ pub fn to_json<T: Serialize>(value: &T) -> serde_json::Result<String> {
 /// What is wrong with a text that [`to_json`] did not write.
 pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, String> {
     let mut object: Map<String, Value> = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    object.remove("sha256").ok_or("it has no seal")?;
+    object.remove("sha256").ok_or("it has no checksum")?;
     let value = serde_json::from_value(Value::Object(object)).map_err(|error| error.to_string())?;
     let expected = to_json(&value).map_err(|error| error.to_string())?;
     if text == expected { Ok(value) } else { Err("it is not as the program wrote it".to_owned()) }
@@ -147,8 +148,8 @@ mod tests {
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }
-        let seal = writer.seal().unwrap();
-        assert_eq!(check(&Disk, &path).unwrap(), seal);
+        let checksum = writer.seal().unwrap();
+        assert_eq!(check(&Disk, &path).unwrap(), checksum);
         let bytes = fs::read(&path).unwrap();
         for bit in 0..8 * bytes.len() {
             let mut changed = bytes.clone();
@@ -161,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn every_changed_bit_of_a_sealed_text_is_found() {
+    fn every_changed_bit_of_a_text_with_a_checksum_is_found() {
         let value = BTreeMap::from([("a".to_owned(), vec![1, 2]), ("b \"ü".to_owned(), vec![])]);
         let text = to_json(&value).unwrap();
         assert_eq!(from_json::<BTreeMap<String, Vec<u32>>>(&text), Ok(value));

@@ -5,15 +5,15 @@ pub(crate) mod over_disk;
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, Read as _, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// How often to look whether a lock is free.
 const LOCK_POLL: Duration = Duration::from_millis(20);
 
-/// A file that is being written.
-pub trait StoredFile: Write + Send {
+/// Where the bytes of a file go.
+pub trait Sink: Write + Send {
     /// Returns when all that was written is on the disk.
     ///
     /// # Errors
@@ -21,31 +21,75 @@ pub trait StoredFile: Write + Send {
     fn sync(&mut self) -> io::Result<()>;
 }
 
-/// The file operations. Every error is that of the operating system.
+/// A file that is being written.
+pub struct StoredFile {
+    path: PathBuf,
+    sink: Box<dyn Sink>,
+}
+
+impl StoredFile {
+    /// The file of this path, whose bytes go there.
+    #[must_use]
+    pub fn new(path: &Path, sink: impl Sink + 'static) -> Self {
+        Self { path: path.to_owned(), sink: Box::new(sink) }
+    }
+
+    /// Appends bytes, all of them.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
+        self.sink.write_all(bytes).map_err(StorageError::at("write", &self.path))
+    }
+
+    /// Returns when all that was written is on the disk.
+    ///
+    /// # Errors
+    /// When it cannot be brought there.
+    pub fn sync(&mut self) -> Result<(), StorageError> {
+        self.sink.sync().map_err(StorageError::at("write", &self.path))
+    }
+}
+
+/// The file operations. Every error names the operation, the path and the operating system's reason.
 #[allow(clippy::missing_errors_doc, reason = "said once for all")]
 pub trait Storage: Sync {
     /// Creates a folder and its parents; nothing happens if it is there.
-    fn create_folder(&self, folder: &Path) -> io::Result<()>;
+    fn create_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Creates a file, or empties it.
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>>;
+    fn create(&self, file: &Path) -> Result<StoredFile, StorageError>;
     /// Renames a file within the file system, over another if there is one.
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
+    /// Gives a file a second name within the file system; copies it where files have one name only.
+    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
     /// Returns when the names in a folder are on the disk.
-    fn sync_folder(&self, folder: &Path) -> io::Result<()>;
+    fn sync_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Names in a folder, sorted; none if there is no such folder.
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>>;
+    fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError>;
     /// Opens a file for reading.
-    fn open(&self, file: &Path) -> io::Result<File>;
+    fn open(&self, file: &Path) -> Result<File, StorageError>;
     /// Whether a file is there.
-    fn exists(&self, file: &Path) -> io::Result<bool>;
+    fn exists(&self, file: &Path) -> Result<bool, StorageError>;
     /// Removes a file.
-    fn remove(&self, file: &Path) -> io::Result<()>;
+    fn remove(&self, file: &Path) -> Result<(), StorageError>;
     /// Removes a folder with all that is in it; nothing happens if there is none.
-    fn remove_folder(&self, folder: &Path) -> io::Result<()>;
+    fn remove_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()>;
+    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError>;
     /// Tries to lock a file, created if needed.
-    fn lock(&self, file: &Path) -> io::Result<Lock>;
+    fn lock(&self, file: &Path) -> Result<Lock, StorageError>;
+
+    /// All bytes of a file.
+    fn read(&self, file: &Path) -> Result<Vec<u8>, StorageError> {
+        let mut bytes = Vec::new();
+        self.open(file)?.read_to_end(&mut bytes).map_err(StorageError::at("read", file))?;
+        Ok(bytes)
+    }
+
+    /// The number of bytes of a file.
+    fn length(&self, file: &Path) -> Result<u64, StorageError> {
+        Ok(self.open(file)?.metadata().map_err(StorageError::at("read", file))?.len())
+    }
 }
 
 /// What trying for a lock says.
@@ -75,17 +119,23 @@ impl StorageError {
     pub fn at(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self { action, path: path.to_owned(), source }
     }
+
+    /// The kind of the operating system's reason.
+    #[must_use]
+    pub fn kind(&self) -> io::ErrorKind {
+        self.source.kind()
+    }
 }
 
-/// Tries for a lock until it is free or the longest wait is over.
+/// Tries for a lock until it is free or the time is over.
 ///
 /// # Errors
 /// When the file cannot be opened or locked.
-pub fn wait_for_lock(storage: &dyn Storage, file: &Path, longest_wait: Duration) -> Result<Lock, StorageError> {
+pub fn wait_for_lock(storage: &dyn Storage, file: &Path, max_wait: Duration) -> Result<Lock, StorageError> {
     let begin = Instant::now();
     loop {
-        let lock = storage.lock(file).map_err(StorageError::at("lock", file))?;
-        if !matches!(lock, Lock::Taken) || begin.elapsed() >= longest_wait {
+        let lock = storage.lock(file)?;
+        if !matches!(lock, Lock::Taken) || begin.elapsed() >= max_wait {
             return Ok(lock);
         }
         std::thread::sleep(LOCK_POLL);
@@ -96,68 +146,75 @@ pub fn wait_for_lock(storage: &dyn Storage, file: &Path, longest_wait: Duration)
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Disk;
 
-impl StoredFile for File {
+impl Sink for File {
     fn sync(&mut self) -> io::Result<()> {
         self.sync_all()
     }
 }
 
 impl Storage for Disk {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        fs::create_dir_all(folder)
+    fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        fs::create_dir_all(folder).map_err(StorageError::at("create", folder))
     }
 
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        Ok(Box::new(File::create(file)?))
+    fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
+        Ok(StoredFile::new(file, File::create(file).map_err(StorageError::at("create", file))?))
     }
 
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        fs::rename(from, to)
+    fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        fs::rename(from, to).map_err(StorageError::at("move a file here", to))
     }
 
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        File::open(folder)?.sync_all()
+    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        let copied = || fs::copy(from, to).and_then(|_| File::open(to)?.sync_all());
+        fs::hard_link(from, to).or_else(|_| copied()).map_err(StorageError::at("copy a file here", to))
     }
 
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
+    fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        File::open(folder).and_then(|folder| folder.sync_all()).map_err(StorageError::at("sync", folder))
+    }
+
+    fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
         let entries = match fs::read_dir(folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            entries => entries?,
+            entries => entries.map_err(StorageError::at("list", folder))?,
         };
-        let mut names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>()?;
+        let names = entries.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>();
+        let mut names = names.map_err(StorageError::at("list", folder))?;
         names.sort();
         Ok(names)
     }
 
-    fn open(&self, file: &Path) -> io::Result<File> {
-        File::open(file)
+    fn open(&self, file: &Path) -> Result<File, StorageError> {
+        File::open(file).map_err(StorageError::at("read", file))
     }
 
-    fn exists(&self, file: &Path) -> io::Result<bool> {
+    fn exists(&self, file: &Path) -> Result<bool, StorageError> {
         match file.try_exists() {
             // What should be a folder on the way is a file.
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
-            exists => exists,
+            exists => exists.map_err(StorageError::at("look up", file)),
         }
     }
 
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        fs::remove_file(file)
+    fn remove(&self, file: &Path) -> Result<(), StorageError> {
+        fs::remove_file(file).map_err(StorageError::at("remove", file))
     }
 
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
+    fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
         match fs::remove_dir_all(folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => removed,
+            removed => removed.map_err(StorageError::at("remove", folder)),
         }
     }
 
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
-        exchange(one, other)
+    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
+        exchange(one, other).map_err(StorageError::at("exchange folders with", one))
     }
 
-    fn lock(&self, file: &Path) -> io::Result<Lock> {
-        let handle = File::options().create(true).truncate(false).write(true).open(file)?;
+    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
+        let handle = File::options().create(true).truncate(false).write(true).open(file);
+        let handle = handle.map_err(StorageError::at("lock", file))?;
         match handle.try_lock() {
             Ok(()) => Ok(Lock::Ours(Box::new(handle))),
             Err(TryLockError::WouldBlock) => Ok(Lock::Taken),
@@ -167,7 +224,7 @@ impl Storage for Disk {
             {
                 Ok(Lock::Unknown)
             }
-            Err(TryLockError::Error(error)) => Err(error),
+            Err(TryLockError::Error(error)) => Err(StorageError::at("lock", file)(error)),
         }
     }
 }

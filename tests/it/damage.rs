@@ -62,9 +62,10 @@ fn swap(one: &Path, other: &Path) {
     fs::rename(aside, other).unwrap();
 }
 
-/// The only compacted file of a table.
+/// The compacted file of a table with the first two parts.
 fn compacted(root: &Path, table: &str) -> PathBuf {
-    fs::read_dir(root.join("tables").join(table)).unwrap().next().unwrap().unwrap().path()
+    let files = fs::read_dir(root.join("tables").join(table)).unwrap().map(|entry| entry.unwrap().path());
+    files.min().unwrap()
 }
 
 /// The directory of another sweep beside this one.
@@ -132,7 +133,7 @@ const PARTS: &[Damage] = &[
     damage("a copy under a number past the plan", "tables/jobs/part-000-000002.parquet", 0, |root| {
         fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-000-000002.parquet")).unwrap();
     }),
-    damage("a part of an epoch that there is not", "tables/jobs/part-002-000000.parquet", 0, |root| {
+    damage("a part of an extension that there is not", "tables/jobs/part-002-000000.parquet", 0, |root| {
         fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-002-000000.parquet")).unwrap();
     }),
     damage("names of two parts swapped", "tables/jobs/part-000-000000.parquet", 4100, |root| {
@@ -141,7 +142,7 @@ const PARTS: &[Damage] = &[
     damage("names of two slips files swapped", "tables/slips/part-000-000001.parquet", 4100, |root| {
         swap(&path(root, "slips", FIRST), &path(root, "slips", SECOND));
     }),
-    damage("names of parts of two epochs swapped", "tables/slips/part-001-000000.parquet", 14, |root| {
+    damage("names of parts of two extensions swapped", "tables/slips/part-001-000000.parquet", 14, |root| {
         swap(&path(root, "slips", EXTENSION), &path(root, "slips", SECOND));
     }),
     damage("a file in the folder of another table", "tables/slips/part-000-000001.parquet", 4, |root| {
@@ -199,53 +200,47 @@ const PARTS: &[Damage] = &[
 ];
 
 const COMPACTED: &[Damage] = &[
-    damage("a bit of compacted slips", "tables/slips/compact-000000-", 4110, |root| {
+    damage("a bit of compacted slips", "tables/slips/compact-000-000000-000001-", 4100, |root| {
         flip(&compacted(root, "slips"), |length| length / 2);
     }),
-    damage("compacted jobs cut in half", "tables/jobs/compact-000000-", 4110, |root| {
+    damage("compacted jobs cut in half", "tables/jobs/compact-000-000000-000001-", 4100, |root| {
         change(&compacted(root, "jobs"), |bytes| bytes.truncate(bytes.len() / 2));
     }),
-    // Of 4110 jobs these have precursors.
-    damage("missing compacted precursors", "tables/precursors/compact-000000-", 3718, |root| {
+    damage("missing compacted precursors", "tables/precursors/compact-000-000000-000001-", 4100, |root| {
         fs::remove_file(compacted(root, "precursors")).unwrap();
     }),
-    damage("missing compacted jobs", "tables/jobs/compact-000000-", 4110, |root| {
+    damage("missing compacted jobs", "tables/jobs/compact-000-000000-000001-", 4100, |root| {
         fs::remove_file(compacted(root, "jobs")).unwrap();
     }),
-    damage("all compacted files missing", "tables/jobs/compact-000000-", 4110, |root| {
+    damage("all compacted files of a sweep missing", "tables/jobs/part-000-000000.parquet", 4100, |root| {
         in_all_tables(|table| fs::remove_file(compacted(root, table)).unwrap());
     }),
-    damage("all tables missing", "tables/jobs/compact-000000-", 4110, |root| {
+    damage("all tables missing", "tables/jobs/part-001-000000.parquet", 4110, |root| {
         fs::remove_dir_all(root.join("tables")).unwrap();
     }),
-    damage("compacted files in each other's place", "tables/slips/compact-000000-", 4110, |root| {
+    damage("compacted files in each other's place", "tables/slips/compact-000-000000-000001-", 4100, |root| {
         swap(&compacted(root, "slips"), &compacted(root, "precursors"));
         let (slips, precursors) = (compacted(root, "slips"), compacted(root, "precursors"));
         let names = [&slips, &precursors].map(|path| path.file_name().unwrap().to_owned());
         fs::rename(&slips, slips.with_file_name(&names[1])).unwrap();
         fs::rename(&precursors, precursors.with_file_name(&names[0])).unwrap();
     }),
-    damage("the record cut in half", "run/compacted.json", 0, |root| {
-        change(&root.join("run/compacted.json"), |bytes| bytes.truncate(bytes.len() / 2));
-    }),
-    damage("a bit of the record", "run/compacted.json", 0, |root| {
-        let path = root.join("run/compacted.json");
-        let text = fs::read_to_string(&path).unwrap();
-        fs::write(path, text.replacen("          1\n", "          0\n", 1)).unwrap();
-    }),
-    damage("the record missing", "run/compacted.json", 0, |root| {
-        fs::remove_file(root.join("run/compacted.json")).unwrap();
-    }),
-    damage("the record of another directory", "run/compacted.json", 0, |root| {
-        fs::copy(other_compacted(root).join("run/compacted.json"), root.join("run/compacted.json")).unwrap();
+    damage("a compacted file under the name of other parts", "tables/slips/compact-000-000000-000000-", 4100, |root| {
+        let path = compacted(root, "jobs");
+        let name = path.file_name().unwrap().to_str().unwrap().replace("000000-000001", "000000-000000");
+        fs::rename(&path, path.with_file_name(name)).unwrap();
     }),
     damage("a compacted part back among the files", "tables/jobs/part-000-000001.parquet", 0, |root| {
         let parts = root.with_file_name("parts");
         fs::copy(path(&parts, "jobs", SECOND), path(root, "jobs", SECOND)).unwrap();
     }),
-    damage("a compacted file of another directory", "tables/slips/compact-000000-", 0, |root| {
+    damage("a compacted file of another directory", "tables/slips/compact-000-000000-000000-", 0, |root| {
         let from = compacted(&other_compacted(root), "slips");
         fs::copy(&from, path(root, "slips", from.file_name().unwrap().to_str().unwrap())).unwrap();
+    }),
+    damage("a compacted file of parts past the plan", "tables/slips/compact-000-000007-000009-", 0, |root| {
+        let name = "compact-000-000007-000009-0123456789abcdef.parquet";
+        fs::copy(compacted(root, "slips"), path(root, "slips", name)).unwrap();
     }),
 ];
 

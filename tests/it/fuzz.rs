@@ -11,8 +11,8 @@ use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use stickslip::observe::measure;
-use stickslip::results::manifest::Directory;
-use stickslip::run::{Options, Shard, compact, run, verify};
+use stickslip::results::Results;
+use stickslip::run::{Options, Shard, run};
 use stickslip::sweep::Sweep;
 use stickslip::table::file::Reader;
 use stickslip::table::storage::Disk;
@@ -143,12 +143,12 @@ discard = 0
 precursors = true
 ";
 
-/// A results directory, one that is compacted, and the bytes of their files.
-struct Results {
+/// A folder with a results directory, and one that is compacted.
+struct Examples {
     folder: tempfile::TempDir,
 }
 
-static RESULTS: LazyLock<Results> = LazyLock::new(|| {
+static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let sweep = Sweep::parse(TINY, Path::new("tiny.toml")).unwrap();
     for name in ["parts", "compacted"] {
@@ -160,8 +160,8 @@ static RESULTS: LazyLock<Results> = LazyLock::new(|| {
             |job: &stickslip::sweep::Job, stop: &AtomicBool| measure(&job.parameters, &recording, solver, stop);
         run(&Disk, &sweep, &folder.path().join(name), options, &kernel, &mut |_| ()).unwrap();
     }
-    compact(&Disk, &folder.path().join("compacted")).unwrap();
-    Results { folder }
+    Results::read(&Disk, &folder.path().join("compacted")).unwrap().compact().unwrap();
+    Examples { folder }
 });
 
 /// The files of a folder and those below it.
@@ -238,9 +238,9 @@ proptest! {
         let mut run_files = files(&root.join("run"));
         run_files.retain(|path| path.extension().is_some_and(|extension| extension == "json" || extension == "toml"));
         let (copy, is_changed) = copy(&root, &run_files[which.index(run_files.len())], &changes);
-        let read = Directory::read(&Disk, copy.path());
+        let read = Results::read(&Disk, copy.path());
         prop_assert_eq!(read.is_err(), is_changed);
-        match verify(&Disk, copy.path()) {
+        match Results::verify(&Disk, copy.path()) {
             Ok(verification) => prop_assert_eq!(verification.whole, !is_changed),
             Err(error) => prop_assert!(is_changed, "{}", error),
         }
@@ -260,10 +260,10 @@ proptest! {
         let (copy, is_changed) = copy(&root, file, &changes);
         let file = copy.path().join(file.strip_prefix(&root).unwrap());
         prop_assert_eq!(Reader::new(&Disk, vec![file.clone()]).any(|batch| batch.is_err()), is_changed);
-        let verification = verify(&Disk, copy.path()).unwrap();
+        let verification = Results::verify(&Disk, copy.path()).unwrap();
         prop_assert_eq!(verification.whole, !is_changed);
         prop_assert!(!is_changed || verification.problems.iter().any(|problem| problem.path == file));
-        // What is read of the footer alone, before any seal is looked at, may be refused but must not break.
+        // What is read of the footer alone, before any checksum is looked at, may be refused but must not break.
         let _ = stickslip::table::file::footer(&Disk, &file);
         prop_assert!(begin.elapsed() < LONGEST);
     }

@@ -1,39 +1,35 @@
-//! Verification: every file whole and in its place, every job there once; what is damaged is named, and can be taken away.
+//! Verification: every file whole and in its place, every job there once; what is damaged is named, and can be taken
+//! away.
 //!
 //! ```text
-//! beginning.rs   manifest and sweep files
-//! parts.rs       the files of each part of the plan, and what else lies among them
-//! compacted.rs   the compacted files  ->  survivors.rs  what of damaged ones can be kept
+//! manifest.rs    manifest and sweep files, which restore each other
+//! files.rs       the files of the plan's parts, each alone or compacted, and what else lies among them
 //! rows.rs        the rows of all tables held against each other
-//! repair.rs      moves what is damaged away, so that the next run makes it anew
 //! ```
 //!
-//! Reading changes nothing. Memory: one part; for damaged compacted files an entry for each of their jobs.
+//! Reading changes nothing. A repair moves what is damaged to `run/quarantine/` and restores what can be restored; the
+//! next run does the rest. Memory: the names of the files.
 
-mod beginning;
-mod compacted;
-mod parts;
-mod repair;
+mod files;
+mod manifest;
 mod rows;
-mod survivors;
 
-pub use repair::{RepairError, Repaired, repair};
-
-use crate::results::compact::Without;
-use crate::results::layout::part_name;
-use crate::results::manifest::{Directory, DirectoryError};
-use crate::sweep::Plan;
+use crate::results::commit::move_away;
+use crate::results::error::ResultsError;
+use crate::results::events::{Kept, RunEvent, committed_parts};
+use crate::results::handle::Results;
+use crate::results::layout::{Layout, part_name};
 use crate::table::checksum;
 use crate::table::file::DatasetError;
 use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Version of [`Verification`] as JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
-/// What a verification found. Serialises to a stable form, told by `format`.
+/// What a verification found. Serialises to a stable form, whose version is `format`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
     /// Version of this form.
@@ -54,8 +50,11 @@ pub struct Verification {
     pub parts_missing: u64,
     /// Jobs in them.
     pub jobs_missing: u64,
-    /// Epochs whose sweeps are to be run to make damaged parts anew, in this order.
-    pub epochs: Vec<usize>,
+    /// Extensions whose sweeps are to be run for the damaged parts, in this order.
+    pub extensions: Vec<usize>,
+    /// Whether parts that are to be run again were compacted.
+    #[serde(skip)]
+    lost_compacted: bool,
 }
 
 /// Something that is damaged.
@@ -71,29 +70,40 @@ pub struct Problem {
     pub jobs: Vec<String>,
     /// What mends it.
     pub remedy: Remedy,
+    /// Files that a repair moves away, in this order.
+    #[serde(skip)]
+    moved: Vec<PathBuf>,
 }
 
 /// What mends a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
-    /// Writing the manifest and the copies of the sweep files anew.
-    Beginning,
+    /// Writing the manifest and the copies of the sweep files again.
+    Manifest,
     /// Moving the file away.
     File,
-    /// Moving the files of its part away, and running it.
+    /// Moving the file away with those of the same parts in other tables, and running these parts.
     Part,
-    /// Making the compacted files anew without the parts concerned, and running these.
-    Compacted,
     /// Running the part: there is nothing of it.
     Run,
-    /// Reducing anew.
+    /// Reducing again.
     Reduce,
+}
+
+/// What a repair did.
+#[derive(Clone, Debug)]
+pub struct Repaired {
+    /// What was found.
+    pub verification: Verification,
+    /// Names of the parts that are now missing, and were not before.
+    pub parts: BTreeSet<String>,
 }
 
 impl Problem {
     fn of_file(path: PathBuf, problem: impl Into<String>, remedy: Remedy) -> Self {
-        Self { path, problem: problem.into(), parts: Vec::new(), jobs: Vec::new(), remedy }
+        let moved = if remedy == Remedy::File { vec![path.clone()] } else { Vec::new() };
+        Self { path, problem: problem.into(), parts: Vec::new(), jobs: Vec::new(), remedy, moved }
     }
 }
 
@@ -106,81 +116,93 @@ impl Verification {
 
     /// Whether tables that were compacted are to be compacted again.
     #[must_use]
-    pub fn wants_compaction(&self) -> bool {
-        !self.epochs.is_empty() && self.problems.iter().any(|problem| problem.remedy == Remedy::Compacted)
+    pub const fn wants_compaction(&self) -> bool {
+        self.lost_compacted
     }
 
-    /// Whether reduced data are to be made anew, and no run does it.
+    /// Whether reduced data are to be made again, and no run does it.
     #[must_use]
     pub fn wants_reduction(&self) -> bool {
-        self.epochs.is_empty() && self.problems.iter().any(|problem| problem.remedy == Remedy::Reduce)
+        self.extensions.is_empty() && self.problems.iter().any(|problem| problem.remedy == Remedy::Reduce)
     }
 
-    fn count(&mut self, storage: &dyn Storage, path: &Path) -> Result<(), StorageError> {
-        let length = storage.open(path).and_then(|file| file.metadata()).map(|metadata| metadata.len());
-        self.bytes += length.map_err(StorageError::at("read", path))?;
-        self.files += 1;
-        Ok(())
+    /// Names of the parts that are to be run again.
+    fn lost_parts(&self) -> BTreeSet<&str> {
+        self.problems.iter().flat_map(|problem| &problem.parts).map(String::as_str).collect()
     }
 }
 
-/// Verifies a directory. `committed` holds the names of the parts that are known to have been committed.
-///
-/// # Errors
-/// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
-pub fn verify(
-    storage: &dyn Storage,
-    root: &Path,
-    committed: &BTreeSet<String>,
-) -> Result<Verification, DirectoryError> {
-    Ok(examine(storage, root, committed)?.0)
-}
+impl<'a> Results<'a> {
+    /// Verifies a directory, whatever is damaged. Needs no lock, so runs may be at work.
+    ///
+    /// # Errors
+    /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
+    pub fn verify(storage: &'a dyn Storage, root: &Path) -> Result<Verification, ResultsError> {
+        Ok(Self::examine(storage, root)?.1)
+    }
 
-/// Verifies a directory; gives it with what of its compacted files can be kept, and what cannot.
-fn examine(
-    storage: &dyn Storage,
-    root: &Path,
-    committed: &BTreeSet<String>,
-) -> Result<(Verification, Directory, Without), DirectoryError> {
-    let mut verification = Verification { format: FORMAT, ..Verification::default() };
-    let directory = beginning::read(storage, root, &mut verification.problems)?;
-    let (directory, without) = compacted::verify(storage, directory, &mut verification)?;
-    parts::verify(storage, &directory, &without, committed, &mut verification)?;
-    let reduced = directory.layout().reduced();
-    for name in storage.list(&reduced).map_err(StorageError::at("list", &reduced))? {
-        let path = reduced.join(name);
-        if let Err(error) = checksum::check(storage, &path) {
-            verification.problems.push(Problem::of_file(path, problem_of(&error), Remedy::Reduce));
+    /// Takes away what is damaged, so that the next run makes it again.
+    ///
+    /// # Errors
+    /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the
+    /// same can be tried again.
+    pub fn repair(storage: &'a dyn Storage, root: &Path) -> Result<Repaired, ResultsError> {
+        // Reports what is no results directory before anything is written.
+        let (results, _) = Self::examine(storage, root)?;
+        results.exclusively(|| {
+            let (results, verification) = Self::examine(storage, root)?;
+            if verification.problems.iter().any(|problem| problem.remedy == Remedy::Manifest) {
+                manifest::restore_manifest(&results)?;
+            }
+            let (tables, quarantine) = (results.layout().tables(), results.layout().quarantine());
+            for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
+                move_away(storage, path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
+            }
+            let parts: BTreeSet<String> = verification.lost_parts().into_iter().map(str::to_owned).collect();
+            if !parts.is_empty() {
+                let mut log = results.begin_log()?;
+                parts.iter().try_for_each(|part| log.write(&RunEvent::PartQuarantined { part: part.clone() }))?;
+            }
+            Ok(Repaired { verification, parts })
+        })
+    }
+
+    /// Verifies a directory; gives it as it is restored.
+    fn examine(storage: &'a dyn Storage, root: &Path) -> Result<(Self, Verification), ResultsError> {
+        // First, so that what the logs say is there was there when the files were listed.
+        let committed: BTreeMap<String, Kept> = committed_parts(storage, &Layout::new(root))?;
+        let mut verification = Verification { format: FORMAT, ..Verification::default() };
+        let results = manifest::salvage(storage, root, &mut verification.problems)?;
+        files::verify(&results, &committed, &mut verification)?;
+        let reduced = results.layout().reduced();
+        for name in storage.list(&reduced)? {
+            let path = reduced.join(name);
+            if let Err(error) = checksum::check(storage, &path) {
+                verification.problems.push(Problem::of_file(path, problem_of(&error), Remedy::Reduce));
+            }
         }
+        verification.whole = verification.problems.is_empty();
+        verification.extensions = results.extensions_to_run(&verification.lost_parts());
+        Ok((results, verification))
     }
-    verification.whole = verification.problems.is_empty();
-    verification.epochs = epochs(&directory, &verification.problems);
-    Ok((verification, directory, without))
-}
 
-/// The sweeps to be run for the parts of these problems, that which was asked for last at the end.
-fn epochs(directory: &Directory, problems: &[Problem]) -> Vec<usize> {
-    let names: BTreeSet<&str> = problems.iter().flat_map(|problem| &problem.parts).map(String::as_str).collect();
-    if names.is_empty() {
-        return Vec::new();
-    }
-    let mut epochs = BTreeSet::new();
-    for part in Plan::new(directory.sweeps()).parts() {
-        if names.contains(part_name(&part).as_str()) && !directory.wants(&part) {
-            epochs.insert(part.epoch);
+    /// The sweeps to be run for these parts, that which was asked for last at the end.
+    fn extensions_to_run(&self, lost: &BTreeSet<&str>) -> Vec<usize> {
+        if lost.is_empty() {
+            return Vec::new();
         }
+        let unwanted = self.plan().parts().filter(|part| lost.contains(part_name(part).as_str()) && !self.wants(part));
+        let mut extensions: BTreeSet<usize> = unwanted.map(|part| part.epoch).collect();
+        extensions.remove(&self.current());
+        extensions.into_iter().chain([self.current()]).collect()
     }
-    epochs.remove(&directory.current());
-    epochs.into_iter().chain([directory.current()]).collect()
 }
 
 /// What an error says is wrong with a file.
 fn problem_of(error: &DatasetError) -> String {
     match error {
         DatasetError::Damaged { problem, .. } => problem.clone(),
-        DatasetError::Storage(StorageError { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
-            "it is missing".to_owned()
-        }
+        DatasetError::Storage(error) if error.kind() == std::io::ErrorKind::NotFound => "it is missing".to_owned(),
         DatasetError::Storage(StorageError { source, .. }) => format!("it cannot be read: {source}"),
         error => error.to_string(),
     }

@@ -95,8 +95,8 @@ impl Fault {
         }
     }
 
-    /// Whether it can befall an operation. What only looks leaves the disk as it was, so that a kill there is one at the
-    /// next operation that changes something.
+    /// Whether it can befall an operation. What only looks leaves the disk as it was, so that a kill there is one at
+    /// the next operation that changes something.
     pub fn befalls(self, operation: Operation) -> bool {
         use Operation::{List, LookUp, Read};
         match self {

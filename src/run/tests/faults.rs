@@ -228,6 +228,6 @@ fn every_fault_at_every_operation_leaves_whole_files_and_the_next_run_ends_with_
     let text = fs::read_to_string(file).unwrap();
     assert!(
         text.contains(&table) && text.contains(&format!("{total} faults")),
-        "docs/development.md tells another table; it was tried: {total} faults\n{table}"
+        "docs/development.md has another table; tried were: {total} faults\n{table}"
     );
 }

@@ -1,10 +1,10 @@
 //! A disk in memory that fails at the n-th operation of a kind, and knows what a power cut would leave.
 //!
-//! Names and bytes are kept twice: as processes see them, and as they lie on the disk. A file's bytes get there when it is
-//! synced, the names in a folder when the folder is.
+//! Names and bytes are kept twice: as processes see them, and as they lie on the disk. A file's bytes get there when it
+//! is synced, the names in a folder when the folder is.
 
 use super::fault::{Fault, Operation};
-use crate::table::storage::{Lock, Storage, StoredFile};
+use crate::table::storage::{Lock, Sink, Storage, StorageError, StoredFile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs::File;
@@ -166,6 +166,16 @@ impl FaultyDisk {
         folders.filter_map(|(path, _)| Some(path.strip_prefix(folder).ok()?.to_owned())).collect()
     }
 
+    /// An operation on a path.
+    fn on<T>(
+        &self,
+        operation: Operation,
+        path: &Path,
+        act: impl FnOnce(&mut State) -> io::Result<T>,
+    ) -> Result<T, StorageError> {
+        self.act(operation, act).map_err(StorageError::at(operation.name(), path))
+    }
+
     fn act<T>(&self, operation: Operation, act: impl FnOnce(&mut State) -> io::Result<T>) -> io::Result<T> {
         let mut state = self.state();
         match state.meet(operation) {
@@ -262,7 +272,7 @@ impl Write for FaultyFile {
     }
 }
 
-impl StoredFile for FaultyFile {
+impl Sink for FaultyFile {
     fn sync(&mut self) -> io::Result<()> {
         self.disk.act(Operation::Sync, |_| {
             let mut bytes = self.bytes.lock().unwrap();
@@ -285,24 +295,24 @@ impl Drop for Held {
 }
 
 impl Storage for FaultyDisk {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        self.act(Operation::CreateFolder, |state| {
+    fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.on(Operation::CreateFolder, folder, |state| {
             state.is_folder(folder.parent().unwrap())?;
             state.seen.entry(folder.to_owned()).or_insert(Node::Folder);
             state.is_folder(folder)
         })
     }
 
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        self.act(Operation::Create, |state| {
+    fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
+        self.on(Operation::Create, file, |state| {
             let bytes = state.touch(file)?;
             bytes.lock().unwrap().seen.clear();
-            Ok(Box::new(FaultyFile { disk: self.clone(), bytes }) as Box<dyn StoredFile>)
+            Ok(StoredFile::new(file, FaultyFile { disk: self.clone(), bytes }))
         })
     }
 
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.act(Operation::Rename, |state| {
+    fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        self.on(Operation::Rename, to, |state| {
             state.file(from)?;
             state.is_folder(to.parent().unwrap())?;
             let node = state.seen.remove(from).unwrap();
@@ -311,8 +321,13 @@ impl Storage for FaultyDisk {
         })
     }
 
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.act(Operation::SyncFolder, |state| {
+    /// Compaction meets its faults in `maintenance.rs`.
+    fn link(&self, _: &Path, to: &Path) -> Result<(), StorageError> {
+        Err(StorageError::at("link", to)(io::ErrorKind::Unsupported.into()))
+    }
+
+    fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.on(Operation::SyncFolder, folder, |state| {
             state.is_folder(folder)?;
             let is_in = |path: &Path| path.parent() == Some(folder);
             state.on_disk.retain(|path, _| !is_in(path));
@@ -322,53 +337,54 @@ impl Storage for FaultyDisk {
         })
     }
 
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
-        self.act(Operation::List, |state| {
+    fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+        self.on(Operation::List, folder, |state| {
             let names = state.seen.keys().filter(|path| path.parent() == Some(folder));
             Ok(names.filter_map(|path| path.file_name()).map(ToOwned::to_owned).collect())
         })
     }
 
-    fn open(&self, file: &Path) -> io::Result<File> {
+    fn open(&self, file: &Path) -> Result<File, StorageError> {
         let verdict = self.state().meet(Operation::Read);
-        match verdict {
-            Verdict::Refused(error) => return Err(io::Error::from_raw_os_error(error)),
+        let opened = match verdict {
+            Verdict::Refused(error) => Err(io::Error::from_raw_os_error(error)),
             // A folder opens like a file and does not read like one.
-            Verdict::DoneButRefused(_) => return File::open(std::env::temp_dir()),
-            Verdict::Done | Verdict::HalfDone => {}
-        }
-        let mut handle = tempfile::tempfile()?;
-        handle.write_all(&self.state().file(file)?.lock().unwrap().seen)?;
-        handle.rewind()?;
-        Ok(handle)
+            Verdict::DoneButRefused(_) => File::open(std::env::temp_dir()),
+            Verdict::Done | Verdict::HalfDone => tempfile::tempfile().and_then(|mut handle| {
+                handle.write_all(&self.state().file(file)?.lock().unwrap().seen)?;
+                handle.rewind()?;
+                Ok(handle)
+            }),
+        };
+        opened.map_err(StorageError::at("read", file))
     }
 
-    fn exists(&self, file: &Path) -> io::Result<bool> {
-        self.act(Operation::LookUp, |state| Ok(state.seen.contains_key(file)))
+    fn exists(&self, file: &Path) -> Result<bool, StorageError> {
+        self.on(Operation::LookUp, file, |state| Ok(state.seen.contains_key(file)))
     }
 
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        self.act(Operation::Remove, |state| {
+    fn remove(&self, file: &Path) -> Result<(), StorageError> {
+        self.on(Operation::Remove, file, |state| {
             state.file(file)?;
             state.seen.remove(file);
             Ok(())
         })
     }
 
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
-        self.act(Operation::Remove, |state| {
+    fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.on(Operation::Remove, folder, |state| {
             state.seen.retain(|path, _| !path.starts_with(folder));
             Ok(())
         })
     }
 
-    /// Compaction meets its faults in the tests of `upkeep`.
-    fn exchange(&self, _: &Path, _: &Path) -> io::Result<()> {
-        Err(io::ErrorKind::Unsupported.into())
+    /// Compaction meets its faults in `maintenance.rs`.
+    fn exchange(&self, one: &Path, _: &Path) -> Result<(), StorageError> {
+        Err(StorageError::at("exchange", one)(io::ErrorKind::Unsupported.into()))
     }
 
-    fn lock(&self, file: &Path) -> io::Result<Lock> {
-        self.act(Operation::Lock, |state| {
+    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
+        self.on(Operation::Lock, file, |state| {
             state.touch(file)?;
             if !state.locks.insert(file.to_owned()) {
                 return Ok(Lock::Taken);

@@ -3,11 +3,12 @@
 mod fault;
 mod faults;
 mod faulty_disk;
+mod maintenance;
 
 use super::*;
 use crate::model::Parameters;
-use crate::observe::Measurements;
-use crate::observe::{Drops, Modulation, Precursor, Slip};
+use crate::observe::{Drops, Measurements, Modulation, Precursor, Slip};
+use crate::results::ErrorKind;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{SimulationError, Summary};
@@ -17,6 +18,7 @@ use crate::table::file::Reader;
 use crate::table::storage::Disk;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -153,7 +155,7 @@ fn a_stopped_run_resumes_byte_identical_and_runs_no_committed_job_again() {
     };
     let mut stopping = 0;
     let report = run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &kernel, &mut |event| {
-        stopping += u32::from(event == RunEvent::Stopping);
+        stopping += u32::from(*event == RunEvent::Stopping);
     })
     .unwrap();
     assert!(report.stopped && stopping == 1);
@@ -301,26 +303,26 @@ fn the_same_shard_twice_is_refused_while_it_runs() {
         fine(job, interrupt)
     });
     let error = second.into_inner().unwrap().unwrap();
-    assert!(matches!(error, RunError::Locked { .. }), "{error}");
+    assert!(error.kind == ErrorKind::Busy && error.to_string().contains("shard 1/1 is being run"), "{error}");
     assert_eq!(run_all(root.path(), &sweep(1, ""), &fine).jobs_left, 0);
 }
 
 #[test]
-fn the_status_tells_what_is_there_and_what_is_missing() {
+fn the_status_reports_what_is_there_and_what_is_missing() {
     let root = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(false);
     let half = Options { shard: "1/2".parse().unwrap(), ..options(&stop, 2) };
     run(&Disk, &sweep(SEEDS, ""), root.path(), half, &|job, _| faulty(job, true), &mut |_| ()).unwrap();
-    let directory = Directory::read(&Disk, root.path()).unwrap();
-    let status = status(&Disk, &directory).unwrap();
+    let status = status(&Results::read(&Disk, root.path()).unwrap()).unwrap();
+    let overview = status.overview;
     let rows = texts(root.path(), "jobs", "outcome");
     let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;
-    assert_eq!((status.jobs_failed, status.jobs_done), (failed, rows.len() as u64 - failed));
-    assert_eq!(status.jobs_missing, 2 * SEEDS - rows.len() as u64);
-    assert!(status.parts_done > 0 && status.parts_missing > 0 && status.running.is_empty());
+    assert_eq!((overview.jobs_failed, overview.jobs_done), (failed, rows.len() as u64 - failed));
+    assert_eq!(overview.jobs_missing, 2 * SEEDS - rows.len() as u64);
+    assert!(overview.parts_done > 0 && overview.parts_missing > 0 && status.running.is_empty());
     assert!(status.pace.is_some_and(|pace| pace > 0.0) && status.time_left.is_some());
-    let total = status.predicted_cost_done + status.predicted_cost_missing;
-    assert!(total > PART_COST * (status.parts_done + status.parts_missing - 1) as f64);
+    let total = overview.predicted_cost_done + overview.predicted_cost_missing;
+    assert!(total > PART_COST * (overview.parts_done + overview.parts_missing - 1) as f64);
 }
 
 #[test]
@@ -336,9 +338,9 @@ fn events_account_for_every_job() {
             assert_eq!(job_id.len(), 32);
             failed += 1;
         }
-        RunEvent::PartCommitted { jobs, .. } => committed += jobs as u64,
-        RunEvent::Stopping | RunEvent::OutOfTime => panic!("nobody asked"),
+        RunEvent::PartCommitted { jobs, .. } => committed += *jobs as u64,
         RunEvent::Finished(report) => finished += report.jobs_run,
+        event => panic!("nobody asked for {event:?}"),
     })
     .unwrap();
     assert_eq!((started, done, failed), (2 * SEEDS, 2 * SEEDS - 4, 4));

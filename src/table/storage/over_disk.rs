@@ -1,6 +1,6 @@
 //! Disks of tests: that of the operating system, but for what a test says otherwise.
 
-use super::{Disk, Lock, Storage, StoredFile};
+use super::{Disk, Lock, Sink, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
@@ -20,62 +20,68 @@ pub trait OverDisk: Sync {
         Ok(())
     }
 
-    fn create_file(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        Disk.create(file)
+    /// Puts something between a file and what is written to it.
+    fn wrap(&self, file: File) -> Box<dyn Sink> {
+        Box::new(file)
     }
 
-    fn exchange_folders(&self, one: &Path, other: &Path) -> io::Result<()> {
+    fn exchange_folders(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
         Disk.exchange(one, other)
     }
 
-    fn try_lock(&self, file: &Path) -> io::Result<Lock> {
+    fn try_lock(&self, file: &Path) -> Result<Lock, StorageError> {
         Disk.lock(file)
     }
 }
 
 impl<T: OverDisk> Storage for T {
-    fn create_folder(&self, folder: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("create", folder))?;
         Disk.create_folder(folder)
     }
-    fn create(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        self.before(Access::Change)?;
-        self.create_file(file)
+    fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
+        let created = self.before(Access::Change).and_then(|()| File::create(file));
+        let sink = self.wrap(created.map_err(StorageError::at("create", file))?);
+        Ok(StoredFile { path: file.to_owned(), sink })
     }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("move a file here", to))?;
         Disk.rename(from, to)
     }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("copy a file here", to))?;
+        Disk.link(from, to)
+    }
+    fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("sync", folder))?;
         Disk.sync_folder(folder)
     }
-    fn list(&self, folder: &Path) -> io::Result<Vec<OsString>> {
-        self.before(Access::Look)?;
+    fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("list", folder))?;
         Disk.list(folder)
     }
-    fn open(&self, file: &Path) -> io::Result<File> {
-        self.before(Access::Look)?;
+    fn open(&self, file: &Path) -> Result<File, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("read", file))?;
         Disk.open(file)
     }
-    fn exists(&self, file: &Path) -> io::Result<bool> {
-        self.before(Access::Look)?;
+    fn exists(&self, file: &Path) -> Result<bool, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("look up", file))?;
         Disk.exists(file)
     }
-    fn remove(&self, file: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn remove(&self, file: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("remove", file))?;
         Disk.remove(file)
     }
-    fn remove_folder(&self, folder: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("remove", folder))?;
         Disk.remove_folder(folder)
     }
-    fn exchange(&self, one: &Path, other: &Path) -> io::Result<()> {
-        self.before(Access::Change)?;
+    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("exchange folders with", one))?;
         self.exchange_folders(one, other)
     }
-    fn lock(&self, file: &Path) -> io::Result<Lock> {
-        self.before(Access::Look)?;
+    fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("lock", file))?;
         self.try_lock(file)
     }
 }

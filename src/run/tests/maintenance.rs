@@ -1,17 +1,22 @@
-//! Upkeep on a disk that dies at each operation in turn, on one that cannot exchange folders, and beside a run.
+//! Compaction and repair on a disk that dies at each operation in turn, on one that cannot exchange folders, and beside
+//! a run.
 
-use super::*;
+use super::{faulty, fine};
 use crate::observe::Measurements;
-use crate::run::{Options, Shard, run};
+use crate::results::compact::Compacted;
+use crate::results::layout::Layout;
+use crate::results::{Results, ResultsError};
+use crate::run::{Kernel, Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, Sweep};
 use crate::table::file::Reader;
 use crate::table::storage::over_disk::{Access, OverDisk};
-use crate::table::storage::{Disk, StoredFile};
+use crate::table::storage::{Disk, Sink, Storage, StorageError};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -32,7 +37,7 @@ fn change(left: &AtomicU64) -> io::Result<()> {
     left.map(|_| ()).map_err(|_| io::Error::other("the disk died"))
 }
 
-struct DyingFile(Box<dyn StoredFile>, Arc<AtomicU64>);
+struct DyingFile(File, Arc<AtomicU64>);
 
 impl Write for DyingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -44,7 +49,7 @@ impl Write for DyingFile {
     }
 }
 
-impl StoredFile for DyingFile {
+impl Sink for DyingFile {
     fn sync(&mut self) -> io::Result<()> {
         change(&self.1)?;
         self.0.sync()
@@ -55,11 +60,14 @@ impl OverDisk for Dying {
     fn before(&self, access: Access) -> io::Result<()> {
         if access == Access::Change { change(&self.changes_left) } else { Ok(()) }
     }
-    fn create_file(&self, file: &Path) -> io::Result<Box<dyn StoredFile>> {
-        Ok(Box::new(DyingFile(Disk.create(file)?, Arc::clone(&self.changes_left))))
+    fn wrap(&self, file: File) -> Box<dyn Sink> {
+        Box::new(DyingFile(file, Arc::clone(&self.changes_left)))
     }
-    fn exchange_folders(&self, one: &Path, other: &Path) -> io::Result<()> {
-        if self.exchanges { Disk.exchange(one, other) } else { Err(ErrorKind::Unsupported.into()) }
+    fn exchange_folders(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
+        if self.exchanges {
+            return Disk.exchange(one, other);
+        }
+        Err(StorageError::at("exchange folders with", one)(io::ErrorKind::Unsupported.into()))
     }
 }
 
@@ -81,16 +89,17 @@ fn kernel(job: &Job, _: &AtomicBool) -> Result<Measurements, SimulationError> {
     Ok(Measurements { ruptures: job.parameters.seed, summary, ..Measurements::default() })
 }
 
+fn options(stop: &AtomicBool) -> Options<'_> {
+    Options { threads: NonZeroUsize::new(1), stop, retry_failed: false, shard: Shard::default(), walltime: None }
+}
+
 fn run_all(root: &Path, seeds: u64) -> u64 {
     let stop = AtomicBool::new(false);
-    let options = Options {
-        threads: NonZeroUsize::new(1),
-        stop: &stop,
-        retry_failed: false,
-        shard: Shard::default(),
-        walltime: None,
-    };
-    run(&Disk, &sweep(seeds), root, options, &kernel, &mut |_| ()).unwrap().jobs_run
+    run(&Disk, &sweep(seeds), root, options(&stop), &kernel, &mut |_| ()).unwrap().jobs_run
+}
+
+fn compact(storage: &dyn Storage, root: &Path) -> Result<Compacted, ResultsError> {
+    Results::read(storage, root)?.compact()
 }
 
 /// The ids of all jobs in the tables, as a reader finds them.
@@ -130,7 +139,8 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
     assert_eq!(expected_ids.len() as u64, 2 * SEEDS);
     compact(&Disk, whole.path()).unwrap();
     let expected = tables_of(whole.path());
-    assert_eq!(expected.len(), 2);
+    // One file of each table for the beginning, one for the extension.
+    assert_eq!(expected.len(), 4);
     let mut exchanged = 0;
     for changes in 0.. {
         let root = extended();
@@ -139,13 +149,14 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
         assert!(ids(root.path()) == expected_ids, "after {changes} changes");
         let after = tables_of(root.path());
         assert!(after == before || after == expected, "after {changes} changes");
-        let verification = verify(&Disk, root.path()).unwrap();
+        let verification = Results::verify(&Disk, root.path()).unwrap();
         assert!(verification.whole, "after {changes} changes: {:?}", verification.problems);
         assert_eq!(run_all(root.path(), SEEDS), 0, "after {changes} changes");
         exchanged += u64::from(ended.is_err() && after == expected);
         compact(&Disk, root.path()).unwrap();
         assert!(tables_of(root.path()) == expected, "after {changes} changes");
         if ended.is_ok() {
+            println!("{changes} operations");
             assert!(changes > 20, "{changes} operations");
             break;
         }
@@ -166,15 +177,16 @@ fn a_repair_that_ends_at_any_operation_can_be_done_again() {
                 fs::write(damaged, &bytes[..bytes.len() / 2]).unwrap();
             }
         }
-        let ended = repair(&Dying::after(changes), root.path());
-        repair(&Disk, root.path()).unwrap();
-        let verification = verify(&Disk, root.path()).unwrap();
+        let ended = Results::repair(&Dying::after(changes), root.path());
+        Results::repair(&Disk, root.path()).unwrap();
+        let verification = Results::verify(&Disk, root.path()).unwrap();
         assert!(verification.whole, "after {changes} changes: {:?}", verification.problems);
         run_all(root.path(), SEEDS);
         compact(&Disk, root.path()).unwrap();
         assert_eq!(ids(root.path()).len() as u64, 2 * SEEDS, "after {changes} changes");
-        assert!(verify(&Disk, root.path()).unwrap().whole, "after {changes} changes");
+        assert!(Results::verify(&Disk, root.path()).unwrap().whole, "after {changes} changes");
         if ended.is_ok() {
+            println!("{changes} operations");
             assert!(changes > 20, "{changes} operations");
             break;
         }
@@ -188,27 +200,65 @@ fn a_file_system_without_exchange_is_refused_and_nothing_is_changed() {
     let error = compact(&Dying { exchanges: false, ..Dying::after(1000) }, root.path()).unwrap_err();
     assert!(error.to_string().contains("cannot exchange two folders"), "{error}");
     assert!(tables_of(root.path()) == before);
-    assert!(verify(&Disk, root.path()).unwrap().whole);
+    assert!(Results::verify(&Disk, root.path()).unwrap().whole);
 }
 
 #[test]
-fn upkeep_and_runs_keep_each_other_out() {
+fn who_changes_what_is_committed_and_runs_keep_each_other_out() {
     let root = extended();
-    let layout = Layout::new(root.path());
     let stop = AtomicBool::new(false);
-    let options = Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
-    let begin = |seeds| run(&Disk, &sweep(seeds), root.path(), options, &kernel, &mut |_| ());
-    let upkeep = Claim::take(&Disk, &layout, NAME, PATIENCE).unwrap();
-    assert!(upkeep.is_some());
-    let error = begin(SEEDS + 1).unwrap_err();
+    let begin = |seeds| run(&Disk, &sweep(seeds), root.path(), options(&stop), &kernel, &mut |_| ());
+    let results = Results::read(&Disk, root.path()).unwrap();
+    let error = results.exclusively(|| Ok(begin(SEEDS + 1).unwrap_err())).unwrap();
     assert!(error.to_string().contains("being repaired or compacted"), "{error}");
-    drop(upkeep);
-    let shard = Claim::take(&Disk, &layout, &Shard::default().writer(), PATIENCE).unwrap();
-    for ended in [compact(&Disk, root.path()).map(|_| ()), repair(&Disk, root.path()).map(|_| ())] {
+    let shard = results.lock_shard(&Shard::default().writer()).unwrap().unwrap();
+    for ended in [compact(&Disk, root.path()).map(|_| ()), Results::repair(&Disk, root.path()).map(|_| ())] {
         let error = ended.unwrap_err();
         assert!(error.to_string().contains("is being run (shard-1-of-1)"), "{error}");
     }
-    assert!(verify(&Disk, root.path()).unwrap().whole, "looking needs no lock");
+    assert!(Results::verify(&Disk, root.path()).unwrap().whole, "looking needs no lock");
     drop(shard);
     assert_eq!(begin(SEEDS + 1).unwrap().jobs_run, 2);
+}
+
+#[test]
+fn compacted_files_depend_on_the_parts_that_are_done_alone_and_hold_them_in_plan_order() {
+    /// So that small sweeps have several files.
+    const PARTS_PER_FILE: u64 = 2;
+    let stop = AtomicBool::new(false);
+    let run_with = |root: &Path, options, kernel: &Kernel<'_>| {
+        run(&Disk, &super::sweep(SEEDS, ""), root, options, kernel, &mut |_| ()).unwrap()
+    };
+    let compacted = |root: &Path| {
+        let compacted = Results::read(&Disk, root).unwrap().compact_by(PARTS_PER_FILE).unwrap();
+        assert!(Results::verify(&Disk, root).unwrap().whole);
+        assert!(!Results::read(&Disk, root).unwrap().compact_by(PARTS_PER_FILE).unwrap().changed);
+        (compacted, super::tables_of(root))
+    };
+    let [once, retried, sharded] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    run_with(once.path(), options(&stop), &fine);
+    let in_plan_order = super::texts(once.path(), "jobs", "job_id");
+    let parts = super::tables_of(once.path()).len() / 3;
+    let (all, expected) = compacted(once.path());
+    assert_eq!((all.parts, all.jobs, all.failed_parts), (parts as u64, 2 * SEEDS, 0));
+    assert!(expected.len() / 3 == parts.div_ceil(2) && parts > 3, "{:?}", expected.keys());
+    assert!(super::texts(once.path(), "jobs", "job_id") == in_plan_order);
+
+    run_with(retried.path(), options(&stop), &|job, _| faulty(job, true));
+    let (some, with_failures) = compacted(retried.path());
+    assert!(some.failed_parts > 0 && some.parts + some.failed_parts == all.parts, "{some:?}");
+    let own = with_failures.keys().filter(|path| path.to_string_lossy().contains("part-")).count() as u64;
+    assert_eq!(own, 3 * some.failed_parts);
+    let retry = Options { retry_failed: true, ..options(&stop) };
+    assert_eq!(run_with(retried.path(), retry, &fine).jobs_run, 4);
+    let is_kept = |path: &PathBuf| path.to_string_lossy().contains("compact-");
+    let after = super::tables_of(retried.path());
+    assert!(with_failures.iter().filter(|(path, _)| is_kept(path)).all(|(path, bytes)| after[path] == *bytes));
+    assert!(compacted(retried.path()).1 == expected);
+
+    for shard in ["2/3", "1/3", "3/3"] {
+        run_with(sharded.path(), Options { shard: shard.parse().unwrap(), ..options(&stop) }, &fine);
+        let tables = compacted(sharded.path()).1;
+        assert!(shard != "3/3" || tables == expected);
+    }
 }

@@ -1,0 +1,291 @@
+//! Events: what happens to a results directory, as it happens. Displays are fed with them, and the log keeps them.
+//!
+//! The log is lines of JSON in `run/log/`, one file for each run, so that runs on several hosts do not write into each
+//! other's. Tables never depend on it.
+
+use crate::results::commit::create_folder;
+use crate::results::handle::Results;
+use crate::results::layout::{Layout, TableFile};
+use crate::table::file::PROGRAM;
+use crate::table::storage::{Storage, StorageError, StoredFile};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Something that happened. Costs are CPU times, and all times are in s.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum RunEvent {
+    /// A run knows what is to be done.
+    Started {
+        /// Name of the host.
+        host: String,
+        /// Id of the process.
+        process: u32,
+        /// Program and version.
+        program: String,
+        /// Shard, as `K/N`.
+        shard: String,
+        /// Threads.
+        threads: usize,
+        /// Jobs to run.
+        jobs: u64,
+        /// Jobs that are there already.
+        jobs_there: u64,
+        /// Predicted cost of the jobs to run.
+        predicted_cost: f64,
+    },
+    /// A job is done, though not yet committed.
+    JobDone {
+        /// Slips recorded.
+        slips: usize,
+        /// Predicted cost.
+        predicted_cost: f64,
+        /// Its wall time.
+        wall: f64,
+    },
+    /// A job failed; the others go on.
+    JobFailed {
+        /// Its id.
+        job_id: String,
+        /// Why.
+        reason: String,
+        /// The command that does the same, to look at it alone.
+        command: String,
+        /// Predicted cost.
+        predicted_cost: f64,
+        /// Its wall time.
+        wall: f64,
+    },
+    /// A part is committed.
+    PartCommitted {
+        /// Its name.
+        part: String,
+        /// Jobs that were run for it.
+        jobs: usize,
+        /// Those that failed.
+        failed: usize,
+        /// Predicted cost of these jobs.
+        predicted_cost: f64,
+        /// Sum of their wall times.
+        measured_cost: f64,
+    },
+    /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
+    Stopping,
+    /// Not all parts would end in time; what is under way does.
+    OutOfTime,
+    /// The run ends by itself.
+    Finished(RunReport),
+    /// The run ends with an error.
+    Error {
+        /// The error.
+        error: String,
+    },
+    /// The rows of a committed part were damaged and taken away, so that it is run again.
+    PartQuarantined {
+        /// Its name.
+        part: String,
+    },
+    /// Parts were compacted.
+    Compacted {
+        /// Names of the files of the jobs table.
+        files: Vec<String>,
+    },
+}
+
+/// What a run did. Jobs count when they are committed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunReport {
+    /// Jobs run, failed ones included.
+    pub jobs_run: u64,
+    /// Jobs that still count as failed in the parts of this run's shard, earlier ones included.
+    pub jobs_failed: u64,
+    /// Jobs of this run's shard that are still to be run.
+    pub jobs_left: u64,
+    /// Parts committed.
+    pub parts_committed: u64,
+    /// Whether the run was stopped, or its time did not suffice, before all was done.
+    pub stopped: bool,
+    /// Predicted wall time of the cheapest part that was not started for want of time, in s.
+    pub time_wanted: Option<f64>,
+    /// Predicted CPU time of the jobs run, in s.
+    pub predicted_cost: f64,
+    /// Sum of their wall times, in s.
+    pub measured_cost: f64,
+    /// Wall time of the run, in s.
+    pub wall: f64,
+}
+
+impl RunEvent {
+    /// The event with which a run begins.
+    #[must_use]
+    pub fn started(shard: String, threads: usize, jobs: u64, jobs_there: u64, predicted_cost: f64) -> Self {
+        let (program, process) = (PROGRAM.to_owned(), std::process::id());
+        Self::Started { host: host(), process, program, shard, threads, jobs, jobs_there, predicted_cost }
+    }
+
+    /// Whether the log keeps it: a line for each job would be millions.
+    const fn is_logged(&self) -> bool {
+        !matches!(self, Self::JobDone { .. })
+    }
+}
+
+/// A line of a log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Line {
+    /// Seconds since 1970 UTC.
+    time: f64,
+    #[serde(flatten)]
+    event: RunEvent,
+}
+
+/// Fallback host name.
+pub(super) const UNKNOWN_HOST: &str = "unknown";
+
+/// Name of this host, or "unknown".
+#[must_use]
+pub fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
+    let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
+}
+
+fn now() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
+}
+
+/// The log of one run.
+pub struct Log(StoredFile);
+
+impl Log {
+    fn create(storage: &dyn Storage, layout: &Layout) -> Result<Self, StorageError> {
+        let folder = layout.logs();
+        create_folder(storage, &folder)?;
+        let plain: String =
+            host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+        let path = folder.join(format!("{:.3}-{plain}-{}.jsonl", now(), std::process::id()));
+        Ok(Self(storage.create(&path)?))
+    }
+
+    /// Appends an event, if it is one that the log keeps.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
+        if !event.is_logged() {
+            return Ok(());
+        }
+        // An event always has a form as JSON: it holds texts and numbers alone.
+        let line = serde_json::to_string(&Line { time: now(), event: event.clone() }).unwrap_or_default();
+        self.0.write(format!("{line}\n").as_bytes())
+    }
+}
+
+/// Goes through the events of all logs, in order of the beginnings of their runs. What a killed run left half-written
+/// is passed over.
+fn read(storage: &dyn Storage, layout: &Layout, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
+    let folder = layout.logs();
+    for name in storage.list(&folder)? {
+        let path = folder.join(name);
+        for line in BufReader::new(storage.open(&path)?).split(b'\n') {
+            let line = line.map_err(StorageError::at("read", &path))?;
+            if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
+                visit(event);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// How the rows of a part were kept last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kept {
+    Alone,
+    Compacted,
+}
+
+/// The parts that were committed and not taken away since, by their names, as the logs say.
+pub(super) fn committed_parts(storage: &dyn Storage, layout: &Layout) -> Result<BTreeMap<String, Kept>, StorageError> {
+    let mut parts = BTreeMap::new();
+    read(storage, layout, |event| match event {
+        RunEvent::PartCommitted { part, .. } => {
+            parts.insert(part, Kept::Alone);
+        }
+        RunEvent::PartQuarantined { part } => {
+            parts.remove(&part);
+        }
+        RunEvent::Compacted { files } => {
+            parts.extend(
+                files
+                    .iter()
+                    .filter_map(|name| TableFile::parse(name))
+                    .flat_map(|file| file.part_names())
+                    .map(|part| (part, Kept::Compacted)),
+            );
+        }
+        _ => (),
+    })?;
+    Ok(parts)
+}
+
+impl Results<'_> {
+    /// Begins a log.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn begin_log(&self) -> Result<Log, StorageError> {
+        Log::create(self.storage(), self.layout())
+    }
+
+    /// Goes through all events that are logged, in order of the beginnings of their runs.
+    ///
+    /// # Errors
+    /// When a log cannot be read.
+    pub fn events(&self, visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
+        read(self.storage(), self.layout(), visit)
+    }
+
+    /// Measured over predicted cost of all parts in the logs; `None` before the first.
+    ///
+    /// # Errors
+    /// When a log cannot be read.
+    pub fn pace(&self) -> Result<Option<f64>, StorageError> {
+        let (mut predicted, mut measured) = (0.0, 0.0);
+        self.events(|event| {
+            if let RunEvent::PartCommitted { predicted_cost, measured_cost, .. } = event {
+                predicted += predicted_cost;
+                measured += measured_cost;
+            }
+        })?;
+        Ok((predicted > 0.0).then(|| measured / predicted))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::storage::Disk;
+
+    #[test]
+    fn a_log_reads_back_without_its_half_written_end() {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(root.path());
+        let mut log = Log::create(&Disk, &layout).unwrap();
+        let events = [
+            RunEvent::started("1/1".to_owned(), 2, 3, 0, 4.0),
+            RunEvent::Finished(RunReport { jobs_run: 3, time_wanted: Some(1.5), ..RunReport::default() }),
+            RunEvent::Error { error: "disk full".to_owned() },
+            RunEvent::Stopping,
+        ];
+        for event in &events {
+            log.write(event).unwrap();
+        }
+        log.write(&RunEvent::JobDone { slips: 3, predicted_cost: 1.0, wall: 1.0 }).unwrap();
+        log.0.write(b"{\"time\": 1, \"ev").unwrap();
+        let mut read_back = Vec::new();
+        read(&Disk, &layout, |event| read_back.push(event)).unwrap();
+        assert_eq!(read_back, events);
+    }
+}

@@ -1,0 +1,203 @@
+//! A results directory that fits this program: opened once, valid from then on.
+
+use crate::results::commit::alone;
+use crate::results::error::ResultsError;
+use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
+use crate::results::manifest::{self, Manifest};
+use crate::results::tables;
+use crate::sweep::{Job, Part, Plan, Sweep};
+use crate::table::file::Footer;
+use crate::table::storage::{Storage, StorageError};
+use std::fmt;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
+/// for, since other processes may be at work on it.
+#[derive(Clone)]
+pub struct Results<'a> {
+    storage: &'a dyn Storage,
+    layout: Layout,
+    /// At least one.
+    sweeps: Vec<Sweep>,
+    current: usize,
+}
+
+impl fmt::Debug for Results<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Results").field("root", &self.layout.root()).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Results<'a> {
+    /// Opens the directory of a sweep: begins it, goes on with it, or extends it.
+    ///
+    /// # Errors
+    /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
+    pub fn open(storage: &'a dyn Storage, root: &Path, sweep: &Sweep) -> Result<Self, ResultsError> {
+        let layout = Layout::new(root);
+        if let (results, None) = Self::compare(storage, &layout, sweep)? {
+            return Ok(results);
+        }
+        let _alone = alone(storage, &layout, manifest::WRITER)?;
+        // Another run may have written the manifest before the lock was ours.
+        let (results, unwritten) = Self::compare(storage, &layout, sweep)?;
+        if let Some(manifest) = unwritten {
+            manifest.write(storage, &layout)?;
+        }
+        Ok(results)
+    }
+
+    /// Reads a directory as it is.
+    ///
+    /// # Errors
+    /// When it is no results directory, belongs to other versions, or is damaged.
+    pub fn read(storage: &'a dyn Storage, root: &Path) -> Result<Self, ResultsError> {
+        let layout = Layout::new(root);
+        let (manifest, sweeps) = manifest::read_with_sweeps(storage, &layout)?.ok_or_else(|| no_results(root))?;
+        Ok(Self::new(storage, layout, sweeps, manifest.current))
+    }
+
+    pub(super) const fn new(storage: &'a dyn Storage, layout: Layout, sweeps: Vec<Sweep>, current: usize) -> Self {
+        Self { storage, layout, sweeps, current }
+    }
+
+    /// The directory as it will be once it is opened with a sweep, and the manifest that is to be written for that.
+    fn compare(
+        storage: &'a dyn Storage,
+        layout: &Layout,
+        sweep: &Sweep,
+    ) -> Result<(Self, Option<Manifest>), ResultsError> {
+        let results = |sweeps, current| Self::new(storage, layout.clone(), sweeps, current);
+        // In this order: another run may write the manifest in between, and none removes it.
+        let is_fresh = is_fresh(storage, layout)?;
+        let Some((mut manifest, mut sweeps)) = manifest::read_with_sweeps(storage, layout)? else {
+            if is_fresh {
+                return Ok((results(vec![sweep.clone()], 0), Some(Manifest::new(sweep))));
+            }
+            let problem =
+                "is not empty and no results directory (there is no run/manifest.json); choose another with --out";
+            return Err(ResultsError::refused(layout.root(), problem));
+        };
+        let last = &sweeps[manifest.current];
+        let mut differences = manifest.difference(&Manifest::new(last));
+        differences.extend(last.difference(sweep).iter().map(ToString::to_string));
+        manifest::refuse(layout, &differences)?;
+        let known = sweeps.iter().position(|known| known.text() == sweep.text());
+        if known == Some(manifest.current) {
+            return Ok((results(sweeps, manifest.current), None));
+        }
+        manifest.current = known.unwrap_or_else(|| {
+            sweeps.push(sweep.clone());
+            manifest.sweeps.push(sweep.text().to_owned());
+            sweeps.len() - 1
+        });
+        Ok((results(sweeps, manifest.current), Some(manifest)))
+    }
+
+    /// Where it lies.
+    #[must_use]
+    pub const fn storage(&self) -> &'a dyn Storage {
+        self.storage
+    }
+
+    /// Where everything in it lies.
+    #[must_use]
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The sweeps that were run here, one for each extension.
+    #[must_use]
+    pub fn sweeps(&self) -> &[Sweep] {
+        &self.sweeps
+    }
+
+    /// The extension whose sweep was asked for last.
+    #[must_use]
+    pub const fn current(&self) -> usize {
+        self.current
+    }
+
+    /// The sweep that was asked for last.
+    #[must_use]
+    pub fn sweep(&self) -> &Sweep {
+        &self.sweeps[self.current]
+    }
+
+    /// All jobs in their parts.
+    #[must_use]
+    pub fn plan(&self) -> Plan<'_> {
+        Plan::new(&self.sweeps)
+    }
+
+    /// What the footers of table files with rows of an extension hold.
+    #[must_use]
+    pub fn footer(&self, extension: usize) -> Footer {
+        Footer::default().with_sweep(&self.sweeps[extension])
+    }
+
+    /// Names of the tables, that of the jobs last.
+    pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
+        let precursors = self.sweep().recording().precursors.then_some(tables::PRECURSORS);
+        [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
+    }
+
+    /// Whether a part is to be there: it holds a job of the sweep that was asked for last.
+    #[must_use]
+    pub fn wants(&self, part: &Part) -> bool {
+        part.epoch == self.current || part.jobs.iter().any(|job| self.sweep().contains(&job.parameters))
+    }
+
+    /// How many jobs of a part are not of the sweep that was asked for last.
+    #[must_use]
+    pub fn unwanted_jobs(&self, part: &Part) -> u64 {
+        let is_wanted = |job: &&Job| part.epoch == self.current || self.sweep().contains(&job.parameters);
+        (part.jobs.len() - part.jobs.iter().filter(is_wanted).count()) as u64
+    }
+
+    /// The id of a job of a part.
+    #[must_use]
+    pub fn job_id(&self, part: &Part, position: usize) -> String {
+        self.sweeps[part.epoch].job_id(&part.jobs[position].parameters).to_string()
+    }
+
+    /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
+    /// folder, and the sync after it leaves names that are seen but would not survive a power cut.
+    ///
+    /// # Errors
+    /// When a folder cannot be synced.
+    pub fn sync_names(&self) -> Result<(), StorageError> {
+        for above in self.layout.root().ancestors().skip(1) {
+            // Most are not ours, and who made the folders in them synced them if that is possible at all.
+            let _ = self.storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
+        }
+        for folder in self.layout.result_folders() {
+            match self.storage.sync_folder(&folder) {
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                synced => synced?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A directory that is none of ours, for those who look at one.
+pub(super) fn no_results(root: &Path) -> ResultsError {
+    let problem =
+        "is no results directory (there is no run/manifest.json); name one that a run made, such as results/fig3";
+    ResultsError::refused(root, problem)
+}
+
+/// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.
+fn is_fresh(storage: &dyn Storage, layout: &Layout) -> Result<bool, StorageError> {
+    let first_sweep = layout.sweep(0);
+    let ours = |name: &std::ffi::OsString| {
+        RUN_FOLDERS.iter().any(|folder| name == folder) || Some(name.as_os_str()) == first_sweep.file_name()
+    };
+    match storage.list(layout.root()) {
+        // A file at this place is somebody else's.
+        Err(error) if error.kind() == ErrorKind::NotADirectory => Ok(false),
+        names => Ok(names?.iter().all(|name| name == RUN) && storage.list(&layout.run())?.iter().all(ours)),
+    }
+}

@@ -1,0 +1,213 @@
+//! Parts: consecutive jobs of the plan whose rows are committed together, in the plan's order.
+//!
+//! A part has one file in each table. The one in `jobs` comes last, so a part is done exactly if that is there, or if a
+//! compacted file of `jobs` holds it.
+
+use crate::observe::Measurements;
+use crate::results::commit::{Commit, create_folder};
+use crate::results::error::ResultsError;
+use crate::results::handle::Results;
+use crate::results::layout::{Layout, TableFile};
+use crate::results::tables::{
+    self, Drive, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, SlipRow, label, relabel,
+};
+use crate::sweep::Part;
+use crate::table::columns::{Table, columns};
+use crate::table::file::{Batch, DatasetError, Reader, TableWriter, files, read_rows};
+use crate::table::storage::{Storage, StorageError};
+use arrow_array::Array;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// What a job of a part ended with: its measurements, or why it failed.
+pub type Outcome = Result<Measurements, String>;
+
+/// The parts that are done, as the names in `tables/jobs` said at one instant.
+#[derive(Clone, Debug, Default)]
+pub struct DoneParts {
+    /// Parts with files of their own, by extension and number.
+    own: HashSet<(usize, u64)>,
+    /// First and last parts of compacted files, by extension and first part.
+    compacted: BTreeMap<(usize, u64), u64>,
+}
+
+impl DoneParts {
+    /// Whether a part is done.
+    #[must_use]
+    pub fn has(&self, part: &Part) -> bool {
+        self.is_compacted(part) || self.own.contains(&(part.epoch, part.index))
+    }
+
+    /// Whether the rows of a part are in a compacted file.
+    #[must_use]
+    pub fn is_compacted(&self, part: &Part) -> bool {
+        let before = self.compacted.range((part.epoch, 0)..=(part.epoch, part.index)).next_back();
+        before.is_some_and(|(_, &last)| part.index <= last)
+    }
+}
+
+impl Results<'_> {
+    /// Looks up which parts are done.
+    ///
+    /// # Errors
+    /// When the folder of the jobs table cannot be listed.
+    pub fn done_parts(&self) -> Result<DoneParts, StorageError> {
+        let mut done = DoneParts::default();
+        for name in self.storage().list(&self.layout().table(tables::JOBS))? {
+            match name.to_str().and_then(TableFile::parse) {
+                Some(file) if file.is_compacted() => {
+                    done.compacted.insert((file.extension, file.first), file.last);
+                }
+                Some(file) => {
+                    done.own.insert((file.extension, file.first));
+                }
+                None => (),
+            }
+        }
+        Ok(done)
+    }
+
+    /// The file of a part in a table.
+    #[must_use]
+    pub fn part_file(&self, table: &str, part: &Part) -> PathBuf {
+        self.layout().table(table).join(TableFile::of_part(part.epoch, part.index).to_string())
+    }
+
+    /// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done. Parts with
+    /// failed jobs are never compacted.
+    ///
+    /// # Errors
+    /// When its file in `jobs` cannot be read, or has other jobs than the part.
+    pub fn failures(&self, done: &DoneParts, part: &Part) -> Result<Option<BTreeMap<usize, String>>, ResultsError> {
+        if !done.has(part) {
+            return Ok(None);
+        }
+        let (mut failed, mut rows) = (BTreeMap::new(), 0);
+        if done.is_compacted(part) {
+            return Ok(Some(failed));
+        }
+        let path = self.part_file(tables::JOBS, part);
+        for batch in read_rows::<OutcomeRow>(self.storage(), vec![path.clone()]) {
+            for row in batch? {
+                if row.outcome == JobOutcome::Failed {
+                    failed.insert(rows, row.reason.unwrap_or_default());
+                }
+                rows += 1;
+            }
+        }
+        if rows == part.jobs.len() {
+            Ok(Some(failed))
+        } else {
+            Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.jobs.len())))
+        }
+    }
+
+    /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have.
+    ///
+    /// # Errors
+    /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
+    /// counts as before, or as done, but never as half done.
+    pub fn commit(&self, staging: &Path, part: &Part, outcomes: &BTreeMap<usize, Outcome>) -> Result<(), ResultsError> {
+        let sweep = &self.sweeps()[part.epoch];
+        let label = |position: usize| label(sweep, &part.jobs[position].parameters);
+        let jobs: Jobs<'_> = (0..part.jobs.len()).map(|position| (label(position), outcomes.get(&position))).collect();
+        let mut commit = Commit::begin(self.storage(), staging)?;
+        self.stage::<SlipRow<'_>>(&mut commit, part, &jobs, |writer, job, outcome| {
+            outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
+        })?;
+        if sweep.recording().precursors {
+            self.stage::<PrecursorRow<'_>>(&mut commit, part, &jobs, |writer, job, outcome| {
+                let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
+                precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
+            })?;
+        }
+        self.stage::<JobRow>(&mut commit, part, &jobs, |writer, job, outcome| {
+            writer.push(&(relabel(job), JobRecord::new(outcome.as_ref().map_err(String::as_str))))
+        })?;
+        Ok(commit.publish()?)
+    }
+
+    /// Writes a part's file of one table: new rows of jobs with an outcome, the old ones of the others.
+    fn stage<'j, R: Table>(
+        &self,
+        commit: &mut Commit<'_>,
+        part: &Part,
+        jobs: &'j Jobs<'_>,
+        write: impl Fn(&mut TableWriter<R>, &'j Label<Drive>, &'j Outcome) -> Result<(), DatasetError>,
+    ) -> Result<(), ResultsError> {
+        let target = self.part_file(R::NAME, part);
+        create_folder(self.storage(), &self.layout().table(R::NAME))?;
+        let keeps = jobs.iter().any(|(_, outcome)| outcome.is_none());
+        let kept = if keeps { KeptRows::read(self.storage(), &target)? } else { KeptRows::default() };
+        let footer = self.footer(part.epoch);
+        let mut writer = TableWriter::create(self.storage(), &commit.stage(&target), &footer)?;
+        for (job, outcome) in jobs {
+            match outcome {
+                Some(outcome) => write(&mut writer, job, outcome)?,
+                None => kept.copy(&mut writer, &job.0.job_id)?,
+            }
+        }
+        Ok(writer.finish()?)
+    }
+}
+
+/// The jobs of a part, those that were run with their outcomes.
+type Jobs<'a> = Vec<(Label<Drive>, Option<&'a Outcome>)>;
+
+columns! {
+    /// How a job ended, as a row of the jobs table says.
+    struct OutcomeRow {
+        outcome: JobOutcome;
+        reason: Option<String>;
+    }
+}
+
+/// Files of a table that count beside these of `jobs`: those with the rows of the same parts. A run killed in between
+/// leaves the slips of a part without its jobs.
+///
+/// # Errors
+/// As [`files`].
+pub fn committed_files(
+    storage: &dyn Storage,
+    layout: &Layout,
+    table: &str,
+    jobs: &[PathBuf],
+) -> Result<Vec<PathBuf>, DatasetError> {
+    let parsed = |path: &PathBuf| path.file_name()?.to_str().and_then(TableFile::parse);
+    let parts = |file: TableFile| (file.extension, file.first, file.last, file.is_compacted());
+    let done: HashSet<_> = jobs.iter().filter_map(parsed).map(parts).collect();
+    let counts = |path: &PathBuf| parsed(path).is_some_and(|file| done.contains(&parts(file)));
+    Ok(files(storage, &layout.table(table))?.into_iter().filter(counts).collect())
+}
+
+/// The rows of a file by job.
+#[derive(Default)]
+struct KeptRows {
+    batches: Vec<Batch>,
+    by_job: HashMap<String, Vec<(usize, Range<usize>)>>,
+}
+
+impl KeptRows {
+    fn read(storage: &dyn Storage, path: &Path) -> Result<Self, DatasetError> {
+        let mut kept = Self::default();
+        for batch in Reader::new(storage, vec![path.to_owned()]) {
+            let batch = batch?;
+            let jobs = batch.texts("job_id")?;
+            let mut begin = 0;
+            while begin < jobs.len() {
+                let job = jobs.value(begin);
+                let end = (begin..jobs.len()).find(|&row| jobs.value(row) != job).unwrap_or(jobs.len());
+                kept.by_job.entry(job.to_owned()).or_default().push((kept.batches.len(), begin..end));
+                begin = end;
+            }
+            kept.batches.push(batch);
+        }
+        Ok(kept)
+    }
+
+    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), DatasetError> {
+        let rows = self.by_job.get(job).into_iter().flatten();
+        rows.cloned().try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
+    }
+}
