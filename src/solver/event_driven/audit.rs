@@ -1,13 +1,13 @@
 //! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
 
-use super::Run;
+use super::Integration;
 use super::chain::Chain;
 use super::kernels::Kernels;
 use super::leap::{DriveNow, Driving};
+use super::slider::Slider;
 use super::taylor::{Series, State};
-use crate::model::Interface;
 use crate::solver::ledger::{Audit, work};
-use crate::solver::segment::{ForceAt, ForcePath, Segment};
+use crate::solver::segment::Segment;
 
 impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
@@ -80,11 +80,11 @@ impl Audit {
         self.damping += chain.mass * chain.damping_rate * integral;
     }
 
-    /// Enters the energies at the end, with the drive at `driven` m.
-    pub(super) fn settle(&mut self, chain: &Chain, interface: &Interface, state: &State, stiffness: f64, driven: f64) {
-        let blocks = chain.layout.blocks;
-        let displacements: Vec<f64> = (0..blocks).map(|j| chain.at(&state.displacement, j)).collect();
-        let speeds = (0..blocks).map(|j| chain.at(&state.velocity, j));
+    /// Enters the energies at the end, with a drive of so many N/m at `driven` m.
+    pub(super) fn record_final_energy(&mut self, slider: &Slider, stiffness: f64, driven: f64) {
+        let Slider { interface, chain, state } = slider;
+        let displacements: Vec<f64> = slider.displacements().collect();
+        let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
         let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
         let sprung = stiffness * (driven - displacements[0]) * (driven - displacements[0]);
         self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
@@ -93,37 +93,33 @@ impl Audit {
     }
 }
 
-impl Run<'_> {
-    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
+impl Integration<'_> {
+    /// Goes over a glide once more in Taylor steps, for the energies; `shown` is its force without the free motion.
     pub(super) fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
         let elapsed = shown.duration;
-        let after = std::mem::replace(&mut self.state, before);
-        let (start, least_orders, mut done) = (self.time, self.least_orders, 0.0);
+        let after = std::mem::replace(&mut self.slider.state, before);
+        let (start, min_orders, mut done) = (self.frame.time, self.pace.min_orders, 0.0);
         while done < elapsed {
             let left = elapsed - done;
-            let Ok(length) = self.expand(left) else { break };
+            if self.expand(left).is_err() {
+                break;
+            }
+            let length = self.step.length;
             let s = (left / length).min(1.0);
             if let Some(audit) = &mut self.audit {
-                audit.follow_series(self.kernels, &self.chain, &self.series, [0.0, s], length);
-                let path = ForcePath::Polynomial {
-                    coefficients: &self.force,
-                    bend: self.force_bend,
-                    first: 0.0,
-                    scale: length,
-                    ends: [0.0, s].map(|s| ForceAt::new(&self.force, s)),
-                };
-                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
-                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
+                audit.follow_series(self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
+                let resolved = self.step.segment_to(s, self.frame.now());
+                audit.unseen_work += work(&self.frame.drive, &audit.quadrature, &resolved);
             }
-            self.kernels.evaluate(&self.series, s, length, &mut self.state);
+            self.kernels.evaluate(&self.step.series, s, length, &mut self.slider.state);
             done = if s < 1.0 { elapsed } else { done + length };
-            self.set_time(start + done);
+            self.frame.set_time(start + done);
         }
-        self.state = after;
-        self.least_orders = least_orders;
-        self.set_time(start);
+        self.slider.state = after;
+        self.pace.min_orders = min_orders;
+        self.frame.set_time(start);
         if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
+            audit.unseen_work -= work(&self.frame.drive, &audit.quadrature, shown);
         }
     }
 }

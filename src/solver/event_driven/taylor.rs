@@ -54,7 +54,7 @@ pub(super) struct StepInput {
     /// Wanted bound on the last terms, in m.
     pub error: f64,
     /// Order from which on the terms are compared with it.
-    pub least_order: usize,
+    pub min_order: usize,
     /// `K_d/m`, in 1/s².
     pub pulling: f64,
     /// The drive's displacement.
@@ -262,7 +262,7 @@ fn converge_in_memory<V: Vector>(
         recurrence.add_forces(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
-        if p % 2 == 1 && order >= input.least_order && are_small::<V>(&terms[rows..], rows, order, input.error) {
+        if p % 2 == 1 && order >= input.min_order && are_small::<V>(&terms[rows..], rows, order, input.error) {
             return Some(order);
         }
     }
@@ -286,7 +286,7 @@ fn converge_in_registers<V: Vector, const R: usize>(
         even = recurrence.next_order(p, even, odd, lower);
         odd = recurrence.next_order(p + 1, odd, even, higher);
         let order = p + 3;
-        if order >= input.least_order && are_small::<V>(rows, R, order, input.error) {
+        if order >= input.min_order && are_small::<V>(rows, R, order, input.error) {
             return Some(order);
         }
     }
