@@ -9,11 +9,11 @@
 //! such; [`Ledger::left_out`] tells how much that was. Where a leap carries the free motion on, it is resolved once more for
 //! its damping and for the work on it, which the segment of the leap does not show.
 
+use super::harmonic::Harmonic;
 use super::quadrature::Quadrature;
 use super::segment::{ForcePath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use std::f64::consts::TAU;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
 const NODES_FOR_DRIVE: usize = 8;
@@ -131,10 +131,11 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             };
             segment.duration * nodes.iter().map(|&(s, weight)| weight * power(s)).sum::<f64>()
         }
-        ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
+        ForcePath::Harmonic(harmonic) => {
+            let Harmonic { start, rate, amplitude, phase, angular_frequency } = harmonic;
             // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + turned)) dτ, term by term.
             let turned = drive.phase(segment.start);
-            let angle = TAU * (segment.duration * angular_frequency / TAU).fract();
+            let angle = harmonic.turn(segment.duration);
             let (sine, cosine) = libm::sincos(angle + turned);
             let (sine_before, cosine_before) = libm::sincos(turned);
             let ramp = (start + rate * segment.duration) * cosine
@@ -161,13 +162,9 @@ mod tests {
     #[test]
     fn work_over_a_leap_is_that_of_many_short_quadratures() {
         let (drive, quadrature) = modulated();
-        let path = ForcePath::Harmonic {
-            start: 120.0,
-            rate: 3e3,
-            amplitude: 38.0,
-            phase: 0.7,
-            angular_frequency: drive.angular_frequency,
-        };
+        let angular_frequency = drive.angular_frequency;
+        let path =
+            ForcePath::Harmonic(Harmonic { start: 120.0, rate: 3e3, amplitude: 38.0, phase: 0.7, angular_frequency });
         let segment = Segment { start: 0.3, duration: 0.07, path };
         let pieces = 200;
         let width = segment.duration / f64::from(pieces);

@@ -5,11 +5,13 @@
 
 mod event_driven;
 mod fixed_step;
+mod harmonic;
 mod ledger;
 mod polynomial;
 mod quadrature;
 mod segment;
 
+pub use harmonic::Harmonic;
 pub use ledger::Ledger;
 pub use segment::{ForcePath, Segment};
 

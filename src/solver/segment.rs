@@ -1,7 +1,7 @@
 //! The shear force between two contact events, as a closed-form function of time: values, extremes and integral of F_S.
 
+use super::harmonic::Harmonic;
 use super::polynomial;
-use std::f64::consts::{PI, TAU};
 
 /// How F_S runs along a segment.
 #[derive(Clone, Copy, Debug)]
@@ -19,19 +19,8 @@ pub enum ForcePath<'a> {
         /// The shear force at both ends of the segment.
         ends: [ForceAt; 2],
     },
-    /// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ since the start.
-    Harmonic {
-        /// Ramp at the start, in N.
-        start: f64,
-        /// Rate of the ramp, in N/s.
-        rate: f64,
-        /// Amplitude of the cosine, in N.
-        amplitude: f64,
-        /// Its phase at the start, in rad.
-        phase: f64,
-        /// Its angular frequency, in rad/s.
-        angular_frequency: f64,
-    },
+    /// A ramp with a cosine, in N, with the time since the start.
+    Harmonic(Harmonic),
 }
 
 /// A polynomial shear force at some s.
@@ -76,7 +65,7 @@ impl Segment<'_> {
     pub fn end_force(&self) -> f64 {
         match self.path {
             ForcePath::Polynomial { ends: [_, end], .. } => end.force,
-            ForcePath::Harmonic { .. } => self.force_after(self.duration),
+            ForcePath::Harmonic(harmonic) => harmonic.value(self.duration),
         }
     }
 
@@ -91,15 +80,7 @@ impl Segment<'_> {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
                 polynomial::value(coefficients, first + elapsed / scale)
             }
-            ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
-                let ramp = start + rate * elapsed;
-                if amplitude == 0.0 {
-                    ramp
-                } else {
-                    let turns = (elapsed * angular_frequency / TAU).fract();
-                    ramp + amplitude * libm::cos(TAU * turns + phase)
-                }
-            }
+            ForcePath::Harmonic(harmonic) => harmonic.value(elapsed),
         }
     }
 
@@ -123,7 +104,7 @@ impl Segment<'_> {
                 let [start, end] = ends.map(|end| end.force);
                 (start.min(end) - strays, start.max(end) + strays)
             }
-            ForcePath::Harmonic { start, rate, amplitude, .. } => {
+            ForcePath::Harmonic(Harmonic { start, rate, amplitude, .. }) => {
                 let end = start + rate * self.duration;
                 (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
             }
@@ -144,9 +125,8 @@ impl Segment<'_> {
                     visit(self.start + (s - first) * scale, polynomial::value(coefficients, s));
                 });
             }
-            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
-                let crests =
-                    |sign: f64| harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+            ForcePath::Harmonic(harmonic) => {
+                let crests = |sign: f64| harmonic.times(sign).crests(self.duration);
                 let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)].concat().into_iter().flatten().collect();
                 turns.sort_by(f64::total_cmp);
                 for elapsed in turns {
@@ -160,15 +140,7 @@ impl Segment<'_> {
     pub fn impulse(&self) -> f64 {
         match self.path {
             ForcePath::Polynomial { scale, ends: [start, end], .. } => scale * (end.integral - start.integral),
-            ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
-                let ramp = self.duration * (start + 0.5 * rate * self.duration);
-                if amplitude == 0.0 {
-                    return ramp;
-                }
-                let turns = (self.duration * angular_frequency / TAU).fract();
-                let swing = libm::sin(TAU * turns + phase) - libm::sin(phase);
-                ramp + amplitude / angular_frequency * swing
-            }
+            ForcePath::Harmonic(harmonic) => harmonic.integral(self.duration),
         }
     }
 
@@ -199,8 +171,8 @@ impl Segment<'_> {
                 };
                 ((s - first) * scale, extreme)
             }
-            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
-                let turns = harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+            ForcePath::Harmonic(harmonic) => {
+                let turns = harmonic.times(sign).crests(self.duration);
                 [Some(0.0), Some(self.duration)].into_iter().chain(turns).flatten().fold(
                     (0.0, f64::NEG_INFINITY),
                     |best: (f64, f64), elapsed| {
@@ -212,24 +184,6 @@ impl Segment<'_> {
         };
         (extreme > floor).then_some((self.start + elapsed, extreme))
     }
-}
-
-/// First and last local maximum of r τ + A cos(ω τ + φ) in [0, `duration`], if any: the largest is one of the two.
-fn harmonic_crests(rate: f64, amplitude: f64, phase: f64, angular_frequency: f64, duration: f64) -> [Option<f64>; 2] {
-    let speed = amplitude.abs() * angular_frequency;
-    if speed <= rate.abs() {
-        return [None; 2];
-    }
-    // With A < 0 the cosine is shifted by half a turn.
-    let shift = if amplitude < 0.0 { phase + PI } else { phase };
-    let crest = libm::asin(rate / speed);
-    let period = TAU / angular_frequency;
-    let first = (crest - shift).rem_euclid(TAU) / angular_frequency;
-    if first > duration {
-        return [None; 2];
-    }
-    let last = first + ((duration - first) / period).floor() * period;
-    [Some(first), Some(last)]
 }
 
 #[cfg(test)]
@@ -264,8 +218,8 @@ mod tests {
         /// With at most two maxima and minima there is no other turn in between.
         #[test]
         fn a_short_swing_turns_nowhere_else(rate in -1.0_f64..1.0, amplitude in -1.0_f64..1.0, phase in 0.0_f64..6.3) {
-            let path = ForcePath::Harmonic { start: 0.2, rate, amplitude, phase, angular_frequency: 9.0 };
-            assert_turns(&Segment { start: 3.0, duration: 1.3, path });
+            let harmonic = Harmonic { start: 0.2, rate, amplitude, phase, angular_frequency: 9.0 };
+            assert_turns(&Segment { start: 3.0, duration: 1.3, path: ForcePath::Harmonic(harmonic) });
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use super::Integration;
 use super::chain::Chain;
+use super::driven_solution::DrivenSolution;
 use super::kernels::Kernels;
-use super::leap::{DriveNow, Driving};
 use super::slider::Slider;
 use super::taylor::{Series, State};
+use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::{Audit, work};
 use crate::solver::segment::Segment;
 
@@ -36,8 +37,8 @@ impl Audit {
     pub(super) fn follow_leap(
         &mut self,
         chain: &Chain,
-        drive: &DriveNow,
-        driven: Driving<'_>,
+        drive: &Harmonic,
+        driven: &DrivenSolution,
         state: &State,
         elapsed: f64,
     ) {
@@ -58,8 +59,7 @@ impl Audit {
             let middle = x + 0.5 * y;
             let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
             if j == 0 {
-                let displacement = drive.ramp + drive.amplitude * libm::cos(drive.phase);
-                force -= drive.stiffness / chain.mass * displacement;
+                force -= chain.drive_stiffness / chain.mass * drive.value(0.0);
             }
             dropped += y * force + w * (v + 0.5 * w);
             if j > 0 {
@@ -71,8 +71,8 @@ impl Audit {
         self.left_out += chain.mass * dropped;
         let mut integral = ramp * elapsed;
         if drive.amplitude > 0.0 {
-            let (sine, versine) = turned(frequency, elapsed);
-            let (sine_twice, versine_twice) = turned(2.0 * frequency, elapsed);
+            let (sine, versine) = sine_and_versine(frequency, elapsed);
+            let (sine_twice, versine_twice) = sine_and_versine(2.0 * frequency, elapsed);
             integral -= 2.0 * (mixed[0] * versine + mixed[1] * sine);
             let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
             integral += 0.5 * frequency * (size * frequency * elapsed - swing);
@@ -80,13 +80,13 @@ impl Audit {
         self.damping += chain.mass * chain.damping_rate * integral;
     }
 
-    /// Enters the energies at the end, with a drive of so many N/m at `driven` m.
-    pub(super) fn record_final_energy(&mut self, slider: &Slider, stiffness: f64, driven: f64) {
+    /// Enters the energies at the end, with the drive at `driven` m.
+    pub(super) fn record_final_energy(&mut self, slider: &Slider, driven: f64) {
         let Slider { interface, chain, state } = slider;
         let displacements: Vec<f64> = slider.displacements().collect();
         let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
         let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
-        let sprung = stiffness * (driven - displacements[0]) * (driven - displacements[0]);
+        let sprung = chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
         self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
         self.elastic =
             0.5 * (chain.mass * chain.coupling[0][0] * stretched + sprung) + interface.elastic_energy(&displacements);
@@ -125,7 +125,7 @@ impl Integration<'_> {
 }
 
 /// sin ωt and 1 - cos ωt; whole turns are taken off first.
-fn turned(frequency: f64, elapsed: f64) -> (f64, f64) {
+fn sine_and_versine(frequency: f64, elapsed: f64) -> (f64, f64) {
     let angle = std::f64::consts::TAU * (frequency * elapsed / std::f64::consts::TAU).fract();
     let half = libm::sin(0.5 * angle);
     (libm::sin(angle), 2.0 * half * half)

@@ -3,6 +3,7 @@
 //! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
 //! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
 
+use crate::solver::harmonic::Harmonic;
 use crate::solver::polynomial::{beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value};
 use std::f64::consts::{PI, TAU};
 
@@ -73,35 +74,9 @@ fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<
     (value(coefficients, high) >= 0.0).then(|| safeguarded_halley(coefficients, low, high, first))
 }
 
-/// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Driven {
-    pub start: f64,
-    pub rate: f64,
-    pub amplitude: f64,
-    pub phase: f64,
-    pub angular_frequency: f64,
-}
-
-impl Driven {
-    pub fn value(&self, elapsed: f64) -> f64 {
-        let ramp = self.start + self.rate * elapsed;
-        if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }
-    }
-
-    fn angle(&self, elapsed: f64) -> f64 {
-        // Whole periods are taken off first, so that long leaps lose no digits of the phase.
-        TAU * (elapsed * self.angular_frequency / TAU).fract() + self.phase
-    }
-
-    fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
-        let (sine, cosine) = libm::sincos(self.angle(elapsed));
-        let ramp = self.start + self.rate * elapsed;
-        (ramp + self.amplitude * cosine, self.rate - self.amplitude * self.angular_frequency * sine)
-    }
-
+impl Harmonic {
     /// First instant at or after `from` at which the motion is not below `level`; infinite if never.
-    pub fn first_rise_to(&self, level: f64, from: f64) -> f64 {
+    pub(super) fn first_rise_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) >= level {
             return from;
         }
@@ -140,7 +115,7 @@ impl Driven {
 
     /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too, so it
     /// lies within the first period.
-    pub fn first_fall_to(&self, level: f64, from: f64) -> f64 {
+    pub(super) fn first_fall_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) <= level {
             return from;
         }
@@ -209,7 +184,7 @@ mod tests {
             start in -1.0_f64..1.0, rate in 0.001_f64..2.0, amplitude in 0.0_f64..1.5, phase in -7.0_f64..7.0,
             level in 0.0_f64..4.0, from in 0.0_f64..9.0
         ) {
-            let driven = Driven { start, rate, amplitude, phase, angular_frequency: 2.5 };
+            let driven = Harmonic { start, rate, amplitude, phase, angular_frequency: 2.5 };
             let rise = driven.first_rise_to(level, from);
             prop_assert!(rise >= from);
             let fall = driven.first_fall_to(-level, from);

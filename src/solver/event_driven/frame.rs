@@ -1,8 +1,9 @@
 //! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time nor
 //! displacement loses digits in long runs.
 
-use super::taylor::DriveTerms;
+use super::taylor::DriveDerivatives;
 use crate::model::{ContactEvent, Drive};
+use crate::solver::harmonic::Harmonic;
 
 /// Local time at which the frame moves, in s.
 pub(super) const FRAME_SPAN: f64 = 0.0625;
@@ -99,12 +100,12 @@ impl Frame {
     }
 
     /// Present phase of the modulation, in rad.
-    pub fn phase(&self) -> f64 {
+    fn phase(&self) -> f64 {
         self.drive.phase(self.origin_time) + self.drive.angular_frequency * self.time
     }
 
     /// Present displacement of the drive's ramp, without the cosine, in m.
-    pub fn ramp(&self) -> f64 {
+    fn ramp(&self) -> f64 {
         self.ramp_at_origin + self.drive.velocity * self.time
     }
 
@@ -113,9 +114,15 @@ impl Frame {
         self.drive.stiffness * (self.ramp() + self.swing[0] - displacement)
     }
 
-    /// The drive's displacement over a step of so many seconds.
-    pub fn drive_terms(&self, length: f64) -> DriveTerms {
-        DriveTerms {
+    /// The drive's displacement from now on, within the cycle, in m.
+    pub fn drive_motion(&self) -> Harmonic {
+        let Drive { velocity, amplitude, angular_frequency, .. } = self.drive;
+        Harmonic { start: self.ramp(), rate: velocity, amplitude, phase: self.phase(), angular_frequency }
+    }
+
+    /// The derivatives of the drive's displacement, for a step of so many seconds.
+    pub fn drive_derivatives(&self, length: f64) -> DriveDerivatives {
+        DriveDerivatives {
             ramp: [self.ramp(), self.drive.velocity * length],
             swing: self.swing,
             angle: self.drive.angular_frequency * length,

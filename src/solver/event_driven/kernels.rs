@@ -1,12 +1,13 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::chain::Chain;
+use super::free_motion::{SplitMotion, split};
 use super::glide::{Glide, advance};
-use super::leap::{DriveNow, Leap, split};
 use super::taylor::{Series, State, StepInput, evaluate, expand, reachable};
 use super::vector::Plain;
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Avx2, Avx512};
+use crate::solver::harmonic::Harmonic;
 
 /// The hot loops, compiled for the features of one kind of processor.
 #[derive(Clone, Copy)]
@@ -14,7 +15,7 @@ pub(super) struct Kernels {
     expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
-    split: unsafe fn(&Chain, &DriveNow, &mut Leap) -> Option<f64>,
+    split: unsafe fn(&Chain, &Harmonic, &mut SplitMotion) -> Option<f64>,
     glide: unsafe fn(&Chain, f64, f64, &mut Glide),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
@@ -25,7 +26,7 @@ pub(super) struct Kernels {
 macro_rules! kernels {
     ($module:ident, $vector:ident, $rows:literal $(, $features:literal)?) => {
         mod $module {
-            use super::{Chain, DriveNow, Glide, Kernels, Leap, Series, State, StepInput};
+            use super::{Chain, Glide, Harmonic, Kernels, Series, SplitMotion, State, StepInput};
             use super::{advance, evaluate, expand, reachable, split};
             use super::$vector;
 
@@ -45,8 +46,8 @@ macro_rules! kernels {
             }
 
             $(#[target_feature(enable = $features)])?
-            fn split_here(chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
-                split(chain, drive, leap)
+            fn split_here(chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64> {
+                split(chain, drive, motion)
             }
 
             $(#[target_feature(enable = $features)])?
@@ -121,11 +122,11 @@ impl Kernels {
         unsafe { (self.reachable)(chain, series, blocks) }
     }
 
-    /// Splits the state into driven solution and free motion; see [`split`].
+    /// Splits the motion into driven solution and free motion; see [`split`].
     #[inline]
-    pub fn split(self, chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
+    pub fn split(self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64> {
         // SAFETY: as above.
-        unsafe { (self.split)(chain, drive, leap) }
+        unsafe { (self.split)(chain, drive, motion) }
     }
 
     /// Carries the free motion over so many seconds; see [`advance`].

@@ -10,7 +10,9 @@
 mod audit;
 mod chain;
 mod crossing;
+mod driven_solution;
 mod frame;
+mod free_motion;
 mod glide;
 mod kernels;
 mod lanes;
@@ -24,7 +26,7 @@ mod vector;
 use self::frame::{FRAME_SPAN, Frame};
 use self::kernels::Kernels;
 use self::lanes::Layout;
-use self::leap::{Attempt, Bounds, DriveNow, Leap};
+use self::leap::{Attempt, Bounds, Leap};
 use self::slider::Slider;
 use self::step::{Pace, Step};
 use self::tolerances::Tolerances;
@@ -147,9 +149,7 @@ impl<'a> Integration<'a> {
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit.take() {
-            let drive = &self.frame.drive;
-            let driven = self.frame.ramp() + drive.amplitude * libm::cos(self.frame.phase());
-            audit.record_final_energy(&self.slider, drive.stiffness, driven);
+            audit.record_final_energy(&self.slider, self.frame.drive_motion().value(0.0));
         }
         Ok(self.summary)
     }
@@ -158,16 +158,7 @@ impl<'a> Integration<'a> {
     /// not yet allowed.
     #[inline(never)]
     fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
-        let Drive { stiffness, velocity, amplitude, angular_frequency, .. } = self.frame.drive;
-        let drive = DriveNow {
-            stiffness,
-            mass: self.slider.chain.mass,
-            ramp: self.frame.ramp(),
-            velocity,
-            amplitude,
-            phase: self.frame.phase(),
-            angular_frequency,
-        };
+        let drive = self.frame.drive_motion();
         let start = self.frame.now();
         let bounds = Bounds { horizon, until_turn, error: self.tolerances.leap_error, passed: self.passed_force };
         let mut shown = None;

@@ -137,14 +137,14 @@ impl Step {
         polynomial::expanded(&self.coefficients, s)
     }
 
-    /// Adds to the series of a block, and to F_S under a drive of so many N/m.
-    fn amend(&mut self, chain: &Chain, block: usize, coefficients: [f64; MERGED_ORDER + 1], stiffness: f64) {
+    /// Adds to the series of a block, and what follows to F_S.
+    fn amend(&mut self, chain: &Chain, block: usize, coefficients: [f64; MERGED_ORDER + 1]) {
         let (row, lane) = chain.layout.slot(block);
         self.series.add(row, lane, &coefficients);
         self.amended.push(block);
         if block == 0 {
             for (force, coefficient) in self.force.iter_mut().zip(coefficients) {
-                *force -= stiffness * coefficient;
+                *force -= chain.drive_stiffness * coefficient;
             }
             self.force_bend = polynomial::second_derivative_bound(&self.force);
         }
@@ -256,15 +256,14 @@ impl Integration<'_> {
         if window * length < MIN_WINDOW * self.pace.typical_advance {
             return 0.0;
         }
-        let drive_stiffness = self.frame.drive.stiffness;
-        self.step.amend(chain, block, about_start([second, third, fourth], s), drive_stiffness);
+        self.step.amend(chain, block, about_start([second, third, fourth], s));
         if change == Change::Break {
             let beside = about_start([0.0, 0.0, square * chain.coupling[0][0] * second / 12.0], s);
             if block > 0 {
-                self.step.amend(chain, block - 1, beside, drive_stiffness);
+                self.step.amend(chain, block - 1, beside);
             }
             if block + 1 < chain.layout.blocks {
-                self.step.amend(chain, block + 1, beside, drive_stiffness);
+                self.step.amend(chain, block + 1, beside);
             }
         }
         window
@@ -279,21 +278,21 @@ impl Integration<'_> {
             halvings += 1;
             length *= 0.5;
         }
-        let (stiffness, Slider { chain, state, .. }) = (self.frame.drive.stiffness, &self.slider);
+        let Slider { chain, state, .. } = &self.slider;
         loop {
             let min_order = self.pace.min_orders.get(halvings).copied().unwrap_or(0);
-            let drive = self.frame.drive_terms(length);
+            let drive = self.frame.drive_derivatives(length);
             let input = StepInput {
                 length,
                 error: self.tolerances.step_error,
                 min_order,
-                pulling: stiffness / chain.mass,
+                pulling: chain.drive_stiffness / chain.mass,
                 drive,
             };
             let step = &mut self.step;
             if self.kernels.expand(chain, state, &input, &mut step.series) {
                 self.pace.note_order(halvings, step.series.order);
-                step.series.shear_force(drive, stiffness, &mut step.force);
+                step.series.shear_force(drive, chain.drive_stiffness, &mut step.force);
                 step.force_bend = polynomial::second_derivative_bound(&step.force);
                 (step.start, step.length) = (self.frame.time, length);
                 return Ok(());

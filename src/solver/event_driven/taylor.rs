@@ -26,19 +26,19 @@ const INVERSE_FACTORIAL: [f64; MOST_COEFFICIENTS] = {
 
 /// The drive's displacement U over a step: h^p U^(p), order after order, in m.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DriveTerms {
-    /// Ramp now, and its rise over the step.
+pub(super) struct DriveDerivatives {
+    /// Ramp at the start, and its rise over the step.
     pub ramp: [f64; 2],
-    /// Δ cos θ and -Δ sin θ at the phase of now.
+    /// Δ cos θ and -Δ sin θ at the phase θ of the start.
     pub swing: [f64; 2],
     /// ω h, in rad.
     pub angle: f64,
 }
 
-impl DriveTerms {
+impl DriveDerivatives {
     /// The term of this order; the next call gives the next.
     #[inline(always)]
-    pub fn take(&mut self) -> f64 {
+    pub fn next_order(&mut self) -> f64 {
         let term = self.ramp[0] + self.swing[0];
         self.ramp = [self.ramp[1], 0.0];
         self.swing = [self.angle * self.swing[1], -self.angle * self.swing[0]];
@@ -58,7 +58,7 @@ pub(super) struct StepInput {
     /// `K_d/m`, in 1/s².
     pub pulling: f64,
     /// The drive's displacement.
-    pub drive: DriveTerms,
+    pub drive: DriveDerivatives,
 }
 
 /// The series of one step.
@@ -123,11 +123,11 @@ impl Series {
     }
 
     /// The coefficients of F_S under a drive of so many N/m, in N, written over what is there.
-    pub fn shear_force(&self, mut drive: DriveTerms, stiffness: f64, coefficients: &mut Vec<f64>) {
+    pub fn shear_force(&self, mut drive: DriveDerivatives, stiffness: f64, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = 0;
         for (coefficient, inverse) in coefficients.iter_mut().zip(&INVERSE_FACTORIAL) {
-            *coefficient = stiffness * inverse * (drive.take() - self.terms[at][0]);
+            *coefficient = stiffness * inverse * (drive.next_order() - self.terms[at][0]);
             at += self.rows;
         }
     }
@@ -199,7 +199,7 @@ struct Recurrence<'a, V> {
     damping: V,
     /// h² `K_d/m`, and what the drive's displacement has left.
     pulling: f64,
-    drive: DriveTerms,
+    drive: DriveDerivatives,
 }
 
 impl<V: Vector> Recurrence<'_, V> {
@@ -211,7 +211,7 @@ impl<V: Vector> Recurrence<'_, V> {
                 V::load(pull).fused(self.square, V::load(row)).store(row);
             }
         }
-        let push = self.pulling * self.drive.take();
+        let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
             V::load(&FIRST_LANE).fused(V::splat(push), V::load(&next[0])).store(&mut next[0]);
         }
@@ -236,7 +236,7 @@ impl<V: Vector> Recurrence<'_, V> {
                 next[r] = V::load(&pull[r]).fused(self.square, next[r]);
             }
         }
-        let push = self.pulling * self.drive.take();
+        let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
             next[0] = V::load(&FIRST_LANE).fused(V::splat(push), next[0]);
         }
