@@ -5,6 +5,7 @@
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
 use super::disorder::Contact;
+use super::lanes::{LANES, Row};
 use super::{BreakOn, Disorder, Parameters};
 use std::array;
 use std::cmp::Reverse;
@@ -66,23 +67,20 @@ impl Due {
     }
 }
 
-/// Width in which sums over the contacts of a block are taken: fixed, so that their rounding does not depend on the
-/// processor.
-const LANES: usize = 8;
-
 /// Times eight bytes that are 0 or 1 each: their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
-/// Eight contacts of a block, side by side in memory as they are looked at. Those beyond the last stay detached for ever.
+/// The contacts of a row, side by side in memory as they are looked at: contact i of a block lies in row i div 8 of the
+/// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-struct Row {
+struct ContactRow {
     /// Stiffness while attached, else 0.
-    attached_stiffness: [f64; LANES],
-    anchor: [f64; LANES],
+    attached_stiffness: Row,
+    anchor: Row,
     /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
-    upper: [f64; LANES],
-    lower: [f64; LANES],
+    upper: Row,
+    lower: Row,
     /// The present life, or, while detached, the next.
     life: [Contact; LANES],
     generation: [u32; LANES],
@@ -96,7 +94,7 @@ pub struct Interface {
     break_on: BreakOn,
     disorder: Disorder,
     /// The rows of the first block, then of the second, and so on.
-    rows: Vec<Row>,
+    rows: Vec<ContactRow>,
     reattachments: BinaryHeap<Reverse<Due>>,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
@@ -114,11 +112,11 @@ impl Interface {
     pub fn new(parameters: &Parameters) -> Self {
         let blocks = parameters.blocks;
         let rows_per_block = parameters.contacts_per_block.div_ceil(LANES);
-        let detached = Row {
-            attached_stiffness: [0.0; LANES],
-            anchor: [0.0; LANES],
-            upper: [f64::INFINITY; LANES],
-            lower: [f64::NEG_INFINITY; LANES],
+        let detached = ContactRow {
+            attached_stiffness: Row::filled(0.0),
+            anchor: Row::filled(0.0),
+            upper: Row::filled(f64::INFINITY),
+            lower: Row::filled(f64::NEG_INFINITY),
             life: [Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; LANES],
             generation: [0; LANES],
         };
@@ -186,7 +184,7 @@ impl Interface {
         // So many rows as have a bit for each contact.
         for start in (0..self.rows_per_block).step_by(LANES) {
             let mut reached = 0_u64;
-            for (row, Row { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
+            for (row, ContactRow { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
                 let in_row: [u8; LANES] =
                     array::from_fn(|lane| u8::from((upper[lane] <= displacement) | (lower[lane] >= displacement)));
                 reached |= (u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56) << (LANES * row);
@@ -208,7 +206,7 @@ impl Interface {
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
         for row in &mut self.rows {
-            for position in row.anchor.iter_mut().chain(&mut row.upper).chain(&mut row.lower) {
+            for position in row.anchor.iter_mut().chain(row.upper.iter_mut()).chain(row.lower.iter_mut()) {
                 *position -= shift;
             }
         }
@@ -230,7 +228,7 @@ impl Interface {
     /// Elastic energy in the attached contacts for given displacements in m, in J.
     #[must_use]
     pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
-        let of_row = |displacement: f64, row: &Row| -> [f64; LANES] {
+        let of_row = |displacement: f64, row: &ContactRow| -> [f64; LANES] {
             array::from_fn(|lane| {
                 let elongation = displacement - row.anchor[lane];
                 0.5 * row.attached_stiffness[lane] * elongation * elongation
@@ -245,13 +243,13 @@ impl Interface {
         (block * self.rows_per_block + contact / LANES, contact % LANES)
     }
 
-    fn rows_of(&self, block: usize) -> &[Row] {
+    fn rows_of(&self, block: usize) -> &[ContactRow] {
         &self.rows[block * self.rows_per_block..][..self.rows_per_block]
     }
 
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
         let (row, lane) = self.place(block, contact);
-        let Row { life, generation, anchor, .. } = &self.rows[row];
+        let ContactRow { life, generation, anchor, .. } = &self.rows[row];
         let Contact { threshold, stiffness, .. } = life[lane];
         ContactEvent {
             time,
@@ -296,36 +294,29 @@ impl Interface {
     /// Takes the sums and nearest break positions of a block anew.
     fn gather(&mut self, block: usize) {
         self.sum(block);
-        let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
         for row in self.rows_of(block) {
             for lane in 0..LANES {
                 upper[lane] = if row.upper[lane] < upper[lane] { row.upper[lane] } else { upper[lane] };
                 lower[lane] = if row.lower[lane] > lower[lane] { row.lower[lane] } else { lower[lane] };
             }
         }
-        self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
-        self.block_lower[block] = across(lower, |a, b| if a > b { a } else { b });
+        self.block_upper[block] = upper.reduce(|a, b| if a < b { a } else { b });
+        self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
     }
 
     /// Takes the sums of a block anew, in fixed lanes.
     fn sum(&mut self, block: usize) {
-        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
+        let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
         for row in self.rows_of(block) {
             for lane in 0..LANES {
                 stiffness[lane] += row.attached_stiffness[lane];
                 pull[lane] += row.attached_stiffness[lane] * row.anchor[lane];
             }
         }
-        self.block_stiffness[block] = across(stiffness, |a, b| a + b);
-        self.block_pull[block] = across(pull, |a, b| a + b);
+        self.block_stiffness[block] = stiffness.reduce(|a, b| a + b);
+        self.block_pull[block] = pull.reduce(|a, b| a + b);
     }
-}
-
-/// Puts lanes together in pairs.
-#[inline(always)]
-fn across(l: [f64; LANES], together: impl Fn(f64, f64) -> f64) -> f64 {
-    let halves: [f64; LANES / 2] = array::from_fn(|i| together(l[i], l[i + LANES / 2]));
-    together(together(halves[0], halves[2]), together(halves[1], halves[3]))
 }
 
 #[cfg(test)]

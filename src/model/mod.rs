@@ -3,6 +3,7 @@
 mod disorder;
 mod drive;
 mod interface;
+mod lanes;
 mod parameters;
 pub mod slider;
 pub mod theory;
@@ -10,6 +11,7 @@ pub mod theory;
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
 pub use interface::{Change, ContactEvent, Interface};
+pub(crate) use lanes::{LANES, Row};
 pub(crate) use parameters::Shortest;
 pub use parameters::{BreakOn, Description, ParameterError, Parameters, Symbol, Value};
 

@@ -1,8 +1,8 @@
 //! The chain of blocks as the solver sees it: its coefficients in lanes, kept up with what the contacts become.
 
-use super::lanes::{Layout, Row};
+use super::layout::Layout;
 use crate::model::slider::StiffnessMatrix;
-use crate::model::{Interface, Parameters};
+use crate::model::{Interface, Parameters, Row};
 
 /// What the contacts make of each block, one entry a block.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@
 
 use super::chain::Chain;
 use super::driven_solution::DrivenSolution;
-use super::lanes::Layout;
+use super::layout::Layout;
 use crate::solver::harmonic::Harmonic;
 
 /// Halvings of the decay rate after which free motion counts as undamped.

@@ -14,8 +14,9 @@
 //! steps need, and nothing is evaluated on the way. Contract: the terms left out are a given part of the motion.
 
 use super::chain::Chain;
-use super::lanes::{LANES, Layout, Row};
+use super::layout::Layout;
 use super::vector::Vector;
+use crate::model::{LANES, Row};
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
 const TAIL: f64 = 12.0;

@@ -11,7 +11,7 @@ use super::chain::Chain;
 use super::free_motion::SplitMotion;
 use super::glide::Glide;
 use super::kernels::Kernels;
-use super::lanes::Layout;
+use super::layout::Layout;
 use super::taylor::State;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;

@@ -15,7 +15,7 @@ mod frame;
 mod free_motion;
 mod glide;
 mod kernels;
-mod lanes;
+mod layout;
 mod leap;
 mod slider;
 mod step;
@@ -25,7 +25,7 @@ mod vector;
 
 use self::frame::{FRAME_SPAN, Frame};
 use self::kernels::Kernels;
-use self::lanes::Layout;
+use self::layout::Layout;
 use self::leap::{Attempt, Bounds, Leap};
 use self::slider::Slider;
 use self::step::{Pace, Step};

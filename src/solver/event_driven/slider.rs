@@ -1,7 +1,7 @@
 //! The slider as it moves: its contacts, the chain that they make of the blocks, and the motion of the blocks.
 
 use super::chain::Chain;
-use super::lanes::Layout;
+use super::layout::Layout;
 use super::taylor::State;
 use crate::model::{ContactEvent, Interface, Parameters};
 

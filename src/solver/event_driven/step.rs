@@ -17,7 +17,7 @@ use super::Integration;
 use super::chain::Chain;
 use super::crossing::first_exit;
 use super::frame::FRAME_SPAN;
-use super::lanes::Layout;
+use super::layout::Layout;
 use super::slider::Slider;
 use super::taylor::{Series, StepInput};
 use crate::model::Change;

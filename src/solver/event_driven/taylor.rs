@@ -6,8 +6,9 @@
 //! strays within the step.
 
 use super::chain::Chain;
-use super::lanes::{Layout, Row};
+use super::layout::Layout;
 use super::vector::Vector;
+use crate::model::Row;
 use crate::solver::polynomial::{INVERSE, MOST_COEFFICIENTS};
 
 /// Largest order of a step.

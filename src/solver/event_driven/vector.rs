@@ -2,7 +2,7 @@
 //!
 //! Contract: every operation is rounded in each lane as IEEE 754 says, fused ones once, so all give the same bits.
 
-use super::lanes::{LANES, Row};
+use crate::model::{LANES, Row};
 
 /// Eight doubles, in whatever registers a set of processor features has.
 pub(super) trait Vector: Copy {
