@@ -94,8 +94,9 @@ impl Audit {
 }
 
 impl Integration<'_> {
-    /// Goes over a glide once more in Taylor steps, for the energies; `shown` is its force without the free motion.
-    pub(super) fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
+    /// Resolves a leap that carried the free motion over once more in Taylor steps, for the energies. `shown` is its force
+    /// without the free motion.
+    pub(super) fn audit_carried_leap(&mut self, before: State, shown: &Segment<'_>) {
         let elapsed = shown.duration;
         let after = std::mem::replace(&mut self.slider.state, before);
         let (start, min_orders, mut done) = (self.frame.time, self.pace.min_orders, 0.0);

@@ -1,8 +1,8 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::chain::Chain;
+use super::chebyshev::{ChebyshevPropagator, propagate};
 use super::free_motion::{SplitMotion, split};
-use super::glide::{Glide, advance};
 use super::taylor::{Series, State, StepInput, evaluate, expand, reachable};
 use super::vector::Plain;
 #[cfg(target_arch = "x86_64")]
@@ -16,7 +16,7 @@ pub(super) struct Kernels {
     evaluate: unsafe fn(&Series, f64, f64, &mut State),
     reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
     split: unsafe fn(&Chain, &Harmonic, &mut SplitMotion) -> Option<f64>,
-    glide: unsafe fn(&Chain, f64, f64, &mut Glide),
+    propagate: unsafe fn(&Chain, f64, f64, &mut ChebyshevPropagator),
     /// Name of the processor features, for tests and reports.
     #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
     pub name: &'static str,
@@ -26,8 +26,8 @@ pub(super) struct Kernels {
 macro_rules! kernels {
     ($module:ident, $vector:ident, $rows:literal $(, $features:literal)?) => {
         mod $module {
-            use super::{Chain, Glide, Harmonic, Kernels, Series, SplitMotion, State, StepInput};
-            use super::{advance, evaluate, expand, reachable, split};
+            use super::{Chain, ChebyshevPropagator, Harmonic, Kernels, Series, SplitMotion, State, StepInput};
+            use super::{evaluate, expand, propagate, reachable, split};
             use super::$vector;
 
             $(#[target_feature(enable = $features)])?
@@ -51,8 +51,8 @@ macro_rules! kernels {
             }
 
             $(#[target_feature(enable = $features)])?
-            fn glide_here(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
-                advance::<$vector>(chain, seconds, error, glide);
+            fn propagate_here(chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator) {
+                propagate::<$vector>(chain, seconds, error, propagator);
             }
 
             pub(super) const KERNELS: Kernels = Kernels {
@@ -60,7 +60,7 @@ macro_rules! kernels {
                 evaluate: evaluate_here,
                 reachable: reachable_here,
                 split: split_here,
-                glide: glide_here,
+                propagate: propagate_here,
                 name: stringify!($module),
             };
         }
@@ -129,10 +129,10 @@ impl Kernels {
         unsafe { (self.split)(chain, drive, motion) }
     }
 
-    /// Carries the free motion over so many seconds; see [`advance`].
+    /// Carries the free motion over so many seconds; see [`propagate`].
     #[inline]
-    pub fn glide(self, chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
+    pub fn propagate(self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator) {
         // SAFETY: as above.
-        unsafe { (self.glide)(chain, seconds, error, glide) }
+        unsafe { (self.propagate)(chain, seconds, error, propagator) }
     }
 }

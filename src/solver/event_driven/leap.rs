@@ -4,12 +4,12 @@
 //! is bounded for each block ([`super::free_motion`]). A leap may therefore start while the free motion is still large, if
 //! the bound shows that meanwhile no block reaches a break position, and that the shear force has been or will be larger than
 //! it can be meanwhile. If the free motion has fallen under the tolerance when the next event comes, it is dropped; if not,
-//! and no mode is overdamped, it is carried over in one go ([`super::glide`]). Contract: a leap leaves out at most
+//! and no mode is overdamped, it is carried over in one go ([`super::chebyshev`]). Contract: a leap leaves out at most
 //! `tolerance` · f_s/k of any block's displacement at its end, no event on its way, and no largest shear force.
 
 use super::chain::Chain;
+use super::chebyshev::ChebyshevPropagator;
 use super::free_motion::SplitMotion;
-use super::glide::Glide;
 use super::kernels::Kernels;
 use super::layout::Layout;
 use super::taylor::State;
@@ -18,21 +18,21 @@ use crate::solver::ledger::Audit;
 use crate::solver::segment::Segment;
 use std::f64::consts::TAU;
 
-/// How far ahead of a modulated glide a larger shear force is looked for, in units of 1/γ.
+/// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
 
-/// Part of the displacement that may be left out that the terms of a glide may leave out each.
-const GLIDE_SHARE: f64 = 1e-3;
+/// Part of the error of a leap that each term which the propagator leaves out may have.
+const PROPAGATED_SHARE: f64 = 1e-3;
 
-/// Longest glide in units of the shortest time scale of the slider: some 20 MB.
-const MAX_GLIDE_ANGLE: f64 = 1e6;
+/// Longest time to carry the free motion over, in units of the shortest time scale of the slider: some 20 MB.
+const MAX_CARRIED_ANGLE: f64 = 1e6;
 
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
     /// The slider moved on by so many seconds; a block reached a break position if one is named. Whether the free motion was
     /// carried over.
-    Leapt { elapsed: f64, reached: Option<usize>, glided: bool },
+    Leapt { elapsed: f64, reached: Option<usize>, is_carried: bool },
     /// Not yet: try again after so many seconds.
     Wait { seconds: f64 },
 }
@@ -55,12 +55,12 @@ pub(super) struct Bounds {
 pub(super) struct Leap {
     /// The motion at the start of a leap; displacements and velocities are in the end those after it.
     motion: SplitMotion,
-    glide: Glide,
+    propagator: ChebyshevPropagator,
 }
 
 impl Leap {
     pub fn new(layout: Layout) -> Self {
-        Self { motion: SplitMotion::new(layout), glide: Glide::new(layout) }
+        Self { motion: SplitMotion::new(layout), propagator: ChebyshevPropagator::new(layout) }
     }
 
     /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above `error` m,
@@ -92,7 +92,7 @@ impl Leap {
         if is_short && decay_rate < 0.5 * chain.damping_rate {
             return Attempt::Wait { seconds: horizon };
         }
-        let horizon = if is_short { horizon.min(max_glide(chain)) } else { horizon };
+        let horizon = if is_short { horizon.min(max_carried_time(chain)) } else { horizon };
         let moving = decay.min(horizon);
         let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
         if decay > 0.0 && !self.stays_clear(chain, drive, moving, left) {
@@ -118,11 +118,11 @@ impl Leap {
         }
         driven.evaluate(drive, elapsed, displacement, velocity);
         if is_short {
-            self.carry_free_motion(chain, kernels, elapsed, left, GLIDE_SHARE * error / largest);
+            self.carry_free_motion(chain, kernels, elapsed, left, PROPAGATED_SHARE * error / largest);
         }
         layout.fold(&self.motion.displacement, &mut state.displacement);
         layout.fold(&self.motion.velocity, &mut state.velocity);
-        Attempt::Leapt { elapsed, reached, glided: is_short }
+        Attempt::Leapt { elapsed, reached, is_carried: is_short }
     }
 
     /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
@@ -163,9 +163,9 @@ impl Leap {
     /// is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
     fn carry_free_motion(&mut self, chain: &Chain, kernels: Kernels, elapsed: f64, left: f64, error: f64) {
         let SplitMotion { displacement, velocity, free, .. } = &mut self.motion;
-        self.glide.start(chain.layout, &free.displacement, &free.shifted_velocity);
-        kernels.glide(chain, elapsed, error, &mut self.glide);
-        self.glide.end(chain.layout, &mut free.displacement, &mut free.shifted_velocity);
+        self.propagator.start(chain.layout, &free.displacement, &free.shifted_velocity);
+        kernels.propagate(chain, elapsed, error, &mut self.propagator);
+        self.propagator.end(chain.layout, &mut free.displacement, &mut free.shifted_velocity);
         let half = 0.5 * chain.damping_rate;
         for j in 0..chain.layout.blocks {
             displacement[j] += left * free.displacement[j];
@@ -218,10 +218,10 @@ impl Leap {
     }
 }
 
-/// How long a glide may last, in s, so that its work and memory are bounded. The motion goes on in the next one.
-fn max_glide(chain: &Chain) -> f64 {
+/// How long the free motion may be carried over in one leap, in s, so that work and memory are bounded.
+fn max_carried_time(chain: &Chain) -> f64 {
     let widest = chain.per_block.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
-    MAX_GLIDE_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
+    MAX_CARRIED_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
 }
 
 #[cfg(test)]
@@ -230,7 +230,7 @@ mod tests {
     use crate::model::Parameters;
 
     #[test]
-    fn a_glide_follows_an_undamped_oscillation_for_a_bounded_time() {
+    fn a_leap_carries_an_undamped_oscillation_over_for_a_bounded_time() {
         let parameters = Parameters { blocks: 1, damping_rate: 0.0, ..Parameters::default() };
         let layout = Layout::new(1);
         // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
@@ -244,9 +244,9 @@ mod tests {
         let horizon = 1e9;
         let bounds = Bounds { horizon, until_turn: f64::INFINITY, error: 1e-12, passed: f64::INFINITY };
         let attempt = Leap::new(layout).attempt(&chain, kernels, &drive, bounds, &mut state, |_| {}, None);
-        let Attempt::Leapt { elapsed, reached: None, glided: true } = attempt else { panic!("{attempt:?}") };
+        let Attempt::Leapt { elapsed, reached: None, is_carried: true } = attempt else { panic!("{attempt:?}") };
         let angle = squared.sqrt() * elapsed;
-        assert!(angle > 1e5 && angle <= MAX_GLIDE_ANGLE, "{angle}");
+        assert!(angle > 1e5 && angle <= MAX_CARRIED_ANGLE, "{angle}");
         // A ramp that the block follows, and what is left of its start.
         let ramp = drive.rate * elapsed - drive.rate / squared.sqrt() * libm::sin(angle);
         let expected = ramp + amplitude * libm::cos(angle);

@@ -9,11 +9,11 @@
 
 mod audit;
 mod chain;
+mod chebyshev;
 mod crossing;
 mod driven_solution;
 mod frame;
 mod free_motion;
-mod glide;
 mod kernels;
 mod layout;
 mod leap;
@@ -176,9 +176,9 @@ impl<'a> Integration<'a> {
                 self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
                 false
             }
-            Attempt::Leapt { elapsed, reached, glided } => {
-                if let (Some(before), Some(shown)) = (before.filter(|_| glided), shown) {
-                    self.audit_glide(before, &shown);
+            Attempt::Leapt { elapsed, reached, is_carried } => {
+                if let (Some(before), Some(shown)) = (before.filter(|_| is_carried), shown) {
+                    self.audit_carried_leap(before, &shown);
                 }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
