@@ -14,7 +14,7 @@ impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
     pub(super) fn follow_series(
         &mut self,
-        kernels: Kernels,
+        kernels: &dyn Kernels,
         chain: &Chain,
         series: &Series,
         [first, last]: [f64; 2],
@@ -108,7 +108,7 @@ impl Integration<'_> {
             let length = self.step.length;
             let s = (left / length).min(1.0);
             if let Some(audit) = &mut self.audit {
-                audit.follow_series(self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
+                audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
                 let resolved = self.step.segment_to(s, self.frame.now());
                 audit.unseen_work += work(&self.frame.drive, &audit.quadrature, &resolved);
             }

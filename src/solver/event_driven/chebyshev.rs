@@ -18,7 +18,7 @@
 
 use super::chain::Chain;
 use super::layout::Layout;
-use super::vector::Vector;
+use super::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
@@ -102,7 +102,13 @@ impl ChebyshevPropagator {
 
 /// Carries u and u' over so many seconds; `error` is the part of them that may be left out.
 #[inline(always)]
-pub(super) fn propagate<V: Vector>(chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator) {
+pub(super) fn propagate<S: Simd>(
+    simd: S,
+    chain: &Chain,
+    seconds: f64,
+    error: f64,
+    propagator: &mut ChebyshevPropagator,
+) {
     let rows = propagator.diagonal.len();
     let shift = 0.25 * chain.damping_rate * chain.damping_rate;
     let mut widest = 0.0_f64;
@@ -125,46 +131,46 @@ pub(super) fn propagate<V: Vector>(chain: &Chain, seconds: f64, error: f64, prop
             rows.fill(Row::filled(0.0));
         }
     }
-    add_terms::<V>(&propagator.here, &mut propagator.sums, propagator.weights[0]);
+    add_terms(simd, &propagator.here, &mut propagator.sums, propagator.weights[0]);
     for k in 1..propagator.weights.len() {
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let twice = V::splat(if k == 1 { 1.0 } else { 2.0 });
+        let twice = simd.splat(if k == 1 { 1.0 } else { 2.0 });
         for (here, before) in propagator.here.iter().zip(&mut propagator.before) {
-            recur::<V>([&propagator.diagonal, &propagator.coupling], here, before, twice);
+            recur(simd, [&propagator.diagonal, &propagator.coupling], here, before, twice);
         }
-        add_terms::<V>(&propagator.before, &mut propagator.sums, propagator.weights[k]);
+        add_terms(simd, &propagator.before, &mut propagator.sums, propagator.weights[k]);
         std::mem::swap(&mut propagator.before, &mut propagator.here);
     }
 }
 
 /// `twice` x times one term, minus the term before it, which `next` holds.
 #[inline(always)]
-fn recur<V: Vector>([diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: V) {
+fn recur<S: Simd>(simd: S, [diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: S::Vector) {
     let last = terms.len() - 1;
-    let mut before = V::load(&terms[last]).to_next_lane();
-    let mut here = V::load(&terms[0]);
+    let mut before = simd.load(&terms[last]).to_next_lane();
+    let mut here = simd.load(&terms[0]);
     let last_after = here.to_lane_before();
     for (((next, diagonal), coupling), after) in
         next[..last].iter_mut().zip(&diagonal[..last]).zip(&coupling[..last]).zip(&terms[1..])
     {
-        let after = V::load(after);
-        let product = here.fused(V::load(diagonal), before.plus(after).times(V::load(coupling)));
-        product.fused(twice, V::splat(0.0).minus(V::load(next))).store(next);
+        let after = simd.load(after);
+        let product = here.fused(simd.load(diagonal), before.plus(after).times(simd.load(coupling)));
+        product.fused(twice, simd.splat(0.0).minus(simd.load(next))).store(next);
         (before, here) = (here, after);
     }
-    let product = here.fused(V::load(&diagonal[last]), before.plus(last_after).times(V::load(&coupling[last])));
-    product.fused(twice, V::splat(0.0).minus(V::load(&next[last]))).store(&mut next[last]);
+    let product = here.fused(simd.load(&diagonal[last]), before.plus(last_after).times(simd.load(&coupling[last])));
+    product.fused(twice, simd.splat(0.0).minus(simd.load(&next[last]))).store(&mut next[last]);
 }
 
 /// Adds T_k, applied to u(0) and to u'(0), to u(t) and u'(t).
 #[inline(always)]
-fn add_terms<V: Vector>([displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
-    let (cosine, sine, rooted) = (V::splat(cosine), V::splat(sine), V::splat(-rooted));
+fn add_terms<S: Simd>(simd: S, [displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
+    let (cosine, sine, rooted) = (simd.splat(cosine), simd.splat(sine), simd.splat(-rooted));
     let [displacement, velocity] = sums;
     for (((displaced, moved), x), v) in displaced.iter().zip(moved).zip(displacement).zip(velocity) {
-        let (displaced, moved) = (V::load(displaced), V::load(moved));
-        displaced.fused(cosine, moved.fused(sine, V::load(x))).store(x);
-        moved.fused(cosine, displaced.fused(rooted, V::load(v))).store(v);
+        let (displaced, moved) = (simd.load(displaced), simd.load(moved));
+        displaced.fused(cosine, moved.fused(sine, simd.load(x))).store(x);
+        moved.fused(cosine, displaced.fused(rooted, simd.load(v))).store(v);
     }
 }
 

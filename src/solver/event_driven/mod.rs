@@ -17,11 +17,11 @@ mod free_motion;
 mod kernels;
 mod layout;
 mod leap;
+mod simd;
 mod slider;
 mod step;
 mod taylor;
 mod tolerances;
-mod vector;
 
 use self::frame::{FRAME_SPAN, Frame};
 use self::kernels::Kernels;
@@ -50,15 +50,14 @@ pub(super) fn run(
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let rows = Layout::new(parameters.blocks).rows;
-    let kernels = Kernels::available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
-    let integration = Integration::new(parameters, tolerance, limits, kernels);
+    let integration = Integration::new(parameters, tolerance, limits, kernels::fastest(rows));
     Integration { audit, ..integration }.integrate(observer)
 }
 
 /// One simulation in progress. Times and displacements are those of the frame but where said otherwise.
 struct Integration<'a> {
     limits: Limits<'a>,
-    kernels: Kernels,
+    kernels: Box<dyn Kernels>,
     tolerances: Tolerances,
     frame: Frame,
     slider: Slider,
@@ -74,7 +73,7 @@ struct Integration<'a> {
 }
 
 impl<'a> Integration<'a> {
-    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Kernels) -> Self {
+    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Box<dyn Kernels>) -> Self {
         let tolerances = Tolerances::new(parameters, tolerance);
         let slider = Slider::new(parameters);
         let layout = slider.chain.layout;
@@ -170,7 +169,7 @@ impl<'a> Integration<'a> {
         let Slider { chain, state, .. } = &mut self.slider;
         let before = self.audit.is_some().then(|| state.clone());
         let audit = self.audit.as_deref_mut();
-        let attempt = self.leap.attempt(chain, self.kernels, &drive, bounds, state, emit, audit);
+        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, bounds, state, emit, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
@@ -256,13 +255,13 @@ mod tests {
             ..Parameters::default()
         };
         for parameters in [plain, modulated] {
-            let logs: Vec<(&str, Vec<ContactEvent>)> = Kernels::available(Layout::new(parameters.blocks).rows)
+            let logs: Vec<(&str, Vec<ContactEvent>)> = kernels::available(Layout::new(parameters.blocks).rows)
                 .into_iter()
-                .map(|kernels| {
+                .map(|(name, kernels)| {
                     let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
                     let mut log = ContactLog::default();
                     Integration::new(&parameters, 1e-6, limits, kernels).integrate(&mut log).unwrap();
-                    (kernels.name, log.events)
+                    (name, log.events)
                 })
                 .collect();
             assert!(logs[0].1.len() > 2 * parameters.blocks * parameters.contacts_per_block, "no slip to compare");
@@ -317,7 +316,7 @@ mod tests {
         for parameters in [plain, modulated] {
             let slips = |next_leap: f64| {
                 let limits = Limits { end_time: 0.5, events: u64::MAX, interrupt: None };
-                let kernels = Kernels::available(Layout::new(parameters.blocks).rows).pop().unwrap();
+                let kernels = kernels::fastest(Layout::new(parameters.blocks).rows);
                 let recording = Recording { discard: 0, ..Recording::default() };
                 let mut observer = SlipObserver::new(&parameters, &recording);
                 let integration = Integration::new(&parameters, 1e-10, limits, kernels);

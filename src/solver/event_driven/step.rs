@@ -226,7 +226,7 @@ impl Integration<'_> {
             path: self.step.force_path(first, [force, end_force]),
         });
         if let Some(audit) = &mut self.audit {
-            audit.follow_series(self.kernels, &self.slider.chain, &self.step.series, [first, last], length);
+            audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [first, last], length);
         }
         end_force
     }

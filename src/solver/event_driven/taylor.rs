@@ -7,7 +7,7 @@
 
 use super::chain::Chain;
 use super::layout::Layout;
-use super::vector::Vector;
+use super::simd::{Simd, Vector};
 use crate::model::Row;
 use crate::solver::polynomial::{INVERSE, MOST_COEFFICIENTS};
 
@@ -146,7 +146,8 @@ pub(super) struct State {
 /// Expands the state into a series; false if it does not converge within [`MOST_ORDER`]. Compiled for `R` rows, or for any
 /// number if that is 0; so are the loops below.
 #[inline(always)]
-pub(super) fn expand<V: Vector, const R: usize>(
+pub(super) fn expand<S: Simd, const R: usize>(
+    simd: S,
     chain: &Chain,
     state: &State,
     input: &StepInput,
@@ -155,33 +156,34 @@ pub(super) fn expand<V: Vector, const R: usize>(
     let rows = series.rows_in::<R>();
     let Series { terms, coupling, diagonal, .. } = series;
     let (coupling, diagonal) = (&mut coupling[..rows], &mut diagonal[..rows]);
-    let square = V::splat(input.length * input.length);
-    let minus_square = V::splat(-(input.length * input.length));
+    let square = simd.splat(input.length * input.length);
+    let minus_square = simd.splat(-(input.length * input.length));
     for (scaled, coupling) in coupling.iter_mut().zip(&chain.coupling[..rows]) {
-        V::load(coupling).times(square).store(scaled);
+        simd.load(coupling).times(square).store(scaled);
     }
     for (scaled, diagonal) in diagonal.iter_mut().zip(&chain.diagonal[..rows]) {
-        V::load(diagonal).times(minus_square).store(scaled);
+        simd.load(diagonal).times(minus_square).store(scaled);
     }
     let (first, second) = terms[..2 * rows].split_at_mut(rows);
     for (start, displacement) in first.iter_mut().zip(&state.displacement[..rows]) {
-        V::load(displacement).store(start);
+        simd.load(displacement).store(start);
     }
-    let length = V::splat(input.length);
+    let length = simd.splat(input.length);
     for (rate, velocity) in second.iter_mut().zip(&state.velocity[..rows]) {
-        V::load(velocity).times(length).store(rate);
+        simd.load(velocity).times(length).store(rate);
     }
     let recurrence = Recurrence {
+        simd,
         coupling,
         diagonal,
         pull: &chain.pull[..rows],
         square,
-        damping: V::splat(-chain.damping_rate * input.length),
+        damping: simd.splat(-chain.damping_rate * input.length),
         pulling: input.length * input.length * input.pulling,
         drive: input.drive,
     };
-    let order = if R > 0 && V::HAS_MANY_REGISTERS {
-        converge_in_registers::<V, R>(recurrence, input, terms)
+    let order = if R > 0 && S::HAS_MANY_REGISTERS {
+        converge_in_registers::<S, R>(recurrence, input, terms)
     } else {
         converge_in_memory(recurrence, input, terms, rows)
     };
@@ -190,56 +192,63 @@ pub(super) fn expand<V: Vector, const R: usize>(
 }
 
 /// What makes the next order of the last two.
-struct Recurrence<'a, V> {
+struct Recurrence<'a, S: Simd> {
+    simd: S,
     /// h² times the coupling and minus the diagonal.
     coupling: &'a [Row],
     diagonal: &'a [Row],
     /// The contact force at displacement zero, by mass, and h².
     pull: &'a [Row],
-    square: V,
-    damping: V,
+    square: S::Vector,
+    damping: S::Vector,
     /// h² `K_d/m`, and what the drive's displacement has left.
     pulling: f64,
     drive: DriveDerivatives,
 }
 
-impl<V: Vector> Recurrence<'_, V> {
+impl<S: Simd> Recurrence<'_, S> {
     /// Adds pull and drive to Y_{p+2}; order after order.
     #[inline(always)]
     fn add_forces(&mut self, p: usize, next: &mut [Row]) {
         if p == 0 {
             for (row, pull) in next.iter_mut().zip(self.pull) {
-                V::load(pull).fused(self.square, V::load(row)).store(row);
+                self.simd.load(pull).fused(self.square, self.simd.load(row)).store(row);
             }
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            V::load(&FIRST_LANE).fused(V::splat(push), V::load(&next[0])).store(&mut next[0]);
+            self.simd.load(&FIRST_LANE).fused(self.simd.splat(push), self.simd.load(&next[0])).store(&mut next[0]);
         }
     }
 
     /// Y_{p+2} of Y_p and Y_{p+1}, also written to `rows`. [`sweep`] and [`Self::add_forces`] in arrays: one form for rows in
     /// memory and in registers is slower than either.
     #[inline(always)]
-    fn next_order<const R: usize>(&mut self, p: usize, y: [V; R], rate: [V; R], rows: &mut [Row]) -> [V; R] {
+    fn next_order<const R: usize>(
+        &mut self,
+        p: usize,
+        y: [S::Vector; R],
+        rate: [S::Vector; R],
+        rows: &mut [Row],
+    ) -> [S::Vector; R] {
         let (coupling, diagonal) = (&self.coupling[..R], &self.diagonal[..R]);
         let mut next = y;
         for r in 0..R {
             let before = if r > 0 { y[r - 1] } else { y[R - 1].to_next_lane() };
             let after = if r + 1 < R { y[r + 1] } else { y[0].to_lane_before() };
-            let coupled = before.plus(after).times(V::load(&coupling[r]));
-            let forced = y[r].fused(V::load(&diagonal[r]), coupled);
+            let coupled = before.plus(after).times(self.simd.load(&coupling[r]));
+            let forced = y[r].fused(self.simd.load(&diagonal[r]), coupled);
             next[r] = rate[r].fused(self.damping, forced);
         }
         if p == 0 {
             let pull = &self.pull[..R];
             for r in 0..R {
-                next[r] = V::load(&pull[r]).fused(self.square, next[r]);
+                next[r] = self.simd.load(&pull[r]).fused(self.square, next[r]);
             }
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            next[0] = V::load(&FIRST_LANE).fused(V::splat(push), next[0]);
+            next[0] = self.simd.load(&FIRST_LANE).fused(self.simd.splat(push), next[0]);
         }
         let rows = &mut rows[..R];
         for r in 0..R {
@@ -251,19 +260,22 @@ impl<V: Vector> Recurrence<'_, V> {
 
 /// Adds orders to Y_0 and Y_1 until the series converges; the last one, if it does.
 #[inline(always)]
-fn converge_in_memory<V: Vector>(
-    mut recurrence: Recurrence<'_, V>,
+fn converge_in_memory<S: Simd>(
+    mut recurrence: Recurrence<'_, S>,
     input: &StepInput,
     terms: &mut [Row],
     rows: usize,
 ) -> Option<usize> {
     for p in 0..MOST_ORDER - 1 {
         let terms = &mut terms[p * rows..(p + 3) * rows];
-        sweep::<V>(recurrence.coupling, recurrence.diagonal, recurrence.damping, terms, rows);
+        sweep(recurrence.simd, recurrence.coupling, recurrence.diagonal, recurrence.damping, terms, rows);
         recurrence.add_forces(p, &mut terms[2 * rows..]);
         // Two orders at a time: every second one may vanish by symmetry.
         let order = p + 2;
-        if p % 2 == 1 && order >= input.min_order && are_small::<V>(&terms[rows..], rows, order, input.error) {
+        if p % 2 == 1
+            && order >= input.min_order
+            && are_small(recurrence.simd, &terms[rows..], rows, order, input.error)
+        {
             return Some(order);
         }
     }
@@ -272,14 +284,15 @@ fn converge_in_memory<V: Vector>(
 
 /// The same with the last two orders in registers, where no sum waits for the memory.
 #[inline(always)]
-fn converge_in_registers<V: Vector, const R: usize>(
-    mut recurrence: Recurrence<'_, V>,
+fn converge_in_registers<S: Simd, const R: usize>(
+    mut recurrence: Recurrence<'_, S>,
     input: &StepInput,
     terms: &mut [Row],
 ) -> Option<usize> {
-    let (mut even, mut odd) = ([V::splat(0.0); R], [V::splat(0.0); R]);
+    let simd = recurrence.simd;
+    let (mut even, mut odd) = ([simd.splat(0.0); R], [simd.splat(0.0); R]);
     for r in 0..R {
-        (even[r], odd[r]) = (V::load(&terms[r]), V::load(&terms[R + r]));
+        (even[r], odd[r]) = (simd.load(&terms[r]), simd.load(&terms[R + r]));
     }
     for (pair, rows) in terms[2 * R..].chunks_exact_mut(2 * R).enumerate() {
         let p = 2 * pair;
@@ -287,7 +300,7 @@ fn converge_in_registers<V: Vector, const R: usize>(
         even = recurrence.next_order(p, even, odd, lower);
         odd = recurrence.next_order(p + 1, odd, even, higher);
         let order = p + 3;
-        if order >= input.min_order && are_small::<V>(rows, R, order, input.error) {
+        if order >= input.min_order && are_small(simd, rows, R, order, input.error) {
             return Some(order);
         }
     }
@@ -296,26 +309,26 @@ fn converge_in_registers<V: Vector, const R: usize>(
 
 /// Y_{p+2} without pull and drive: `terms` holds Y_p, Y_{p+1} and room for it.
 #[inline(always)]
-fn sweep<V: Vector>(coupling: &[Row], diagonal: &[Row], damping: V, terms: &mut [Row], rows: usize) {
+fn sweep<S: Simd>(simd: S, coupling: &[Row], diagonal: &[Row], damping: S::Vector, terms: &mut [Row], rows: usize) {
     let (y, rest) = terms.split_at_mut(rows);
     let (rate, next) = rest.split_at_mut(rows);
     let next = &mut next[..rows];
-    let mut before = V::load(&y[rows - 1]).to_next_lane();
-    let mut here = V::load(&y[0]);
+    let mut before = simd.load(&y[rows - 1]).to_next_lane();
+    let mut here = simd.load(&y[0]);
     let last_after = here.to_lane_before();
     let last = rows - 1;
     for ((((next, rate), coupling), diagonal), after) in
         next[..last].iter_mut().zip(&rate[..last]).zip(&coupling[..last]).zip(&diagonal[..last]).zip(&y[1..])
     {
-        let after = V::load(after);
-        let coupled = before.plus(after).times(V::load(coupling));
-        let forced = here.fused(V::load(diagonal), coupled);
-        V::load(rate).fused(damping, forced).store(next);
+        let after = simd.load(after);
+        let coupled = before.plus(after).times(simd.load(coupling));
+        let forced = here.fused(simd.load(diagonal), coupled);
+        simd.load(rate).fused(damping, forced).store(next);
         (before, here) = (here, after);
     }
-    let coupled = before.plus(last_after).times(V::load(&coupling[last]));
-    let forced = here.fused(V::load(&diagonal[last]), coupled);
-    V::load(&rate[last]).fused(damping, forced).store(&mut next[last]);
+    let coupled = before.plus(last_after).times(simd.load(&coupling[last]));
+    let forced = here.fused(simd.load(&diagonal[last]), coupled);
+    simd.load(&rate[last]).fused(damping, forced).store(&mut next[last]);
 }
 
 /// Block 1, at which the drive pulls.
@@ -327,14 +340,14 @@ const FIRST_LANE: Row = {
 
 /// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the wanted error.
 #[inline(always)]
-fn are_small<V: Vector>(terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
-    let (mut in_lower, mut in_higher) = (V::splat(0.0), V::splat(0.0));
+fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
+    let (mut in_lower, mut in_higher) = (simd.splat(0.0), simd.splat(0.0));
     for (lower, higher) in terms[..rows].iter().zip(&terms[rows..]) {
-        in_lower = V::load(lower).magnitude().larger(in_lower);
-        in_higher = V::load(higher).magnitude().larger(in_higher);
+        in_lower = simd.load(lower).magnitude().larger(in_lower);
+        in_higher = simd.load(higher).magnitude().larger(in_higher);
     }
-    let [for_lower, for_higher] = [order - 1, order].map(|p| V::splat(order as f64 * INVERSE_FACTORIAL[p]));
-    in_lower.times(for_lower).larger(in_higher.times(for_higher)).within(V::splat(error))
+    let [for_lower, for_higher] = [order - 1, order].map(|p| simd.splat(order as f64 * INVERSE_FACTORIAL[p]));
+    in_lower.times(for_lower).larger(in_higher.times(for_higher)).within(simd.splat(error))
 }
 
 /// Rows that are taken through all orders together, since their sums need not wait for each other: many with many registers.
@@ -343,26 +356,27 @@ const FEW: usize = 3;
 
 /// State at s in [0, 1] of a step of so many seconds.
 #[inline(always)]
-pub(super) fn evaluate<V: Vector, const R: usize>(series: &Series, s: f64, length: f64, state: &mut State) {
+pub(super) fn evaluate<S: Simd, const R: usize>(simd: S, series: &Series, s: f64, length: f64, state: &mut State) {
     let rows = series.rows_in::<R>();
     let mut r = 0;
-    while V::HAS_MANY_REGISTERS && r + MANY <= rows {
-        evaluate_rows::<V, MANY>(series, rows, r, s, length, state);
+    while S::HAS_MANY_REGISTERS && r + MANY <= rows {
+        evaluate_rows::<S, MANY>(simd, series, rows, r, s, length, state);
         r += MANY;
     }
     while r + FEW <= rows {
-        evaluate_rows::<V, FEW>(series, rows, r, s, length, state);
+        evaluate_rows::<S, FEW>(simd, series, rows, r, s, length, state);
         r += FEW;
     }
     while r < rows {
-        evaluate_rows::<V, 1>(series, rows, r, s, length, state);
+        evaluate_rows::<S, 1>(simd, series, rows, r, s, length, state);
         r += 1;
     }
 }
 
 /// Horner's scheme, nested: Y_0 + s/1 (Y_1 + s/2 (Y_2 + ...)), and the same from Y_1 for the slope.
 #[inline(always)]
-fn evaluate_rows<V: Vector, const G: usize>(
+fn evaluate_rows<S: Simd, const G: usize>(
+    simd: S,
     series: &Series,
     rows: usize,
     first: usize,
@@ -371,19 +385,19 @@ fn evaluate_rows<V: Vector, const G: usize>(
     state: &mut State,
 ) {
     let order = series.order;
-    let inverse_length = V::splat(1.0 / length);
+    let inverse_length = simd.splat(1.0 / length);
     let mut at = order * rows + first;
-    let mut value = [V::splat(0.0); G];
+    let mut value = [simd.splat(0.0); G];
     for (value, term) in value.iter_mut().zip(&series.terms[at..at + G]) {
-        *value = V::load(term);
+        *value = simd.load(term);
     }
     let mut slope = value;
-    let mut for_value = V::splat(s * INVERSE[order]);
+    let mut for_value = simd.splat(s * INVERSE[order]);
     for inverse in INVERSE[1..order].iter().rev() {
         at -= rows;
-        let for_slope = V::splat(s * inverse);
+        let for_slope = simd.splat(s * inverse);
         for ((value, slope), term) in value.iter_mut().zip(&mut slope).zip(&series.terms[at..at + G]) {
-            let term = V::load(term);
+            let term = simd.load(term);
             *value = value.fused(for_value, term);
             *slope = slope.fused(for_slope, term);
         }
@@ -392,7 +406,7 @@ fn evaluate_rows<V: Vector, const G: usize>(
     for ((value, term), x) in
         value.iter().zip(&series.terms[first..first + G]).zip(&mut state.displacement[first..first + G])
     {
-        value.fused(for_value, V::load(term)).store(x);
+        value.fused(for_value, simd.load(term)).store(x);
     }
     for (slope, v) in slope.iter().zip(&mut state.velocity[first..first + G]) {
         slope.times(inverse_length).store(v);
@@ -401,7 +415,8 @@ fn evaluate_rows<V: Vector, const G: usize>(
 
 /// Row and lane of every block that may reach a break position within the step.
 #[inline(always)]
-pub(super) fn reachable<V: Vector, const R: usize>(
+pub(super) fn reachable<S: Simd, const R: usize>(
+    simd: S,
     chain: &Chain,
     series: &mut Series,
     blocks: &mut Vec<(usize, usize)>,
@@ -409,22 +424,23 @@ pub(super) fn reachable<V: Vector, const R: usize>(
     let rows = series.rows_in::<R>();
     blocks.clear();
     let mut r = 0;
-    while V::HAS_MANY_REGISTERS && r + MANY <= rows {
-        reachable_rows::<V, MANY>(chain, series, rows, r, blocks);
+    while S::HAS_MANY_REGISTERS && r + MANY <= rows {
+        reachable_rows::<S, MANY>(simd, chain, series, rows, r, blocks);
         r += MANY;
     }
     while r + FEW <= rows {
-        reachable_rows::<V, FEW>(chain, series, rows, r, blocks);
+        reachable_rows::<S, FEW>(simd, chain, series, rows, r, blocks);
         r += FEW;
     }
     while r < rows {
-        reachable_rows::<V, 1>(chain, series, rows, r, blocks);
+        reachable_rows::<S, 1>(simd, chain, series, rows, r, blocks);
         r += 1;
     }
 }
 
 #[inline(always)]
-fn reachable_rows<V: Vector, const G: usize>(
+fn reachable_rows<S: Simd, const G: usize>(
+    simd: S,
     chain: &Chain,
     series: &mut Series,
     rows: usize,
@@ -432,13 +448,13 @@ fn reachable_rows<V: Vector, const G: usize>(
     blocks: &mut Vec<(usize, usize)>,
 ) {
     let order = series.order;
-    let mut excursion = [V::splat(0.0); G];
+    let mut excursion = [simd.splat(0.0); G];
     let mut at = first;
     for inverse in &INVERSE_FACTORIAL[1..=order] {
         at += rows;
-        let weight = V::splat(*inverse);
+        let weight = simd.splat(*inverse);
         for (excursion, term) in excursion.iter_mut().zip(&series.terms[at..at + G]) {
-            *excursion = V::load(term).magnitude().fused(weight, *excursion);
+            *excursion = simd.load(term).magnitude().fused(weight, *excursion);
         }
     }
     let own = first..first + G;
@@ -447,9 +463,9 @@ fn reachable_rows<V: Vector, const G: usize>(
     let mut reached = [0; G];
     for g in 0..G {
         excursion[g].store(&mut strays[g]);
-        let x = V::load(&starts[g]);
-        let above = x.plus(excursion[g]).reaches(V::load(&upper[g]));
-        let below = V::load(&lower[g]).reaches(x.minus(excursion[g]));
+        let x = simd.load(&starts[g]);
+        let above = x.plus(excursion[g]).reaches(simd.load(&upper[g]));
+        let below = simd.load(&lower[g]).reaches(x.minus(excursion[g]));
         reached[g] = above | below;
     }
     for (g, mut reached) in reached.into_iter().enumerate() {
