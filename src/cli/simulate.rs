@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Parameters, Symbol, Value};
-use stickslip::observe::{AttachedMap, ContactLog, Profile, SlipObserver, Together, Trace};
+use stickslip::observe::{AttachedMap, ContactLog, Observers, Profile, SlipObserver, Trace};
 use stickslip::run::{limits, measured};
 use stickslip::solver::{self, Observer};
 use stickslip::store::dataset::Footer;
@@ -192,7 +192,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     }
     let never = AtomicBool::new(false);
     let begin = Instant::now();
-    let mut observer = Together { lead: &mut slips, others };
+    let mut observer = Observers { lead: &mut slips, others };
     let summary = solver::simulate(parameters, sweep.solver(), limits(sweep.recording(), &never), &mut observer)?;
     let wall = begin.elapsed().as_secs_f64();
     let result = measured(slips, summary);

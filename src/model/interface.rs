@@ -1,7 +1,7 @@
 //! The interface: the contacts between the blocks and the substrate, and what each block feels of them.
 //!
 //! A block's contacts act together: force on block j = (Σ k_i a_i) - (Σ k_i) x_j over its attached contacts, so a step
-//! costs O(N). Single contacts are looked at only when the block reaches its nearest break position or a reattachment
+//! costs O(N). Single contacts are examined only when the block reaches its nearest break position or a reattachment
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
 use super::disorder::Contact;
@@ -70,7 +70,7 @@ impl Due {
 /// Times eight bytes that are 0 or 1 each: their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
-/// The contacts of a row, side by side in memory as they are looked at: contact i of a block lies in row i div 8 of the
+/// The contacts of a row, side by side in memory as they are read: contact i of a block lies in row i div 8 of the
 /// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -178,10 +178,10 @@ impl Interface {
     }
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
-    /// tells each to `log`.
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is looked at in vectors")]
+    /// passes each to `log`.
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
-        // So many rows as have a bit for each contact.
+        // As many rows at a time as have a bit for each contact.
         for start in (0..self.rows_per_block).step_by(LANES) {
             let mut reached = 0_u64;
             for (row, ContactRow { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
@@ -291,7 +291,7 @@ impl Interface {
         self.reattachments.push(Reverse(Due::new(time + row.life[lane].delay, block, contact)));
     }
 
-    /// Takes the sums and nearest break positions of a block anew.
+    /// Computes the sums and nearest break positions of a block again.
     fn gather(&mut self, block: usize) {
         self.sum(block);
         let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
@@ -305,7 +305,7 @@ impl Interface {
         self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
     }
 
-    /// Takes the sums of a block anew, in fixed lanes.
+    /// Computes the sums of a block again, in fixed lanes.
     fn sum(&mut self, block: usize) {
         let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
         for row in self.rows_of(block) {
@@ -325,7 +325,7 @@ mod tests {
 
     #[test]
     fn a_block_breaks_what_is_reached_in_the_order_of_contacts() {
-        // More contacts than bits that are looked at together.
+        // More contacts than are tested together.
         let parameters =
             Parameters { blocks: 2, contacts_per_block: 150, threshold_deviation: 0.4, ..Parameters::default() };
         let whole = Interface::new(&parameters);

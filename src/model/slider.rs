@@ -1,7 +1,7 @@
 //! The slider as an elastic chain: its stiffness matrix S, frequencies and limits of stability.
 //!
-//! S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block, and the driving spring
-//! at block 1. All blocks have the same mass m, so the squared angular frequencies are the eigenvalues of S/m.
+//! S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block, and the driving
+//! spring at block 1. All blocks have the same mass m, so the squared angular frequencies are the eigenvalues of S/m.
 
 use super::Parameters;
 
@@ -53,8 +53,8 @@ impl StiffnessMatrix {
         below
     }
 
-    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite if an
-    /// entry has overflowed.
+    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite
+    /// if an entry has overflowed.
     #[must_use]
     pub fn eigenvalue(&self, index: usize) -> f64 {
         let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();

@@ -11,7 +11,7 @@ mod slip;
 pub use drops::Drops;
 pub use phase::{OVERSHOOT, phase};
 pub use rupture::{Rupture, advance_speed};
-pub use sample::{AttachedMap, ContactLog, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
+pub use sample::{AttachedMap, ContactLog, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
 pub use slip::{Modulation, Precursor, Slip, SlipObserver};
 
 /// What a job records: how many slips, from where, and which tables.

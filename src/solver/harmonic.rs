@@ -1,9 +1,10 @@
-//! A ramp with a cosine, a + b τ + A cos(ω τ + φ): the drive, the driven motion of a block, and the shear force that follows.
+//! A ramp with a cosine, a + b τ + A cos(ω τ + φ): the drive, the driven motion of a block, and the shear force that
+//! follows.
 
 use std::f64::consts::{PI, TAU};
 
-/// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ in s since some instant. In N for a
-/// force, in m for a displacement.
+/// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ in s since some instant. In N
+/// for a force, in m for a displacement.
 #[derive(Clone, Copy, Debug)]
 pub struct Harmonic {
     /// Ramp at τ = 0, in N or m.
@@ -37,8 +38,8 @@ impl Harmonic {
         self.turn(elapsed) + self.phase
     }
 
-    /// What the cosine turns by in so many seconds, in rad. Whole periods are taken off first, so that long times lose no
-    /// digits of the phase.
+    /// What the cosine turns by in so many seconds, in rad. Whole periods are taken off first, so that long times lose
+    /// no digits of the phase.
     pub(super) fn turn(&self, elapsed: f64) -> f64 {
         TAU * (elapsed * self.angular_frequency / TAU).fract()
     }

@@ -1,13 +1,13 @@
 //! The energy ledger: what the drive put in, against what is stored and what was lost.
 //!
-//! The work of the drive, ∫ F_S u' dt, equals the elastic and kinetic energy at the end (both are zero at the start) and
-//! the losses in damping, ∫ mγ Σ v² dt, and in breaking contacts, f²/2k each. Work and breaks are read off the segments and
-//! events that every observer sees, by Gauss-Legendre quadrature or in closed form; the rest comes from the solver. A
-//! break found late, a contact attached stressed or a series cut short all show as a residual.
+//! The work of the drive, ∫ F_S u' dt, equals the elastic and kinetic energy at the end (both are zero at the start)
+//! and the losses in damping, ∫ mγ Σ v² dt, and in breaking contacts, f²/2k each. Work and breaks are read off the
+//! segments and events that every observer sees, by Gauss-Legendre quadrature or in closed form; the rest comes from
+//! the solver. A break found late, a contact attached stressed or a series cut short all show as a residual.
 //!
-//! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered as
-//! such; [`Ledger::left_out`] tells how much that was. Where a leap carries the free motion on, it is resolved once more for
-//! its damping and for the work on it, which the segment of the leap does not show.
+//! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered
+//! as such; [`Ledger::left_out`] reports how much that was. Where a leap carries the free motion on, it is resolved
+//! once more for its damping and for the work on it, which the segment of the leap does not show.
 
 use super::harmonic::Harmonic;
 use super::quadrature::Quadrature;
@@ -96,7 +96,7 @@ impl Observer for Meter<'_> {
     }
 }
 
-/// Runs a solver with an audit and draws up the ledger.
+/// Runs a solver with an audit and returns the ledger.
 pub(super) fn audited(
     parameters: &Parameters,
     observer: &mut dyn Observer,
@@ -133,16 +133,16 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
         }
         ForcePath::Harmonic(harmonic) => {
             let Harmonic { start, rate, amplitude, phase, angular_frequency } = harmonic;
-            // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + turned)) dτ, term by term.
-            let turned = drive.phase(segment.start);
+            // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + drive_phase)) dτ, term by term.
+            let drive_phase = drive.phase(segment.start);
             let angle = harmonic.turn(segment.duration);
-            let (sine, cosine) = libm::sincos(angle + turned);
-            let (sine_before, cosine_before) = libm::sincos(turned);
+            let (sine, cosine) = libm::sincos(angle + drive_phase);
+            let (sine_before, cosine_before) = libm::sincos(drive_phase);
             let ramp = (start + rate * segment.duration) * cosine
                 - start * cosine_before
                 - rate / angular_frequency * (sine - sine_before);
-            let beat = 0.25 * (libm::cos(2.0 * angle + phase + turned) - libm::cos(phase + turned));
-            let drift = 0.5 * angular_frequency * segment.duration * libm::sin(turned - phase);
+            let beat = 0.25 * (libm::cos(2.0 * angle + phase + drive_phase) - libm::cos(phase + drive_phase));
+            let drift = 0.5 * angular_frequency * segment.duration * libm::sin(drive_phase - phase);
             drive.velocity * segment.impulse() + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
     }

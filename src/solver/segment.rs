@@ -11,7 +11,7 @@ pub enum ForcePath<'a> {
         /// Coefficients c_p, in N.
         coefficients: &'a [f64],
         /// Bound on the second derivative by s over [0, 1], in N.
-        bend: f64,
+        curvature_bound: f64,
         /// Where the segment starts.
         first: f64,
         /// Time that s = 1 stands for, in s.
@@ -55,8 +55,12 @@ impl<'a> Segment<'a> {
     /// A segment along a polynomial from s = 0, with s = 1 after `duration` s.
     pub fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
         let ends = [0.0, 1.0].map(|s| ForceAt::new(coefficients, s));
-        let bend = polynomial::second_derivative_bound(coefficients);
-        Self { start, duration, path: ForcePath::Polynomial { coefficients, bend, first: 0.0, scale: duration, ends } }
+        let curvature_bound = polynomial::second_derivative_bound(coefficients);
+        Self {
+            start,
+            duration,
+            path: ForcePath::Polynomial { coefficients, curvature_bound, first: 0.0, scale: duration, ends },
+        }
     }
 }
 
@@ -89,7 +93,7 @@ impl Segment<'_> {
         self.extreme_beyond(floor, 1.0)
     }
 
-    /// Time in s and value in N of the least F_S, if it lies below `ceiling`.
+    /// Time in s and value in N of the smallest F_S, if it lies below `ceiling`.
     pub fn minimum_below(&self, ceiling: f64) -> Option<(f64, f64)> {
         let (time, mirrored) = self.extreme_beyond(-ceiling, -1.0)?;
         Some((time, -mirrored))
@@ -98,11 +102,11 @@ impl Segment<'_> {
     /// Values in N that F_S stays between; not the closest ones.
     pub fn bounds(&self) -> (f64, f64) {
         match self.path {
-            ForcePath::Polynomial { bend, scale, ends, .. } => {
+            ForcePath::Polynomial { curvature_bound, scale, ends, .. } => {
                 let width = self.duration / scale;
-                let strays = 0.125 * bend * width * width;
+                let spread = 0.125 * curvature_bound * width * width;
                 let [start, end] = ends.map(|end| end.force);
-                (start.min(end) - strays, start.max(end) + strays)
+                (start.min(end) - spread, start.max(end) + spread)
             }
             ForcePath::Harmonic(Harmonic { start, rate, amplitude, .. }) => {
                 let end = start + rate * self.duration;
@@ -111,14 +115,14 @@ impl Segment<'_> {
         }
     }
 
-    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the first
-    /// and the last maximum and minimum; those in between lie on lines between them.
+    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the
+    /// first and the last maximum and minimum; those in between lie on lines between them.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         match self.path {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
                 let last = first + self.duration / scale;
-                let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_varies) {
+                let (_, slope_spread) = polynomial::beyond_linear(coefficients);
+                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_spread) {
                     return;
                 }
                 polynomial::for_each_turn(coefficients, first, last, &mut |s| {
@@ -147,23 +151,23 @@ impl Segment<'_> {
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial { coefficients, bend, first, scale, ends } => {
+            ForcePath::Polynomial { coefficients, curvature_bound, first, scale, ends } => {
                 let [at_first, at_last] = ends.map(|at| sign * at.force);
                 let width = self.duration / scale;
                 let last = first + width;
                 let (s, extreme) = if at_last > at_first { (last, at_last) } else { (first, at_first) };
                 // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
-                if extreme + 0.125 * bend * width * width <= floor {
+                if extreme + 0.125 * curvature_bound * width * width <= floor {
                     return None;
                 }
-                let is_monotone = (at_last - at_first).abs() >= bend * width * width || {
-                    let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_varies
+                let is_monotone = (at_last - at_first).abs() >= curvature_bound * width * width || {
+                    let (_, slope_spread) = polynomial::beyond_linear(coefficients);
+                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_spread
                 };
                 let (s, extreme) = if is_monotone {
                     (s, extreme)
                 } else {
-                    let mut signed = [0.0; polynomial::MOST_COEFFICIENTS];
+                    let mut signed = [0.0; polynomial::MAX_COEFFICIENTS];
                     for (s, c) in signed.iter_mut().zip(coefficients) {
                         *s = sign * c;
                     }

@@ -1,11 +1,12 @@
-//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
+//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at
+//! the end.
 
 use super::Integration;
-use super::chain::Chain;
+use super::chain::{Chain, State};
 use super::driven_solution::DrivenSolution;
 use super::kernels::Kernels;
+use super::series::Series;
 use super::slider::Slider;
-use super::taylor::{Series, State};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::{Audit, work};
 use crate::solver::segment::Segment;
@@ -32,8 +33,8 @@ impl Audit {
         self.damping += chain.mass * chain.damping_rate * (last - first) * length * mean_square;
     }
 
-    /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and the
-    /// energy of the free motion that is dropped at its start.
+    /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and
+    /// the energy of the free motion that is dropped at its start.
     pub(super) fn follow_leap(
         &mut self,
         chain: &Chain,
@@ -94,8 +95,8 @@ impl Audit {
 }
 
 impl Integration<'_> {
-    /// Resolves a leap that carried the free motion over once more in Taylor steps, for the energies. `shown` is its force
-    /// without the free motion.
+    /// Resolves a leap that carried the free motion over once more in Taylor steps, for the energies. `shown` is its
+    /// force without the free motion.
     pub(super) fn audit_carried_leap(&mut self, before: State, shown: &Segment<'_>) {
         let elapsed = shown.duration;
         let after = std::mem::replace(&mut self.slider.state, before);

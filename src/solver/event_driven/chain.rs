@@ -1,10 +1,10 @@
-//! The chain of blocks as the solver sees it: its coefficients in lanes, kept up with what the contacts become.
+//! The chain of blocks as the solver sees it: its coefficients in lanes, updated as contacts break and attach.
 
 use super::layout::Layout;
 use crate::model::slider::StiffnessMatrix;
 use crate::model::{Interface, Parameters, Row};
 
-/// What the contacts make of each block, one entry a block.
+/// The coefficients that depend on contacts, one entry a block.
 #[derive(Clone, Debug)]
 pub(super) struct PerBlock {
     /// Diagonal of S/m, in 1/s².
@@ -14,6 +14,15 @@ pub(super) struct PerBlock {
     /// Nearest break positions, in m.
     pub upper: Vec<f64>,
     pub lower: Vec<f64>,
+}
+
+/// Displacements and velocities in lanes.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// In m.
+    pub displacement: Vec<Row>,
+    /// In m/s.
+    pub velocity: Vec<Row>,
 }
 
 /// The chain's coefficients in lanes, all divided by the block mass.
@@ -73,7 +82,7 @@ impl Chain {
         chain
     }
 
-    /// Takes over what the contacts of a block have become.
+    /// Updates the coefficients of a block whose contacts have changed.
     pub fn update(&mut self, block: usize, interface: &Interface) {
         let (row, lane) = self.layout.slot(block);
         let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;

@@ -1,7 +1,8 @@
-//! Chebyshev propagator: carries the free motion over many periods at once, by Chebyshev polynomials of the stiffness matrix.
+//! Chebyshev propagator: carries the free motion over many periods at once, by Chebyshev polynomials of the stiffness
+//! matrix.
 //!
-//! Source: H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984), in the form for equations of second order in time:
-//! D. Kosloff et al., Geophys. Prospect. 37, 383 (1989).
+//! Source: H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984), in the form for equations of second order in
+//! time: D. Kosloff et al., Geophys. Prospect. 37, 383 (1989).
 //!
 //! With u = e^{γt/2} y the free motion obeys u'' = -A u, A = S'/m, so that
 //!
@@ -11,10 +12,15 @@
 //! ```
 //!
 //! The spectrum of A lies in (0, Λ]. In x = 2A/Λ - 1 and θ = t√Λ, the Jacobi-Anger expansion gives
-//! cos(t√A) = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x) and √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x) with
-//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ); with A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel
-//! functions vanish fast beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor
-//! steps need, and nothing is evaluated on the way. Contract: each term left out is at most a given part of the motion.
+//!
+//! ```text
+//! cos(t√A)       = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x)
+//! √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x),    s_k = 2 Σ_{m>=k} J_{2m+1}(θ)
+//! ```
+//!
+//! With A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel functions vanish fast
+//! beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor steps need, and
+//! nothing is evaluated on the way. Contract: each term left out is at most a given part of the motion.
 
 use super::chain::Chain;
 use super::layout::Layout;
@@ -154,12 +160,12 @@ fn recur<S: Simd>(simd: S, [diagonal, coupling]: [&[Row]; 2], terms: &[Row], nex
         next[..last].iter_mut().zip(&diagonal[..last]).zip(&coupling[..last]).zip(&terms[1..])
     {
         let after = simd.load(after);
-        let product = here.fused(simd.load(diagonal), before.plus(after).times(simd.load(coupling)));
-        product.fused(twice, simd.splat(0.0).minus(simd.load(next))).store(next);
+        let product = here.mul_add(simd.load(diagonal), before.plus(after).times(simd.load(coupling)));
+        product.mul_add(twice, simd.splat(0.0).minus(simd.load(next))).store(next);
         (before, here) = (here, after);
     }
-    let product = here.fused(simd.load(&diagonal[last]), before.plus(last_after).times(simd.load(&coupling[last])));
-    product.fused(twice, simd.splat(0.0).minus(simd.load(&next[last]))).store(&mut next[last]);
+    let product = here.mul_add(simd.load(&diagonal[last]), before.plus(last_after).times(simd.load(&coupling[last])));
+    product.mul_add(twice, simd.splat(0.0).minus(simd.load(&next[last]))).store(&mut next[last]);
 }
 
 /// Adds T_k, applied to u(0) and to u'(0), to u(t) and u'(t).
@@ -169,8 +175,8 @@ fn add_terms<S: Simd>(simd: S, [displaced, moved]: &Pair, sums: &mut Pair, [cosi
     let [displacement, velocity] = sums;
     for (((displaced, moved), x), v) in displaced.iter().zip(moved).zip(displacement).zip(velocity) {
         let (displaced, moved) = (simd.load(displaced), simd.load(moved));
-        displaced.fused(cosine, moved.fused(sine, simd.load(x))).store(x);
-        moved.fused(cosine, displaced.fused(rooted, simd.load(v))).store(v);
+        displaced.mul_add(cosine, moved.mul_add(sine, simd.load(x))).store(x);
+        moved.mul_add(cosine, displaced.mul_add(rooted, simd.load(v))).store(v);
     }
 }
 

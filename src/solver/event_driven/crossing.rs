@@ -1,60 +1,61 @@
 //! First crossings: the first instant at which a polynomial, or a ramp with a cosine, reaches a level from below.
 //!
-//! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
-//! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
+//! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong
+//! order: an interval is dismissed only if a bound on the excursion excludes the level, or the function falls
+//! throughout.
 
 use crate::solver::harmonic::Harmonic;
 use crate::solver::polynomial::{beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
-const DEEPEST: u32 = 40;
+const MAX_HALVINGS: u32 = 40;
 
 /// First s in [`from`, `end`], within [0, 1], at which the polynomial leaves the open interval between two levels. The
 /// coefficients are changed.
 pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], from: f64, end: f64) -> Option<f64> {
     let (start, slope) = (coefficients[0], coefficients[1]);
-    let (strays, slope_varies) = beyond_linear(coefficients);
+    let (value_spread, slope_spread) = beyond_linear(coefficients);
     let mut first = None;
-    if start + slope.max(0.0) + strays >= upper {
+    if start + slope.max(0.0) + value_spread >= upper {
         coefficients[0] = start - upper;
-        first = first_reach(coefficients, slope_varies, from, end);
+        first = first_reach(coefficients, slope_spread, from, end);
     }
-    if start + slope.min(0.0) - strays <= lower {
+    if start + slope.min(0.0) - value_spread <= lower {
         coefficients[0] = start - lower;
         for coefficient in &mut *coefficients {
             *coefficient = -*coefficient;
         }
-        first = first_reach(coefficients, slope_varies, from, first.unwrap_or(end)).or(first);
+        first = first_reach(coefficients, slope_spread, from, first.unwrap_or(end)).or(first);
     }
     first
 }
 
-/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the slope by
-/// at most `slope_varies`.
-fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> Option<f64> {
-    let [here, slope, bend] =
+/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the
+/// slope by at most `slope_spread`.
+fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> Option<f64> {
+    let [here, slope, half_curvature] =
         if from > 0.0 { expanded(coefficients, from) } else { [coefficients[0], coefficients[1], coefficients[2]] };
     if here >= 0.0 {
         return Some(from);
     }
-    if coefficients[1].abs() > slope_varies {
+    if coefficients[1].abs() > slope_spread {
         // First where the parabola crosses.
-        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * bend).max(0.0).sqrt());
+        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * half_curvature).max(0.0).sqrt());
         return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
     }
-    first_in(coefficients, from, end, DEEPEST)
+    first_in(coefficients, from, end, MAX_HALVINGS)
 }
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
-    let (strays, slope_varies) = beyond_linear(about);
+    let (value_spread, slope_spread) = beyond_linear(about);
     let slope = about[1];
-    if about[0] + slope.abs() + strays < 0.0 {
+    if about[0] + slope.abs() + value_spread < 0.0 {
         return None;
     }
-    if slope.abs() > slope_varies {
+    if slope.abs() > slope_spread {
         // It may start at or above the level only if the interval before ended there.
         if value(about, -1.0) >= 0.0 {
             return Some(low);
@@ -113,8 +114,8 @@ impl Harmonic {
         if self.value(high) < level { high } else { newton(low, high) }
     }
 
-    /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too, so it
-    /// lies within the first period.
+    /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too,
+    /// so it lies within the first period.
     pub(super) fn first_fall_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) <= level {
             return from;

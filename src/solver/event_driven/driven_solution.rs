@@ -1,5 +1,5 @@
-//! The driven solution, x_p(t) = p0 + p1 t + Re(q e^{iωt}), which the motion decays to between events: one real and, with
-//! modulation, one complex tridiagonal solve.
+//! The driven solution, x_p(t) = p0 + p1 t + Re(q e^{iωt}), which the motion decays to between events: one real and,
+//! with modulation, one complex tridiagonal solve.
 
 use super::chain::Chain;
 use crate::solver::harmonic::Harmonic;

@@ -1,7 +1,7 @@
-//! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time nor
-//! displacement loses digits in long runs.
+//! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time
+//! nor displacement loses digits in long runs.
 
-use super::taylor::DriveDerivatives;
+use super::series::DriveDerivatives;
 use crate::model::{ContactEvent, Drive};
 use crate::solver::harmonic::Harmonic;
 

@@ -30,8 +30,8 @@ const MIN_PIVOT: f64 = 1e-12;
 pub(super) struct FreeMotion {
     /// The rate a at which it surely decays, in 1/s.
     pub decay_rate: f64,
-    /// Minors of S'/m from the leading and from the trailing edge: that which a block begins, and that which begins beyond
-    /// it. A pivot is the first over the second.
+    /// Minors of S'/m from the leading and from the trailing edge: that which a block begins, and that which begins
+    /// beyond it. A pivot is the first over the second.
     ahead: [Vec<f64>; 2],
     behind: [Vec<f64>; 2],
     /// y, in m.
@@ -69,8 +69,8 @@ impl SplitMotion {
     }
 }
 
-/// Splits displacements and velocities into driven solution and free motion, and bounds the latter. Returns the largest bound
-/// on a displacement, in m; `None` if the free motion does not decay.
+/// Splits displacements and velocities into driven solution and free motion, and bounds the latter. Returns the largest
+/// bound on a displacement, in m; `None` if the free motion does not decay.
 #[inline(always)]
 pub(super) fn split(chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64> {
     let SplitMotion { displacement, velocity, driven, free } = motion;
@@ -105,8 +105,8 @@ impl FreeMotion {
         self.decay_rate * (chain.damping_rate - self.decay_rate)
     }
 
-    /// Pivots of S/m and minors of S'/m from both ends; false if S' is not positive definite. A minor follows from the two
-    /// before it, u_j = d_j u_{j+1} - c² u_{j+2}, so that few blocks wait for a division.
+    /// Pivots of S/m and minors of S'/m from both ends; false if S' is not positive definite. A minor follows from the
+    /// two before it, u_j = d_j u_{j+1} - c² u_{j+2}, so that few blocks wait for a division.
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
     fn eliminate(&mut self, chain: &Chain, inverse_pivot: &mut [f64]) -> bool {

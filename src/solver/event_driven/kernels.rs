@@ -1,12 +1,13 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
-use super::chain::Chain;
+use super::chain::{Chain, State};
 use super::chebyshev::{ChebyshevPropagator, propagate};
 use super::free_motion::{SplitMotion, split};
+use super::series::{Series, evaluate, reachable};
 #[cfg(target_arch = "x86_64")]
 use super::simd::{Avx2, Avx512};
 use super::simd::{Baseline, Simd};
-use super::taylor::{Series, State, StepInput, evaluate, expand, reachable};
+use super::taylor::{StepInput, expand};
 use crate::solver::harmonic::Harmonic;
 
 /// The hot loops for one set of processor features.

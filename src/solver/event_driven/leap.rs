@@ -1,18 +1,18 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Between events the motion is a driven solution ([`super::driven_solution`]) and a free motion about it, which decays and
-//! is bounded for each block ([`super::free_motion`]). A leap may therefore start while the free motion is still large, if
-//! the bound shows that meanwhile no block reaches a break position, and that the shear force has been or will be larger than
-//! it can be meanwhile. If the free motion has fallen under the tolerance when the next event comes, it is dropped; if not,
-//! and no mode is overdamped, it is carried over in one go ([`super::chebyshev`]). Contract: a leap leaves out at most
-//! `tolerance` · f_s/k of any block's displacement at its end, no event on its way, and no largest shear force.
+//! Between events the motion is a driven solution ([`super::driven_solution`]) and a free motion about it, which decays
+//! and is bounded for each block ([`super::free_motion`]). A leap may therefore start while the free motion is still
+//! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
+//! will be larger than it can be meanwhile. If the free motion has fallen under the tolerance when the next event
+//! comes, it is dropped; if not, and no mode is overdamped, it is carried over in one go ([`super::chebyshev`]).
+//! Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the way,
+//! and no largest shear force.
 
-use super::chain::Chain;
+use super::chain::{Chain, State};
 use super::chebyshev::ChebyshevPropagator;
 use super::free_motion::SplitMotion;
 use super::kernels::Kernels;
 use super::layout::Layout;
-use super::taylor::State;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
 use crate::solver::segment::Segment;
@@ -30,8 +30,8 @@ const MAX_CARRIED_ANGLE: f64 = 1e6;
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
-    /// The slider moved on by so many seconds; a block reached a break position if one is named. Whether the free motion was
-    /// carried over.
+    /// The slider moved on by so many seconds; a block reached a break position if one is named. Whether the free
+    /// motion was carried over.
     Leapt { elapsed: f64, reached: Option<usize>, is_carried: bool },
     /// Not yet: try again after so many seconds.
     Wait { seconds: f64 },
@@ -63,9 +63,9 @@ impl Leap {
         Self { motion: SplitMotion::new(layout), propagator: ChebyshevPropagator::new(layout) }
     }
 
-    /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above `error` m,
-    /// and writes the state at its end. Shear forces up to `passed` N have been seen since the last break. `emit` receives
-    /// the shear force on the way, `audit` the energies, unless the free motion was carried over.
+    /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above
+    /// `error` m, and writes the state at its end. Shear forces up to `passed` N have been seen since the last break.
+    /// `emit` receives the shear force on the way, `audit` the energies, unless the free motion was carried over.
     #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it reports")]
     pub fn attempt(
         &mut self,
@@ -125,8 +125,9 @@ impl Leap {
         Attempt::Leapt { elapsed, reached, is_carried: is_short }
     }
 
-    /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force:
-    /// one as large is on record, or comes later in the segment, or comes after it, within `until_turn` s and before any break.
+    /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear
+    /// force: one as large is on record, or comes later in the segment, or comes after it, within `until_turn` s and
+    /// before any break.
     fn hides_no_peak(
         &self,
         chain: &Chain,
@@ -159,8 +160,8 @@ impl Leap {
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
     }
 
-    /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where `left`
-    /// is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
+    /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where
+    /// `left` is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
     fn carry_free_motion(&mut self, chain: &Chain, kernels: &dyn Kernels, elapsed: f64, left: f64, error: f64) {
         let SplitMotion { displacement, velocity, free, .. } = &mut self.motion;
         self.propagator.start(chain.layout, &free.displacement, &free.shifted_velocity);
@@ -173,8 +174,8 @@ impl Leap {
         }
     }
 
-    /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's
-    /// bound remains.
+    /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free
+    /// motion's bound remains.
     fn stays_clear(&self, chain: &Chain, drive: &Harmonic, seconds: f64, left: f64) -> bool {
         let (driven, free) = (&self.motion.driven, &self.motion.free);
         (0..chain.layout.blocks).all(|j| {

@@ -1,9 +1,9 @@
 //! Event-driven: from contact event to contact event, in closed form where nothing happens.
 //!
-//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and locates
-//! the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap follows the
-//! driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of displacement of the
-//! order of `tolerance` · f_s/k.
+//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and
+//! locates the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap
+//! follows the driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of
+//! displacement of the order of `tolerance` · f_s/k.
 //!
 //! Displacements and times are kept in a moving [`frame`], so that neither loses digits in long runs.
 
@@ -17,6 +17,7 @@ mod free_motion;
 mod kernels;
 mod layout;
 mod leap;
+mod series;
 mod simd;
 mod slider;
 mod step;
@@ -38,7 +39,7 @@ use std::sync::atomic::Ordering;
 
 /// A leap is tried only if no reattachment is due within so many longest steps.
 const WORTHWHILE_LEAP: f64 = 6.0;
-/// Steps between two looks at the interrupt flag.
+/// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
 /// Runs the method with this tolerance, relative to the contact reach; see [`super::simulate`].
@@ -93,8 +94,8 @@ impl<'a> Integration<'a> {
         }
     }
 
-    /// Apart from where the integration is owned, and what is rare apart from here: the loop is short, and has nothing to
-    /// drop if an observer panics.
+    /// The loop is not inlined where the integration is owned, nor is what is rare inlined here: so it is short, and
+    /// has nothing to drop if an observer panics.
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
         for event in self.slider.interface.initial_attachments() {
@@ -123,7 +124,7 @@ impl<'a> Integration<'a> {
                 let (time, events) = (self.frame.now(), self.limits.events);
                 return Err(SimulationError::EventBudget { time, events });
             }
-            // What is not finite anywhere comes to the driven edge, if the run lasts.
+            // A value that is not finite spreads to the driven edge, if the run lasts.
             if !self.slider.state.displacement[0][0].is_finite() {
                 return Err(SimulationError::NotFinite { time: self.frame.now() });
             }
@@ -153,8 +154,8 @@ impl<'a> Integration<'a> {
         Ok(self.summary)
     }
 
-    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false if it is
-    /// not yet allowed.
+    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false
+    /// if it is not yet allowed.
     #[inline(never)]
     fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
         let drive = self.frame.drive_motion();
@@ -203,7 +204,8 @@ impl<'a> Integration<'a> {
         self.frame.set_time(if is_due { due } else { reached });
     }
 
-    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force `force` N.
+    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force
+    /// `force` N.
     fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
         self.passed_force = force;
         let (frame, summary) = (&self.frame, &mut self.summary);

@@ -1,10 +1,12 @@
 //! A row in registers: the arithmetic of the hot loops, once in plain Rust and once for each set of processor features.
 //!
-//! A set of features is a token type, of which a value exists only where the processor has them: safe code cannot run a loop
-//! that the processor lacks. Tokens and intrinsics are those of `pulp`: the same bits as with our own `unsafe` blocks, within
-//! 0.3 % of the time. (`fearless_simd` would be shorter, but has AVX-512 from Ice Lake on only, a loss of 10 to 17 % before.)
-//! Contract: every operation is rounded in each lane as IEEE 754 says, fused ones once, so all give the
-//! same bits.
+//! A set of features is a token type, of which a value exists only where the processor has them: safe code cannot run a
+//! loop that the processor lacks. Contract: every operation is rounded in each lane as IEEE 754 says, fused ones once,
+//! so all give the same bits.
+//!
+//! Tokens and intrinsics are those of `pulp`, which cost 0.3 % of the time against intrinsics in `unsafe` blocks of our
+//! own. `fearless_simd` needs no trait here, but has AVX-512 from Ice Lake on only, and AVX2 takes 10 to 17 % more
+//! time.
 
 use crate::model::{LANES, Row};
 
@@ -27,8 +29,8 @@ pub(super) trait Vector: Copy {
     fn minus(self, other: Self) -> Self;
     fn times(self, other: Self) -> Self;
     /// `self * factor + addend`, rounded once.
-    fn fused(self, factor: Self, addend: Self) -> Self;
-    fn magnitude(self) -> Self;
+    fn mul_add(self, factor: Self, addend: Self) -> Self;
+    fn abs(self) -> Self;
     /// The larger of each lane; `other` where one is not a number.
     fn larger(self, other: Self) -> Self;
     /// One bit a lane: `self >= other`.
@@ -94,12 +96,12 @@ impl Vector for Row {
     }
 
     #[inline(always)]
-    fn fused(self, factor: Self, addend: Self) -> Self {
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
         lanes(|l| self[l].mul_add(factor[l], addend[l]))
     }
 
     #[inline(always)]
-    fn magnitude(self) -> Self {
+    fn abs(self) -> Self {
         lanes(|l| self[l].abs())
     }
 
@@ -199,13 +201,13 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn fused(self, factor: Self, addend: Self) -> Self {
+        fn mul_add(self, factor: Self, addend: Self) -> Self {
             let simd = self.0;
             Self(simd, simd.mul_add_f64x4(self.1, factor.1, addend.1), simd.mul_add_f64x4(self.2, factor.2, addend.2))
         }
 
         #[inline(always)]
-        fn magnitude(self) -> Self {
+        fn abs(self) -> Self {
             Self(self.0, self.0.abs_f64x4(self.1), self.0.abs_f64x4(self.2))
         }
 
@@ -288,12 +290,12 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn fused(self, factor: Self, addend: Self) -> Self {
+        fn mul_add(self, factor: Self, addend: Self) -> Self {
             Self(self.0, self.0.mul_add_f64x8(self.1, factor.1, addend.1))
         }
 
         #[inline(always)]
-        fn magnitude(self) -> Self {
+        fn abs(self) -> Self {
             Self(self.0, self.0.abs_f64x8(self.1))
         }
 

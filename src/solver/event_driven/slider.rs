@@ -1,8 +1,7 @@
 //! The slider as it moves: its contacts, the chain that they make of the blocks, and the motion of the blocks.
 
-use super::chain::Chain;
+use super::chain::{Chain, State};
 use super::layout::Layout;
-use super::taylor::State;
 use crate::model::{ContactEvent, Interface, Parameters};
 
 /// Contacts, chain and motion, which change together. All displacements are those of the frame.

@@ -1,31 +1,32 @@
-//! One Taylor step, and the contact events on its way.
+//! One Taylor step, and the contact events within it.
 //!
-//! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of k_i a_i
-//! over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and g_p = h² (ΔP - ΔK x_j)_p/m,
-//! the motion changes by
+//! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of k_i
+//! a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and g_p = h² (ΔP
+//! - ΔK x_j)_p/m, the motion changes by
 //!
 //! ```text
 //! at j:         δ2 ξ² + δ3 ξ³ + δ4 ξ⁴,   δ2 = g_0/2,   δ3 = g_1/6 - γh δ2/3,   δ4 = g_2/12 - γh δ3/4 - h² S_jj/m δ2/12
 //! at j-1, j+1:  h² K_int/m δ2/12 ξ⁴
 //! ```
 //!
-//! and by terms of higher order that spread along the chain. As long as these are under a small part of the error of a step, the
-//! event is merged into it: the change is added to the series, which stays right from the event on. The step ends where it no longer
-//! would. Contract: events in the right order, also of blocks whose series has changed.
+//! and by terms of higher order that spread along the chain. As long as these are under a small part of the error of a
+//! step, the event is merged into it: the change is added to the series, which stays right from the event on. The step
+//! ends where it no longer would. Contract: events in the right order, also of blocks whose series has changed.
 
 use super::Integration;
 use super::chain::Chain;
 use super::crossing::first_exit;
 use super::frame::FRAME_SPAN;
 use super::layout::Layout;
+use super::series::Series;
 use super::slider::Slider;
-use super::taylor::{Series, StepInput};
+use super::taylor::StepInput;
 use crate::model::Change;
 use crate::solver::polynomial;
 use crate::solver::segment::{ForceAt, ForcePath, Segment};
 use crate::solver::{Observer, SimulationError};
 
-/// Steps are halved at most so often where events crowd; further only if a series does not converge.
+/// Steps are halved at most this often where events crowd; further only if a series does not converge.
 const MAX_HALVINGS: usize = 7;
 /// Halvings at which a series that does not converge ends the run.
 const HOPELESS_HALVINGS: usize = 60;
@@ -55,10 +56,10 @@ impl Pace {
         Self { typical_advance: max_step, break_window: 0.0, attach_window: 0.0, min_orders: [0; MAX_HALVINGS + 1] }
     }
 
-    /// Takes note of the order at which a series converged.
+    /// Notes the order at which a series converged.
     fn note_order(&mut self, halvings: usize, order: usize) {
         if let Some(min_order) = self.min_orders.get_mut(halvings) {
-            // Reached at the first look: look earlier next time.
+            // Reached at the first check: check earlier next time.
             *min_order = if order <= *min_order + 1 { order - 2 } else { order };
         }
     }
@@ -74,7 +75,7 @@ pub(super) struct Step {
     /// Coefficients of F_S over the step, in N.
     force: Vec<f64>,
     /// Bound on the second derivative of F_S by s, in N.
-    force_bend: f64,
+    curvature_bound: f64,
     /// Row and lane of every block that may break.
     candidates: Vec<(usize, usize)>,
     /// Breaks to come: where in the step, and the block.
@@ -92,7 +93,7 @@ impl Step {
             length: 0.0,
             series: Series::new(layout),
             force: Vec::new(),
-            force_bend: 0.0,
+            curvature_bound: 0.0,
             candidates: Vec::new(),
             breaks: Vec::new(),
             amended: Vec::new(),
@@ -102,7 +103,13 @@ impl Step {
 
     /// The shear force from one s to another, at which it is `ends`.
     fn force_path(&self, first: f64, ends: [ForceAt; 2]) -> ForcePath<'_> {
-        ForcePath::Polynomial { coefficients: &self.force, bend: self.force_bend, first, scale: self.length, ends }
+        ForcePath::Polynomial {
+            coefficients: &self.force,
+            curvature_bound: self.curvature_bound,
+            first,
+            scale: self.length,
+            ends,
+        }
     }
 
     /// The same from s = 0, as a segment that starts at a time in s.
@@ -115,8 +122,8 @@ impl Step {
     fn look_for_break(&mut self, chain: &Chain, block: usize, from: f64, end: f64) -> f64 {
         let (row, lane) = chain.layout.slot(block);
         let levels = [chain.lower[row][lane], chain.upper[row][lane]];
-        let [least, most] = self.series.range(row, lane);
-        if least > levels[0] && most < levels[1] {
+        let [lowest, highest] = self.series.range(row, lane);
+        if lowest > levels[0] && highest < levels[1] {
             return f64::INFINITY;
         }
         self.series.block(row, lane, &mut self.coefficients);
@@ -146,13 +153,13 @@ impl Step {
             for (force, coefficient) in self.force.iter_mut().zip(coefficients) {
                 *force -= chain.drive_stiffness * coefficient;
             }
-            self.force_bend = polynomial::second_derivative_bound(&self.force);
+            self.curvature_bound = polynomial::second_derivative_bound(&self.force);
         }
     }
 }
 
 impl Integration<'_> {
-    /// One Taylor step of at most `horizon` s, to its end or soon after the first events on its way.
+    /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events.
     pub(super) fn take_step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
         let until_attach = self.slider.interface.next_reattachment() - self.frame.time + self.pace.attach_window;
         self.expand(horizon.min(until_attach))?;
@@ -234,7 +241,7 @@ impl Integration<'_> {
     /// Breaks what is reached at a block, or attaches what is due there, at s in the step. Returns how far beyond s the
     /// series stays right; 0 if the step must end.
     fn change(&mut self, change: Change, block: usize, s: f64, force: f64, observer: &mut dyn Observer) -> f64 {
-        let [x, slope, bend] = self.step.expanded(&self.slider.chain, block, s);
+        let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
         let (stiffness, pull) = (self.slider.interface.block_stiffness[block], self.slider.interface.block_pull[block]);
         match change {
             Change::Break => self.break_block(block, x, force, observer),
@@ -251,7 +258,7 @@ impl Integration<'_> {
         let second = 0.5 * (pulled - stiffened * x);
         let third = -stiffened * slope / 6.0 - damping * second / 3.0;
         let own = square * chain.at(&chain.diagonal, block);
-        let fourth = -stiffened * bend / 12.0 - 0.25 * damping * third - own * second / 12.0;
+        let fourth = -stiffened * half_curvature / 12.0 - 0.25 * damping * third - own * second / 12.0;
         let window = self.tolerances.merged_window([second, third], length, chain.damping_rate);
         if window * length < MIN_WINDOW * self.pace.typical_advance {
             return 0.0;
@@ -293,7 +300,7 @@ impl Integration<'_> {
             if self.kernels.expand(chain, state, &input, &mut step.series) {
                 self.pace.note_order(halvings, step.series.order);
                 step.series.shear_force(drive, chain.drive_stiffness, &mut step.force);
-                step.force_bend = polynomial::second_derivative_bound(&step.force);
+                step.curvature_bound = polynomial::second_derivative_bound(&step.force);
                 (step.start, step.length) = (self.frame.time, length);
                 return Ok(());
             }
@@ -325,7 +332,8 @@ mod tests {
     proptest! {
         #[test]
         fn terms_about_an_event_are_the_same_about_the_start(
-            second in -1.0_f64..1.0, third in -1.0_f64..1.0, fourth in -1.0_f64..1.0, at in 0.0_f64..1.0, s in 0.0_f64..1.0
+            second in -1.0_f64..1.0, third in -1.0_f64..1.0, fourth in -1.0_f64..1.0, at in 0.0_f64..1.0,
+            s in 0.0_f64..1.0
         ) {
             let beyond = s - at;
             let expected = beyond * beyond * (second + beyond * (third + beyond * fourth));

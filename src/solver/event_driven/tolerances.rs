@@ -3,8 +3,8 @@
 use crate::model::Parameters;
 use crate::model::slider::largest_frequency;
 
-/// Longest step, in units of the shortest time scale: the cheapest per unit of time, and still far from where the series
-/// would lose digits.
+/// Longest step, in units of the shortest time scale: the cheapest per unit of time, and still far from where the
+/// series would lose digits.
 const MAX_STEP: f64 = 4.0;
 /// Part of the tolerance that one step's truncation may take at most.
 const TRUNCATION_SHARE: f64 = 0.1;
@@ -39,8 +39,9 @@ impl Tolerances {
         }
     }
 
-    /// How far in a step of `length` s the terms of higher order that follow from an event's δ2 and δ3, in m, stay under the
-    /// error of a step. At the fastest frequency ω they are at most (ωh)² (δ3/20 + γh δ2/60) ξ⁵ and (ωh)⁴ δ2/720 ξ⁶.
+    /// How far in a step of `length` s the terms of higher order that follow from an event's δ2 and δ3, in m, stay
+    /// under the error of a step. At the fastest frequency ω they are at most (ωh)² (δ3/20 + γh δ2/60) ξ⁵ and (ωh)⁴
+    /// δ2/720 ξ⁶.
     pub fn merged_window(&self, [second, third]: [f64; 2], length: f64, damping_rate: f64) -> f64 {
         let angle = MAX_STEP * length / self.max_step;
         let square = angle * angle;
@@ -52,10 +53,11 @@ impl Tolerances {
     }
 }
 
-/// Part of the tolerance that one step's truncation may take, so that the sum of what the slider remembers stays bounded.
+/// Part of the tolerance that one step's truncation may take, so that the sum of what the slider remembers stays
+/// bounded.
 ///
-/// An error decays at the rate γ/2 if the motion of the attached slider oscillates, else at that of its slowest mode: with
-/// very little and with very much damping, a million steps may add up, mostly with one sign.
+/// An error decays at the rate γ/2 if the motion of the attached slider oscillates, else at that of its slowest mode:
+/// with very little and with very much damping, a million steps may add up, mostly with one sign.
 fn truncation_share(parameters: &Parameters, max_step: f64) -> f64 {
     let half = 0.5 * parameters.damping_rate;
     // The contacts alone bound the lowest squared frequency of the attached slider.
