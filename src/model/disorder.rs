@@ -16,10 +16,10 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 
 /// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
 const WORDS_PER_DRAW: u128 = 4;
-/// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
+/// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
 const DRAWS_PER_REFILL: u32 = 16;
 type Draws = [Draw; DRAWS_PER_REFILL as usize];
-/// Draws whose arithmetic goes side by side.
+/// Draws that are computed side by side.
 const SIDE_BY_SIDE: usize = 4;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
@@ -90,7 +90,8 @@ impl Disorder {
         }
     }
 
-    /// Draws the generations of a contact from `first` on; apart from [`Self::draw`], which is called far more often.
+    /// Draws the generations of a contact from `first` on. Not inlined in [`Self::draw`], which is called far more
+    /// often.
     #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);

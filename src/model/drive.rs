@@ -2,7 +2,7 @@
 //!
 //! T and Δ may themselves be ramped, cycle by cycle: each cycle starts at a maximum, at t_c, and is a plain cosine,
 //! u(t) = V0 t + Δ_c (cos(2π (t - t_c)/T_c) - 1), with the T_c and Δ_c that the ramp has at t_c. So u and u' are
-//! continuous where cycles join. The [`Drive`] is that of one cycle, the one in force; without a ramp, and after it, a
+//! continuous where cycles join. A [`Drive`] is that of one cycle, the present one; without a ramp, and after it, a
 //! cycle has no end.
 
 use super::Parameters;

@@ -67,7 +67,7 @@ impl Due {
     }
 }
 
-/// Times eight bytes that are 0 or 1 each: their bits in the highest byte, in order.
+/// Eight bytes that are 0 or 1 each, times this, hold their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
 /// The contacts of a row, side by side in memory as they are read: contact i of a block lies in row i div 8 of the
@@ -166,7 +166,7 @@ impl Interface {
     /// Attaches the contact that is due next, unstressed where its block is at that moment.
     ///
     /// # Panics
-    /// When nothing is due: a mistake of the solver.
+    /// When nothing is due: a bug in the solver.
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.block(), due.contact as usize);
@@ -192,7 +192,7 @@ impl Interface {
             while reached != 0 {
                 let contact = LANES * start + reached.trailing_zeros() as usize;
                 if contact >= self.contacts_per_block {
-                    // A displacement that is not finite reaches what no contact has.
+                    // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
                 log(self.event(block, contact, time, displacement, Change::Break));
@@ -220,7 +220,7 @@ impl Interface {
         let due = std::mem::take(&mut self.reattachments);
         self.reattachments = due
             .into_iter()
-            // Not negative, whatever rounding does: see `Due`.
+            // Not negative, whatever rounding does; see `Due`.
             .map(|Reverse(due)| Reverse(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due }))
             .collect();
     }
@@ -264,7 +264,7 @@ impl Interface {
         }
     }
 
-    /// Begins a life of a contact; returns where it breaks, above and below.
+    /// Begins a life of a contact. Returns the positions above and below at which it breaks.
     fn attach(&mut self, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
         let row = &mut self.rows[row];

@@ -7,7 +7,7 @@ use std::ops::{Deref, DerefMut};
 /// Lanes of a row.
 pub(crate) const LANES: usize = 8;
 
-/// One row, in one line of the cache.
+/// Eight doubles in one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Row(pub [f64; LANES]);
@@ -18,7 +18,7 @@ impl Row {
         Self([value; LANES])
     }
 
-    /// Combines the lanes in pairs.
+    /// Combines all lanes into one value, in pairs.
     #[inline(always)]
     pub fn reduce(self, combine: impl Fn(f64, f64) -> f64) -> f64 {
         let halves: [f64; LANES / 2] = array::from_fn(|i| combine(self[i], self[i + LANES / 2]));

@@ -20,31 +20,31 @@ pub struct Harmonic {
 }
 
 impl Harmonic {
-    /// Value after so many seconds.
+    /// Value after `elapsed` s.
     pub fn value(&self, elapsed: f64) -> f64 {
         let ramp = self.start + self.rate * elapsed;
         if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }
     }
 
-    /// Value and slope after so many seconds.
+    /// Value and slope after `elapsed` s.
     pub(super) fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
         let (sine, cosine) = libm::sincos(self.angle(elapsed));
         let ramp = self.start + self.rate * elapsed;
         (ramp + self.amplitude * cosine, self.rate - self.amplitude * self.angular_frequency * sine)
     }
 
-    /// Argument of the cosine after so many seconds.
+    /// Argument of the cosine after `elapsed` s, in rad.
     pub(super) fn angle(&self, elapsed: f64) -> f64 {
         self.turn(elapsed) + self.phase
     }
 
-    /// What the cosine turns by in so many seconds, in rad. Whole periods are taken off first, so that long times lose
+    /// Increase of the argument in `elapsed` s, in rad. Whole periods are taken off first, so that long times lose
     /// no digits of the phase.
     pub(super) fn turn(&self, elapsed: f64) -> f64 {
         TAU * (elapsed * self.angular_frequency / TAU).fract()
     }
 
-    /// Integral over so many seconds.
+    /// Integral over the first `duration` s.
     pub(super) fn integral(&self, duration: f64) -> f64 {
         let ramp = duration * (self.start + 0.5 * self.rate * duration);
         if self.amplitude == 0.0 {
@@ -72,7 +72,7 @@ impl Harmonic {
         [Some(first), Some(last)]
     }
 
-    /// `sign` times it.
+    /// The same multiplied by `sign`.
     pub(super) fn times(&self, sign: f64) -> Self {
         Self { start: sign * self.start, rate: sign * self.rate, amplitude: sign * self.amplitude, ..*self }
     }

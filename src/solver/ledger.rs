@@ -7,7 +7,7 @@
 //!
 //! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered
 //! as such; [`Ledger::left_out`] reports how much that was. Where a leap carries the free motion on, it is resolved
-//! once more for its damping and for the work on it, which the segment of the leap does not show.
+//! again for its damping and for the work on it, which the segment of the leap does not show.
 
 use super::harmonic::Harmonic;
 use super::quadrature::Quadrature;
@@ -152,7 +152,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
 mod tests {
     use super::*;
 
-    /// A modulated drive, and the rule to judge the closed form by.
+    /// A modulated drive, and the rule to check the closed form against.
     fn modulated() -> (Drive, Quadrature) {
         let parameters =
             Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };

@@ -1,7 +1,7 @@
 //! Solvers: advance a model from contact event to contact event and report to an observer what happens.
 //!
-//! The one door is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear force
-//! as a closed-form function of time. Nothing that it sees depends on which solver runs.
+//! The entry point is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear
+//! force as a closed-form function of time. Nothing that it sees depends on which solver runs.
 
 mod event_driven;
 mod fixed_step;
@@ -26,7 +26,7 @@ use std::sync::atomic::AtomicBool;
 pub enum Solver {
     /// From contact event to contact event, exact within the tolerance.
     EventDriven {
-        /// Error of displacement that is aimed at, relative to the contact reach f_s/k. 1e-12 to 1e-2.
+        /// Target for the error of displacement, relative to the contact reach f_s/k. 1e-12 to 1e-2.
         tolerance: f64,
     },
     /// Explicit velocity-Verlet with damping, contacts tested after each step.

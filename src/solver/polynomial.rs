@@ -143,7 +143,7 @@ pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: 
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
     }
-    // A sum that overflows is not finite either.
+    // Nor is a sum that overflows.
     if !derivative.iter().map(|coefficient| coefficient.abs()).sum::<f64>().is_finite() {
         return;
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 /// Largest number of nodes of a rule.
 pub(super) const MAX_NODES: usize = 33;
-/// Newton's method doubles the digits of a node each time, and starts with two.
+/// Newton's method doubles the correct digits of a node each time, and starts with two.
 const NEWTON_STEPS: usize = 6;
 
 /// The rules of 1 to [`MAX_NODES`] nodes.
@@ -18,7 +18,7 @@ impl Quadrature {
         Self { rules: (1..=MAX_NODES).map(rule).collect() }
     }
 
-    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with so many nodes, brought into 1 to [`MAX_NODES`].
+    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with `count` nodes, limited to 1 to [`MAX_NODES`].
     pub fn nodes(&self, count: usize) -> &[(f64, f64)] {
         &self.rules[count.clamp(1, MAX_NODES) - 1]
     }

@@ -14,7 +14,7 @@ pub enum ForcePath<'a> {
         curvature_bound: f64,
         /// Where the segment starts.
         first: f64,
-        /// Time that s = 1 stands for, in s.
+        /// Time per unit of s, in s.
         scale: f64,
         /// The shear force at both ends of the segment.
         ends: [ForceAt; 2],
@@ -99,7 +99,7 @@ impl Segment<'_> {
         Some((time, -mirrored))
     }
 
-    /// Values in N that F_S stays between; not the closest ones.
+    /// Lower and upper bound on F_S, in N; not the tightest.
     pub fn bounds(&self) -> (f64, f64) {
         match self.path {
             ForcePath::Polynomial { curvature_bound, scale, ends, .. } => {
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Between the turns, in order, the force goes one way; and it stays within its bounds.
+    /// Between the turns, in order, the force is monotone, and it stays within its bounds.
     fn assert_turns(segment: &Segment<'_>) {
         let mut turns = vec![segment.start];
         segment.for_each_turn(|time, _| turns.push(time));

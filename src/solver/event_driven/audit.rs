@@ -33,7 +33,7 @@ impl Audit {
         self.damping += chain.mass * chain.damping_rate * (last - first) * length * mean_square;
     }
 
-    /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and
+    /// Enters a leap of `elapsed` s from `state`: the damping loss along the driven solution, in closed form, and
     /// the energy of the free motion that is dropped at its start.
     pub(super) fn follow_leap(
         &mut self,
@@ -95,12 +95,12 @@ impl Audit {
 }
 
 impl Integration<'_> {
-    /// Resolves a leap that carried the free motion over once more in Taylor steps, for the energies. `shown` is its
+    /// Resolves a leap that carried the free motion over again in Taylor steps, for the energies. `reported` is its
     /// force without the free motion.
-    pub(super) fn audit_carried_leap(&mut self, before: State, shown: &Segment<'_>) {
-        let elapsed = shown.duration;
+    pub(super) fn audit_carried_leap(&mut self, before: State, reported: &Segment<'_>) {
+        let elapsed = reported.duration;
         let after = std::mem::replace(&mut self.slider.state, before);
-        let (start, min_orders, mut done) = (self.frame.time, self.pace.min_orders, 0.0);
+        let (start, min_orders, mut done) = (self.frame.time, self.control.min_orders, 0.0);
         while done < elapsed {
             let left = elapsed - done;
             if self.expand(left).is_err() {
@@ -118,10 +118,10 @@ impl Integration<'_> {
             self.frame.set_time(start + done);
         }
         self.slider.state = after;
-        self.pace.min_orders = min_orders;
+        self.control.min_orders = min_orders;
         self.frame.set_time(start);
         if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.frame.drive, &audit.quadrature, shown);
+            audit.unseen_work -= work(&self.frame.drive, &audit.quadrature, reported);
         }
     }
 }

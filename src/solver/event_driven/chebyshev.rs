@@ -106,7 +106,7 @@ impl ChebyshevPropagator {
     }
 }
 
-/// Carries u and u' over so many seconds; `error` is the part of them that may be left out.
+/// Carries u and u' over `seconds` s; `error` is the part of them that may be left out.
 #[inline(always)]
 pub(super) fn propagate<S: Simd>(
     simd: S,

@@ -40,7 +40,7 @@ fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> 
         return Some(from);
     }
     if coefficients[1].abs() > slope_spread {
-        // First where the parabola crosses.
+        // Start where the parabola crosses.
         let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * half_curvature).max(0.0).sqrt());
         return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
     }
@@ -109,7 +109,7 @@ impl Harmonic {
             return f64::INFINITY;
         };
         let high = first + skipped * period;
-        // The branch that rises to a maximum begins at the minimum before, π - 2 asin(p1/Aω) earlier... in phase.
+        // The branch that rises to a maximum begins at the minimum before it: π + 2 asin(p1/Aω) earlier in phase.
         let low = (high - (PI + 2.0 * crest) / self.angular_frequency).max(from);
         if self.value(high) < level { high } else { newton(low, high) }
     }

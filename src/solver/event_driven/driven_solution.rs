@@ -31,7 +31,7 @@ impl DrivenSolution {
         }
     }
 
-    /// Solves for p0, p1 and q with the inverse pivots and a drive that moves so from now on.
+    /// Solves for p0, p1 and q with the inverse pivots and the motion of the drive from now on.
     #[inline(always)]
     pub fn solve(&mut self, chain: &Chain, drive: &Harmonic) {
         let coupling = chain.coupling[0][0];
@@ -115,7 +115,7 @@ impl DrivenSolution {
         })
     }
 
-    /// Writes displacements and velocities after so many seconds, in m and m/s.
+    /// Writes displacements and velocities after `elapsed` s, in m and m/s.
     pub fn evaluate(&self, drive: &Harmonic, elapsed: f64, displacement: &mut [f64], velocity: &mut [f64]) {
         let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };
         for j in 0..self.start.len() {

@@ -11,7 +11,7 @@ pub(super) const FRAME_SPAN: f64 = 0.0625;
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
 
-/// The frame, and the drive as it is seen there.
+/// The frame, and the drive in it.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub drive: Drive,
@@ -45,12 +45,12 @@ impl Frame {
         self.origin_time + self.time
     }
 
-    /// The same for a time in the frame.
+    /// Time since the start of the run, in s, for a time in the frame.
     pub fn absolute_time(&self, time: f64) -> f64 {
         self.origin_time + time
     }
 
-    /// The same for a displacement in the frame, in m.
+    /// Displacement since the start of the run, in m, for a displacement in the frame.
     pub fn absolute_displacement(&self, displacement: f64) -> f64 {
         self.origin_displacement + displacement
     }
@@ -61,17 +61,17 @@ impl Frame {
         ContactEvent { time, displacement: self.absolute_displacement(event.displacement), ..event }
     }
 
-    /// How long it is until a time since the start of the run, in s.
+    /// Seconds until a time that is counted from the start of the run.
     pub fn until(&self, time: f64) -> f64 {
         time - self.origin_time - self.time
     }
 
-    /// Whether a time that is so many seconds away is here, within rounding.
-    pub fn is_here(&self, seconds: f64) -> bool {
+    /// Whether an instant that is `seconds` s away has come, within rounding.
+    pub fn has_come(&self, seconds: f64) -> bool {
         seconds <= 4.0 * f64::EPSILON * self.now()
     }
 
-    /// Moves the clock.
+    /// Sets the time in the frame, in s.
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
         if self.drive.is_modulated() {
@@ -88,7 +88,7 @@ impl Frame {
         self.swing = [self.drive.amplitude, 0.0];
     }
 
-    /// Moves the origin to the present time and close to a displacement. Returns by how much, in s and m.
+    /// Moves the origin close to the present time and a displacement. Returns by how much, in s and m.
     pub fn move_origin(&mut self, displacement: f64) -> (f64, f64) {
         let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
         let displacement = (displacement / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
@@ -120,7 +120,7 @@ impl Frame {
         Harmonic { start: self.ramp(), rate: velocity, amplitude, phase: self.phase(), angular_frequency }
     }
 
-    /// The derivatives of the drive's displacement, for a step of so many seconds.
+    /// The derivatives of the drive's displacement, for a step of `length` s.
     pub fn drive_derivatives(&self, length: f64) -> DriveDerivatives {
         DriveDerivatives {
             ramp: [self.ramp(), self.drive.velocity * length],

@@ -14,13 +14,13 @@ use crate::solver::harmonic::Harmonic;
 pub(super) trait Kernels {
     /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
     fn expand(&self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool;
-    /// State at s in [0, 1] of a step of so many seconds.
+    /// State at s in [0, 1] of a step of `length` s.
     fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State);
     /// Row and lane of every block that may reach a break position within the step.
     fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>);
     /// Splits the motion into driven solution and free motion; see [`split`].
     fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64>;
-    /// Carries the free motion over so many seconds; see [`propagate`].
+    /// Carries the free motion over `seconds` s; see [`propagate`].
     fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator);
 }
 
@@ -64,13 +64,13 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
     }
 }
 
-/// The fastest loops that this processor can run for so many rows.
+/// The fastest loops that this processor can run for this many rows.
 pub(super) fn fastest(rows: usize) -> Box<dyn Kernels> {
     let (_, fastest) = available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
     fastest
 }
 
-/// All loops that this processor can run for so many rows, with their names; the fastest last.
+/// All loops that this processor can run for this many rows, with their names; the fastest last.
 pub(super) fn available(rows: usize) -> Vec<(&'static str, Box<dyn Kernels>)> {
     let mut paths: Vec<(&'static str, Box<dyn Kernels>)> = vec![("baseline", Box::new(Compiled::<_, 0>(Baseline)))];
     // The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.

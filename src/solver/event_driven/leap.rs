@@ -30,10 +30,10 @@ const MAX_CARRIED_ANGLE: f64 = 1e6;
 /// How an attempt to leap ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Attempt {
-    /// The slider moved on by so many seconds; a block reached a break position if one is named. Whether the free
+    /// The slider moved on by `elapsed` s; a block reached a break position if one is named. Whether the free
     /// motion was carried over.
     Leapt { elapsed: f64, reached: Option<usize>, is_carried: bool },
-    /// Not yet: try again after so many seconds.
+    /// Not yet: try again after `seconds` s.
     Wait { seconds: f64 },
 }
 
@@ -43,11 +43,11 @@ pub(super) struct Bounds {
     /// Time to the next reattachment or to the end, in s.
     pub horizon: f64,
     /// Time to the next cycle of a ramped modulation, in s; not before the horizon.
-    pub until_turn: f64,
+    pub until_cycle_end: f64,
     /// Displacement that may be left out, in m.
     pub error: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
-    pub passed: f64,
+    pub largest_force: f64,
 }
 
 /// Leaps, and their work space.
@@ -64,23 +64,24 @@ impl Leap {
     }
 
     /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above
-    /// `error` m, and writes the state at its end. Shear forces up to `passed` N have been seen since the last break.
-    /// `emit` receives the shear force on the way, `audit` the energies, unless the free motion was carried over.
+    /// `error` m, and writes the state at its end. Shear forces up to `largest_force` N have been seen since the last
+    /// break. `report` receives the shear force on the way, `audit` the energies, unless the free motion was carried
+    /// over.
     #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it reports")]
     pub fn attempt(
         &mut self,
         chain: &Chain,
         kernels: &dyn Kernels,
         drive: &Harmonic,
-        Bounds { horizon, until_turn, error, passed }: Bounds,
+        Bounds { horizon, until_cycle_end, error, largest_force }: Bounds,
         state: &mut State,
-        emit: impl FnOnce(Segment<'static>),
+        report: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
         let layout = chain.layout;
         layout.unfold(&state.displacement, &mut self.motion.displacement);
         layout.unfold(&state.velocity, &mut self.motion.velocity);
-        // Worth another try after so many e-foldings of the free motion, or after the next event.
+        // Worth another try after some e-foldings of the free motion, or after the next event.
         let Some(largest) = kernels.split(chain, drive, &mut self.motion) else {
             return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
         };
@@ -108,10 +109,12 @@ impl Leap {
         }
         let path = self.motion.driven.force_path(drive, chain.drive_stiffness);
         let segment = Segment { start: 0.0, duration: elapsed, path };
-        if largest > error && !self.hides_no_peak(chain, drive, &segment, [moving, until_turn], left, passed) {
+        if largest > error
+            && !self.hides_no_peak(chain, drive, &segment, [moving, until_cycle_end], left, largest_force)
+        {
             return wait(0.7);
         }
-        emit(segment);
+        report(segment);
         let SplitMotion { displacement, velocity, driven, .. } = &mut self.motion;
         if !is_short && let Some(audit) = audit {
             audit.follow_leap(chain, drive, driven, state, elapsed);
@@ -126,16 +129,16 @@ impl Leap {
     }
 
     /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear
-    /// force: one as large is on record, or comes later in the segment, or comes after it, within `until_turn` s and
-    /// before any break.
+    /// force: one as large is on record, or comes later in the segment, or comes after it, within `until_cycle_end` s
+    /// and before any break.
     fn hides_no_peak(
         &self,
         chain: &Chain,
         drive: &Harmonic,
         segment: &Segment<'_>,
-        [moving, until_turn]: [f64; 2],
+        [moving, until_cycle_end]: [f64; 2],
         left: f64,
-        passed: f64,
+        largest_force: f64,
     ) -> bool {
         let swing = chain.drive_stiffness * self.motion.free.bound[0];
         let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
@@ -147,7 +150,7 @@ impl Leap {
         } else {
             driven(moving).maximum_above(f64::NEG_INFINITY).map_or(f64::INFINITY, |(_, force)| force) + swing
         };
-        if highest <= passed || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
+        if highest <= largest_force || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
             return true;
         }
         let rate = chain.drive_stiffness * (drive.rate - self.motion.driven.rate[0]);
@@ -156,11 +159,11 @@ impl Leap {
         } else {
             (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
         };
-        let ahead = (moving + further).min(until_turn);
+        let ahead = (moving + further).min(until_cycle_end);
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
     }
 
-    /// Carries the free motion over so many seconds and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where
+    /// Carries the free motion over `elapsed` s and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where
     /// `left` is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
     fn carry_free_motion(&mut self, chain: &Chain, kernels: &dyn Kernels, elapsed: f64, left: f64, error: f64) {
         let SplitMotion { displacement, velocity, free, .. } = &mut self.motion;
@@ -244,7 +247,7 @@ mod tests {
         let amplitude = 1e-6;
         state.displacement[0][0] = amplitude;
         let horizon = 1e9;
-        let bounds = Bounds { horizon, until_turn: f64::INFINITY, error: 1e-12, passed: f64::INFINITY };
+        let bounds = Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, largest_force: f64::INFINITY };
         let attempt = Leap::new(layout).attempt(&chain, &*kernels, &drive, bounds, &mut state, |_| {}, None);
         let Attempt::Leapt { elapsed, reached: None, is_carried: true } = attempt else { panic!("{attempt:?}") };
         let angle = squared.sqrt() * elapsed;

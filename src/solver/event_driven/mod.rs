@@ -29,7 +29,7 @@ use self::kernels::Kernels;
 use self::layout::Layout;
 use self::leap::{Attempt, Bounds, Leap};
 use self::slider::Slider;
-use self::step::{Pace, Step};
+use self::step::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::ledger::Audit;
 use super::segment::Segment;
@@ -37,7 +37,7 @@ use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::{Drive, Parameters};
 use std::sync::atomic::Ordering;
 
-/// A leap is tried only if no reattachment is due within so many longest steps.
+/// A leap is tried only if no reattachment is due within this many longest steps.
 const WORTHWHILE_LEAP: f64 = 6.0;
 /// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
@@ -55,20 +55,20 @@ pub(super) fn run(
     Integration { audit, ..integration }.integrate(observer)
 }
 
-/// One simulation in progress. Times and displacements are those of the frame but where said otherwise.
+/// One simulation in progress. Times and displacements are those of the frame unless stated otherwise.
 struct Integration<'a> {
     limits: Limits<'a>,
     kernels: Box<dyn Kernels>,
     tolerances: Tolerances,
     frame: Frame,
     slider: Slider,
-    pace: Pace,
+    control: StepControl,
     step: Step,
     leap: Leap,
     /// Time before which no leap is tried, in s.
     next_leap: f64,
     /// Largest shear force at the last break and at the ends of steps since, in N.
-    passed_force: f64,
+    largest_force: f64,
     summary: Summary,
     audit: Option<&'a mut Audit>,
 }
@@ -84,11 +84,11 @@ impl<'a> Integration<'a> {
             tolerances,
             frame: Frame::new(Drive::new(parameters)),
             slider,
-            pace: Pace::new(tolerances.max_step),
+            control: StepControl::new(tolerances.max_step),
             step: Step::new(layout),
             leap: Leap::new(layout),
             next_leap: 0.0,
-            passed_force: 0.0,
+            largest_force: 0.0,
             summary: Summary::default(),
             audit: None,
         }
@@ -103,20 +103,20 @@ impl<'a> Integration<'a> {
         }
         while !observer.is_satisfied() {
             let until_end = self.frame.until(self.limits.end_time);
-            if self.frame.is_here(until_end) {
+            if self.frame.has_come(until_end) {
                 return self.finish(false, observer);
             }
-            let mut until_turn = self.frame.until(self.frame.drive.cycle_end);
-            if self.frame.is_here(until_turn) {
+            let mut until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
+            if self.frame.has_come(until_cycle_end) {
                 self.frame.next_cycle();
-                until_turn = self.frame.until(self.frame.drive.cycle_end);
+                until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
             }
-            let until_change = until_turn.min(until_end);
+            let until_change = until_cycle_end.min(until_end);
             let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
             let horizon = until_attach.min(until_change);
             let leapt = horizon > WORTHWHILE_LEAP * self.tolerances.max_step
                 && self.frame.time >= self.next_leap
-                && self.try_leap(horizon, until_turn, observer);
+                && self.try_leap(horizon, until_cycle_end, observer);
             if !leapt {
                 self.take_step(until_change, observer)?;
             }
@@ -154,31 +154,32 @@ impl<'a> Integration<'a> {
         Ok(self.summary)
     }
 
-    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false
-    /// if it is not yet allowed.
+    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_cycle_end` s;
+    /// false if none is allowed yet.
     #[inline(never)]
-    fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
+    fn try_leap(&mut self, horizon: f64, until_cycle_end: f64, observer: &mut dyn Observer) -> bool {
         let drive = self.frame.drive_motion();
         let start = self.frame.now();
-        let bounds = Bounds { horizon, until_turn, error: self.tolerances.leap_error, passed: self.passed_force };
-        let mut shown = None;
-        let emit = |segment: Segment<'static>| {
+        let bounds =
+            Bounds { horizon, until_cycle_end, error: self.tolerances.leap_error, largest_force: self.largest_force };
+        let mut reported = None;
+        let report = |segment: Segment<'static>| {
             let segment = Segment { start, ..segment };
-            shown = Some(segment);
+            reported = Some(segment);
             observer.advance(&segment);
         };
         let Slider { chain, state, .. } = &mut self.slider;
         let before = self.audit.is_some().then(|| state.clone());
         let audit = self.audit.as_deref_mut();
-        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, bounds, state, emit, audit);
+        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, bounds, state, report, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
                 false
             }
             Attempt::Leapt { elapsed, reached, is_carried } => {
-                if let (Some(before), Some(shown)) = (before.filter(|_| is_carried), shown) {
-                    self.audit_carried_leap(before, &shown);
+                if let (Some(before), Some(reported)) = (before.filter(|_| is_carried), reported) {
+                    self.audit_carried_leap(before, &reported);
                 }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
@@ -196,7 +197,7 @@ impl<'a> Integration<'a> {
         }
     }
 
-    /// Moves time on, exactly to the next reattachment if that is what came.
+    /// Advances time by `elapsed` s, exactly to the next reattachment if that ended the leap.
     fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
         let due = self.slider.interface.next_reattachment();
         let reached = self.frame.time + elapsed;
@@ -204,10 +205,10 @@ impl<'a> Integration<'a> {
         self.frame.set_time(if is_due { due } else { reached });
     }
 
-    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force
-    /// `force` N.
+    /// Breaks the contacts of a block that has reached a break position, at displacement `x` m and shear force `force`
+    /// N.
     fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
-        self.passed_force = force;
+        self.largest_force = force;
         let (frame, summary) = (&self.frame, &mut self.summary);
         self.slider.break_reached(block, frame.time, x, |event| {
             summary.breaks += 1;
@@ -215,7 +216,7 @@ impl<'a> Integration<'a> {
         });
     }
 
-    /// Reattaches what is due now.
+    /// Reattaches all contacts that are due.
     fn reattach_due(&mut self, observer: &mut dyn Observer) {
         while self.slider.interface.next_reattachment() <= self.frame.time
             && let Some(block) = self.slider.interface.next_reattachment_block()
@@ -296,7 +297,7 @@ mod tests {
                 assert_eq!(merged.len(), alone.len());
                 assert!(merged.is_sorted_by_key(|event| event.time));
                 if tolerance > 1e-4 {
-                    // Some breaks at different blocks lie closer than their errors by now.
+                    // Some breaks at different blocks lie closer together than their errors.
                     merged.sort_by_key(which);
                     alone.sort_by_key(which);
                 }

@@ -1,5 +1,5 @@
-//! The Taylor series of a step: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p); values, and which
-//! blocks may break. [`super::taylor`] makes it.
+//! The Taylor series of a step: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p); its values, and
+//! which blocks may break. [`super::taylor`] computes it.
 
 use super::chain::{Chain, State};
 use super::layout::Layout;
@@ -30,7 +30,7 @@ pub(super) struct DriveDerivatives {
 }
 
 impl DriveDerivatives {
-    /// The term of this order; the next call gives the next.
+    /// The term of one order; each call returns that of the next order.
     #[inline(always)]
     pub fn next_order(&mut self) -> f64 {
         let term = self.ramp[0] + self.swing[0];
@@ -95,13 +95,13 @@ impl Series {
         }
     }
 
-    /// Bounds on the displacement of one block within the step, in m.
+    /// Lower and upper bound on the displacement of one block within the step, in m.
     pub fn range(&self, row: usize, lane: usize) -> [f64; 2] {
         let (start, excursion) = (self.terms[row][lane], self.excursion[row][lane]);
         [start - excursion, start + excursion]
     }
 
-    /// Writes the coefficients of F_S under a drive of so many N/m, in N.
+    /// Writes the coefficients of F_S, in N, for a drive of `stiffness` N/m.
     pub fn shear_force(&self, mut drive: DriveDerivatives, stiffness: f64, coefficients: &mut Vec<f64>) {
         coefficients.resize(self.order + 1, 0.0);
         let mut at = 0;
@@ -117,7 +117,7 @@ impl Series {
 const MANY: usize = 9;
 const FEW: usize = 3;
 
-/// State at s in [0, 1] of a step of so many seconds.
+/// State at s in [0, 1] of a step of `length` s.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const R: usize>(simd: S, series: &Series, s: f64, length: f64, state: &mut State) {
     let rows = series.rows_in::<R>();

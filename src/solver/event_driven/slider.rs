@@ -34,11 +34,11 @@ impl Slider {
         (0..self.chain.layout.blocks).map(|block| self.displacement(block))
     }
 
-    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m.
+    /// Breaks the contacts of a block that has reached a break position, at displacement `x` m.
     pub fn break_reached(&mut self, block: usize, time: f64, x: f64, log: impl FnMut(ContactEvent)) {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
-        // Rounding may leave the block a hair before the position that it was found to reach.
+        // Rounding may leave the block just short of the position that it has reached.
         let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
         self.interface.break_reached(block, time, reached, log);
         self.chain.update(block, &self.interface);
@@ -51,7 +51,7 @@ impl Slider {
         event
     }
 
-    /// Moves the origin by so many seconds and metres.
+    /// Moves the origin by `time` s and `displacement` m.
     pub fn move_origin(&mut self, time: f64, displacement: f64) {
         self.interface.shift_time(time);
         self.interface.shift(displacement);

@@ -1,17 +1,17 @@
 //! One Taylor step, and the contact events within it.
 //!
-//! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of k_i
-//! a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and g_p = h² (ΔP
-//! - ΔK x_j)_p/m, the motion changes by
+//! An event changes the force on one block j, by (ΔP - ΔK x_j)/m per mass, where K and P are the sums of k_i and of
+//! k_i a_i over its attached contacts. With ξ the position in the step since the event, x_j(ξ) = Σ c_p ξ^p and
+//! g_p = h² (ΔP - ΔK x_j)_p/m, the motion changes by
 //!
 //! ```text
 //! at j:         δ2 ξ² + δ3 ξ³ + δ4 ξ⁴,   δ2 = g_0/2,   δ3 = g_1/6 - γh δ2/3,   δ4 = g_2/12 - γh δ3/4 - h² S_jj/m δ2/12
 //! at j-1, j+1:  h² K_int/m δ2/12 ξ⁴
 //! ```
 //!
-//! and by terms of higher order that spread along the chain. As long as these are under a small part of the error of a
-//! step, the event is merged into it: the change is added to the series, which stays right from the event on. The step
-//! ends where it no longer would. Contract: events in the right order, also of blocks whose series has changed.
+//! and by terms of higher order that spread along the chain. As long as these stay below a small part of the error of a
+//! step, the event is merged into it: the change is added to the series, which stays accurate after the event. The step
+//! ends where it would no longer be. Contract: events in the right order, also of blocks whose series has changed.
 
 use super::Integration;
 use super::chain::Chain;
@@ -30,18 +30,18 @@ use crate::solver::{Observer, SimulationError};
 const MAX_HALVINGS: usize = 7;
 /// Halvings at which a series that does not converge ends the run.
 const HOPELESS_HALVINGS: usize = 60;
-/// A step must span so many units in the last place of the time, so that events are located to a millionth of it.
+/// A step must span this many units in the last place of the time, so that events are located to a millionth of it.
 const MIN_RESOLUTION: f64 = 1_048_576.0;
 /// Order up to which an event changes the series.
 const MERGED_ORDER: usize = 4;
 /// Events that may be merged into one step.
 const MAX_MERGED: u32 = 16;
-/// An event is merged only if the step can go on for so long, in units of how far recent steps came.
+/// An event is merged only if the step can go on for this long, in units of how far recent steps came.
 const MIN_WINDOW: f64 = 0.5;
 
 /// What recent steps say about the next.
 #[derive(Clone, Debug)]
-pub(super) struct Pace {
+pub(super) struct StepControl {
     /// How far steps come, in s.
     typical_advance: f64,
     /// How long a step could go on after the last break and after the last reattachment, in s.
@@ -51,7 +51,7 @@ pub(super) struct Pace {
     pub min_orders: [usize; MAX_HALVINGS + 1],
 }
 
-impl Pace {
+impl StepControl {
     pub fn new(max_step: f64) -> Self {
         Self { typical_advance: max_step, break_window: 0.0, attach_window: 0.0, min_orders: [0; MAX_HALVINGS + 1] }
     }
@@ -82,7 +82,7 @@ pub(super) struct Step {
     breaks: Vec<(f64, usize)>,
     /// Blocks whose series an event has changed.
     amended: Vec<usize>,
-    /// Room for the coefficients of a block.
+    /// Work space for the coefficients of a block.
     coefficients: Vec<f64>,
 }
 
@@ -101,7 +101,7 @@ impl Step {
         }
     }
 
-    /// The shear force from one s to another, at which it is `ends`.
+    /// The shear force along a part of the step that starts at s = `first`; `ends` are its values there and at the end.
     fn force_path(&self, first: f64, ends: [ForceAt; 2]) -> ForcePath<'_> {
         ForcePath::Polynomial {
             coefficients: &self.force,
@@ -112,13 +112,13 @@ impl Step {
         }
     }
 
-    /// The same from s = 0, as a segment that starts at a time in s.
+    /// The segment from s = 0 to `s`, which starts at a time in s.
     pub fn segment_to(&self, s: f64, start: f64) -> Segment<'_> {
         let ends = [0.0, s].map(|s| ForceAt::new(&self.force, s));
         Segment { start, duration: s * self.length, path: self.force_path(0.0, ends) }
     }
 
-    /// Notes when a block first breaks in a part of the step, if it does, and returns it; else infinite.
+    /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
     fn look_for_break(&mut self, chain: &Chain, block: usize, from: f64, end: f64) -> f64 {
         let (row, lane) = chain.layout.slot(block);
         let levels = [chain.lower[row][lane], chain.upper[row][lane]];
@@ -144,7 +144,7 @@ impl Step {
         polynomial::expanded(&self.coefficients, s)
     }
 
-    /// Adds to the series of a block, and what follows to F_S.
+    /// Adds coefficients to the series of a block, and changes F_S accordingly.
     fn amend(&mut self, chain: &Chain, block: usize, coefficients: [f64; MERGED_ORDER + 1]) {
         let (row, lane) = chain.layout.slot(block);
         self.series.add(row, lane, &coefficients);
@@ -161,7 +161,7 @@ impl Step {
 impl Integration<'_> {
     /// Takes one Taylor step of at most `horizon` s, to its end or soon after its first events.
     pub(super) fn take_step(&mut self, horizon: f64, observer: &mut dyn Observer) -> Result<(), SimulationError> {
-        let until_attach = self.slider.interface.next_reattachment() - self.frame.time + self.pace.attach_window;
+        let until_attach = self.slider.interface.next_reattachment() - self.frame.time + self.control.attach_window;
         self.expand(horizon.min(until_attach))?;
         let (start, length) = (self.step.start, self.step.length);
         if length < MIN_RESOLUTION * f64::EPSILON * self.frame.time.max(FRAME_SPAN) {
@@ -175,8 +175,8 @@ impl Integration<'_> {
         while let Some((row, lane)) = self.step.candidates.pop() {
             let chain = &self.slider.chain;
             let found = self.step.look_for_break(chain, chain.layout.block(row, lane), 0.0, end);
-            // What comes so long after an event is left to the next step.
-            end = end.min(found + self.pace.break_window / length);
+            // Events this long after the first are left to the next step.
+            end = end.min(found + self.control.break_window / length);
         }
         loop {
             let due = ((self.slider.interface.next_reattachment() - start) / length).max(done);
@@ -197,8 +197,8 @@ impl Integration<'_> {
             }
             let window = self.change(change, block, s, force.force, observer);
             match change {
-                Change::Break => self.pace.break_window = window * length,
-                Change::Attach => self.pace.attach_window = window * length,
+                Change::Break => self.control.break_window = window * length,
+                Change::Attach => self.control.attach_window = window * length,
             }
             merged += 1;
             if window == 0.0 || merged == MAX_MERGED {
@@ -216,9 +216,9 @@ impl Integration<'_> {
         }
         self.kernels.evaluate(&self.step.series, done, length, &mut self.slider.state);
         self.frame.set_time(self.frame.time);
-        self.passed_force = self.passed_force.max(force.force);
+        self.largest_force = self.largest_force.max(force.force);
         let covered = if done == 1.0 { 2.0 * length } else { done * length };
-        self.pace.typical_advance += 0.25 * (covered - self.pace.typical_advance);
+        self.control.typical_advance += 0.25 * (covered - self.control.typical_advance);
         Ok(())
     }
 
@@ -238,8 +238,8 @@ impl Integration<'_> {
         end_force
     }
 
-    /// Breaks what is reached at a block, or attaches what is due there, at s in the step. Returns how far beyond s the
-    /// series stays right; 0 if the step must end.
+    /// Breaks the contacts that a block has reached, or attaches the one that is due there, at s in the step. Returns
+    /// how far beyond s the series stays accurate; 0 if the step must end.
     fn change(&mut self, change: Change, block: usize, s: f64, force: f64, observer: &mut dyn Observer) -> f64 {
         let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
         let (stiffness, pull) = (self.slider.interface.block_stiffness[block], self.slider.interface.block_pull[block]);
@@ -260,7 +260,7 @@ impl Integration<'_> {
         let own = square * chain.at(&chain.diagonal, block);
         let fourth = -stiffened * half_curvature / 12.0 - 0.25 * damping * third - own * second / 12.0;
         let window = self.tolerances.merged_window([second, third], length, chain.damping_rate);
-        if window * length < MIN_WINDOW * self.pace.typical_advance {
+        if window * length < MIN_WINDOW * self.control.typical_advance {
             return 0.0;
         }
         self.step.amend(chain, block, about_start([second, third, fourth], s));
@@ -279,7 +279,7 @@ impl Integration<'_> {
     /// Expands the state into the series of a step that reaches at least `horizon` or as far as events let it.
     pub(super) fn expand(&mut self, horizon: f64) -> Result<(), SimulationError> {
         let max_step = self.tolerances.max_step;
-        let wanted = self.pace.typical_advance.min(horizon).min(max_step);
+        let wanted = self.control.typical_advance.min(horizon).min(max_step);
         let (mut halvings, mut length) = (0, max_step);
         while halvings < MAX_HALVINGS && 0.5 * length >= wanted {
             halvings += 1;
@@ -287,7 +287,7 @@ impl Integration<'_> {
         }
         let Slider { chain, state, .. } = &self.slider;
         loop {
-            let min_order = self.pace.min_orders.get(halvings).copied().unwrap_or(0);
+            let min_order = self.control.min_orders.get(halvings).copied().unwrap_or(0);
             let drive = self.frame.drive_derivatives(length);
             let input = StepInput {
                 length,
@@ -298,7 +298,7 @@ impl Integration<'_> {
             };
             let step = &mut self.step;
             if self.kernels.expand(chain, state, &input, &mut step.series) {
-                self.pace.note_order(halvings, step.series.order);
+                self.control.note_order(halvings, step.series.order);
                 step.series.shear_force(drive, chain.drive_stiffness, &mut step.force);
                 step.curvature_bound = polynomial::second_derivative_bound(&step.force);
                 (step.start, step.length) = (self.frame.time, length);

@@ -1,8 +1,8 @@
 //! Taylor steps of the chain: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p).
 //!
 //! The equation of motion gives each order from the two before, Y_{p+2} = h² (A Y_p + forces) - γ h Y_{p+1}, one sweep
-//! of a tridiagonal stencil. Orders are added until two successive terms, times their order, fall under the wanted
-//! error. The sum of the terms' magnitudes bounds how far each block moves within the step.
+//! of a tridiagonal stencil. Orders are added until two successive terms, times their order, fall below the error
+//! allowed. The sum of the terms' magnitudes bounds how far each block moves within the step.
 
 use super::chain::{Chain, State};
 use super::series::{DriveDerivatives, INVERSE_FACTORIAL, Series};
@@ -18,7 +18,7 @@ const MAX_ORDER: usize = MAX_COEFFICIENTS - 1;
 pub(super) struct StepInput {
     /// Length h, in s.
     pub length: f64,
-    /// Wanted bound on the last terms, in m.
+    /// Bound that the last terms must meet, in m.
     pub error: f64,
     /// Order from which on the terms are compared with it.
     pub min_order: usize,
@@ -76,7 +76,7 @@ pub(super) fn expand<S: Simd, const R: usize>(
     order.is_some()
 }
 
-/// What makes the next order out of the last two.
+/// The recurrence from the last two orders to the next.
 struct Recurrence<'a, S: Simd> {
     simd: S,
     /// h² times the coupling and minus the diagonal.
@@ -143,7 +143,7 @@ impl<S: Simd> Recurrence<'_, S> {
     }
 }
 
-/// Adds orders to Y_0 and Y_1 until the series converges; the last one, if it does.
+/// Adds orders to Y_0 and Y_1 until the series converges. Returns the last one, if it does.
 #[inline(always)]
 fn converge_in_memory<S: Simd>(
     mut recurrence: Recurrence<'_, S>,
@@ -223,8 +223,8 @@ const FIRST_LANE: Row = {
     row
 };
 
-/// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the wanted
-/// error.
+/// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the error
+/// allowed.
 #[inline(always)]
 fn are_small<S: Simd>(simd: S, terms: &[Row], rows: usize, order: usize, error: f64) -> bool {
     let (mut in_lower, mut in_higher) = (simd.splat(0.0), simd.splat(0.0));

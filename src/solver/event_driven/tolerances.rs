@@ -10,7 +10,7 @@ const MAX_STEP: f64 = 4.0;
 const TRUNCATION_SHARE: f64 = 0.1;
 /// Multiple of the tolerance that the truncations of all steps may add up to within the slider's memory.
 const REMEMBERED_SHARE: f64 = 4.0;
-/// Steps that an undamped slider is taken to remember.
+/// Number of steps that an undamped slider is assumed to remember.
 const MAX_REMEMBERED: f64 = 1e6;
 /// Part of a step's error that one merged event may leave out: little, since these errors have one sign.
 const MERGED_SHARE: f64 = 2e-3;
@@ -27,7 +27,7 @@ pub(super) struct Tolerances {
 }
 
 impl Tolerances {
-    /// For a tolerance relative to the contact reach.
+    /// The bounds for a tolerance relative to the contact reach.
     pub fn new(parameters: &Parameters, tolerance: f64) -> Self {
         let fastest =
             largest_frequency(parameters).max(parameters.largest_modulation_frequency()).max(parameters.damping_rate);
@@ -68,7 +68,7 @@ fn truncation_share(parameters: &Parameters, max_step: f64) -> f64 {
     TRUNCATION_SHARE.min(REMEMBERED_SHARE / remembered)
 }
 
-/// A number somewhat below the N-th root of a positive one: the N-th part of its logarithm, as its bits give it.
+/// A number somewhat below the N-th root of a positive one, by dividing the logarithm that its bits approximate.
 fn root_below<const N: u64>(value: f64) -> f64 {
     const ONE: u64 = 1.0_f64.to_bits();
     0.9 * f64::from_bits(value.to_bits() / N + (ONE - ONE / N))
