@@ -41,11 +41,13 @@ impl Frame {
     }
 
     /// The present time since the start of the run, in s.
+    #[inline]
     pub fn now(&self) -> f64 {
         self.origin_time + self.time
     }
 
     /// Time since the start of the run, in s, for a time in the frame.
+    #[inline]
     pub fn absolute_time(&self, time: f64) -> f64 {
         self.origin_time + time
     }
@@ -56,22 +58,26 @@ impl Frame {
     }
 
     /// An event of the frame with time and displacement counted from the start of the run.
+    #[inline]
     pub fn absolute(&self, event: ContactEvent) -> ContactEvent {
         let time = self.absolute_time(event.time);
         ContactEvent { time, displacement: self.absolute_displacement(event.displacement), ..event }
     }
 
     /// Seconds until a time that is counted from the start of the run.
+    #[inline]
     pub fn until(&self, time: f64) -> f64 {
         time - self.origin_time - self.time
     }
 
     /// Whether an instant that is `seconds` s away has come, within rounding.
+    #[inline]
     pub fn has_come(&self, seconds: f64) -> bool {
         seconds <= 4.0 * f64::EPSILON * self.now()
     }
 
     /// Sets the time in the frame, in s.
+    #[inline]
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
         if self.drive.is_modulated() {
@@ -100,16 +106,19 @@ impl Frame {
     }
 
     /// Present phase of the modulation, in rad.
+    #[inline]
     fn phase(&self) -> f64 {
         self.drive.phase(self.origin_time) + self.drive.angular_frequency * self.time
     }
 
     /// Present displacement of the drive's ramp, without the cosine, in m.
+    #[inline]
     fn ramp(&self) -> f64 {
         self.ramp_at_origin + self.drive.velocity * self.time
     }
 
     /// F_S at a displacement of the trailing edge, in N.
+    #[inline]
     pub fn shear_force(&self, displacement: f64) -> f64 {
         self.drive.stiffness * (self.ramp() + self.swing[0] - displacement)
     }
@@ -121,6 +130,7 @@ impl Frame {
     }
 
     /// The derivatives of the drive's displacement, for a step of `length` s.
+    #[inline]
     pub fn drive_derivatives(&self, length: f64) -> DriveDerivatives {
         DriveDerivatives {
             ramp: [self.ramp(), self.drive.velocity * length],

@@ -4,11 +4,12 @@ use super::chain::{Chain, State};
 use super::chebyshev::{ChebyshevPropagator, propagate};
 use super::free_motion::{SplitMotion, split};
 use super::series::{Series, evaluate, reachable};
-#[cfg(target_arch = "x86_64")]
-use super::simd::{Avx2, Avx512};
-use super::simd::{Baseline, Simd};
+use super::simd::Simd;
 use super::taylor::{StepInput, expand};
 use crate::solver::harmonic::Harmonic;
+use pulp::Scalar512b;
+#[cfg(target_arch = "x86_64")]
+use pulp::x86::{V3, V4};
 
 /// The hot loops for one set of processor features.
 pub(super) trait Kernels {
@@ -72,17 +73,17 @@ pub(super) fn fastest(rows: usize) -> Box<dyn Kernels> {
 
 /// All loops that this processor can run for this many rows, with their names; the fastest last.
 pub(super) fn available(rows: usize) -> Vec<(&'static str, Box<dyn Kernels>)> {
-    let mut paths: Vec<(&'static str, Box<dyn Kernels>)> = vec![("baseline", Box::new(Compiled::<_, 0>(Baseline)))];
+    let mut paths: Vec<(&'static str, Box<dyn Kernels>)> = vec![("baseline", Box::new(Compiled::<_, 0>(Scalar512b)))];
     // The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.
     #[cfg(target_arch = "x86_64")]
     {
-        if let Some(avx2) = Avx2::try_new() {
+        if let Some(avx2) = V3::try_new() {
             paths.push(("AVX2", Box::new(Compiled::<_, 0>(avx2))));
             if rows == 9 {
                 paths.push(("AVX2, nine rows", Box::new(Compiled::<_, 9>(avx2))));
             }
         }
-        if let Some(avx512) = Avx512::try_new() {
+        if let Some(avx512) = V4::try_new() {
             paths.push(("AVX-512", Box::new(Compiled::<_, 0>(avx512))));
             if rows == 9 {
                 paths.push(("AVX-512, nine rows", Box::new(Compiled::<_, 9>(avx512))));

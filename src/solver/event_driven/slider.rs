@@ -25,6 +25,7 @@ impl Slider {
     }
 
     /// Displacement of a block, in m.
+    #[inline]
     pub fn displacement(&self, block: usize) -> f64 {
         self.chain.at(&self.state.displacement, block)
     }
@@ -35,6 +36,7 @@ impl Slider {
     }
 
     /// Breaks the contacts of a block that has reached a break position, at displacement `x` m.
+    #[inline]
     pub fn break_reached(&mut self, block: usize, time: f64, x: f64, log: impl FnMut(ContactEvent)) {
         let (row, lane) = self.chain.layout.slot(block);
         let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
@@ -45,6 +47,7 @@ impl Slider {
     }
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
+    #[inline]
     pub fn attach_next(&mut self, x: f64) -> ContactEvent {
         let event = self.interface.reattach_next(x);
         self.chain.update(event.block, &self.interface);

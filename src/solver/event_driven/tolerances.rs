@@ -42,6 +42,7 @@ impl Tolerances {
     /// How far in a step of `length` s the terms of higher order that follow from an event's δ2 and δ3, in m, stay
     /// under the error of a step. At the fastest frequency ω they are at most (ωh)² (δ3/20 + γh δ2/60) ξ⁵ and (ωh)⁴
     /// δ2/720 ξ⁶.
+    #[inline]
     pub fn merged_window(&self, [second, third]: [f64; 2], length: f64, damping_rate: f64) -> f64 {
         let angle = MAX_STEP * length / self.max_step;
         let square = angle * angle;
