@@ -289,13 +289,7 @@ impl Integration<'_> {
         loop {
             let min_order = self.control.min_orders.get(halvings).copied().unwrap_or(0);
             let drive = self.frame.drive_derivatives(length);
-            let input = StepInput {
-                length,
-                error: self.tolerances.step_error,
-                min_order,
-                pulling: chain.drive_stiffness / chain.mass,
-                drive,
-            };
+            let input = StepInput { length, error: self.tolerances.step_error, min_order, drive };
             let step = &mut self.step;
             if self.kernels.expand(chain, state, &input, &mut step.series) {
                 self.control.note_order(halvings, step.series.order);

@@ -22,8 +22,6 @@ pub(super) struct StepInput {
     pub error: f64,
     /// Order from which on the terms are compared with it.
     pub min_order: usize,
-    /// `K_d/m`, in 1/s².
-    pub pulling: f64,
     /// The drive's displacement.
     pub drive: DriveDerivatives,
 }
@@ -64,7 +62,7 @@ pub(super) fn expand<S: Simd, const R: usize>(
         pull: &chain.pull[..rows],
         square,
         damping: simd.splat(-chain.damping_rate * input.length),
-        pulling: input.length * input.length * input.pulling,
+        pulling: input.length * input.length * (chain.drive_stiffness / chain.mass),
         drive: input.drive,
     };
     let order = if R > 0 && S::HAS_MANY_REGISTERS {
