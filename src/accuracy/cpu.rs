@@ -8,19 +8,14 @@ use crate::table::columns::columns;
 pub fn thread_seconds() -> f64 {
     #[cfg(unix)]
     {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: the pointer is to a timespec of our own, and the call keeps none.
-        let failed = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-        if failed == 0 {
-            return time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64;
-        }
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
     }
-    clock_seconds()
-}
-
-fn clock_seconds() -> f64 {
-    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    #[cfg(not(unix))]
+    {
+        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+        BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    }
 }
 
 /// CPU seconds of the calling thread that a computation takes, and its result.

@@ -19,7 +19,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Description, Parameters, Symbol, Value};
 use stickslip::observe::{
-    AttachedMap, ContactLog, Measurements, Profile, Recording, RecordingKey, SlipObserver, Together, Trace,
+    AttachedMap, ContactLog, Measurements, Observers, Profile, Recording, RecordingKey, SlipObserver, Trace,
 };
 use stickslip::results::tables;
 use stickslip::results::tables::{Drive, SlipRow};
@@ -227,7 +227,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     }
     let never = AtomicBool::new(false);
     let begin = Instant::now();
-    let mut observer = Together { lead: &mut slips, others };
+    let mut observer = Observers { lead: &mut slips, others };
     let summary = solver::simulate(parameters, sweep.solver(), sweep.recording().limits(&never), &mut observer)?;
     let wall = begin.elapsed().as_secs_f64();
     let result = Measurements::new(slips, summary);

@@ -3,8 +3,8 @@
 //! Method: `ChaCha8`; the key is the seed, the stream is the contact's index, the word position is [`WORDS_PER_DRAW`] ×
 //! generation. A threshold that is not positive is drawn again [`REDRAW_STRIDE`] words further on, so that no draw
 //! depends on another. Normal deviates come from the inverse of the normal distribution (M. J. Wichura, algorithm AS
-//! 241, Appl. Statist. 37, 477, 1988), exponential ones from a logarithm, with `libm`'s functions: the same bits on every
-//! machine. Contract: the mapping is pinned by known-answer tests; changing it changes [`RNG_SCHEME`].
+//! 241, Appl. Statist. 37, 477, 1988), exponential ones from a logarithm, with `libm`'s functions: the same bits on
+//! every machine. Contract: the mapping is pinned by known-answer tests; changing it changes [`RNG_SCHEME`].
 
 use super::Parameters;
 use rand_chacha::ChaCha8Rng;
@@ -16,10 +16,10 @@ pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
 
 /// 32-bit words that one draw takes from its stream: two uniform deviates of 64 bits.
 const WORDS_PER_DRAW: u128 = 4;
-/// Generations in one refill of 64 words, the four blocks that the generator makes at a time anyway.
+/// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
 const DRAWS_PER_REFILL: u32 = 16;
 type Draws = [Draw; DRAWS_PER_REFILL as usize];
-/// Draws whose arithmetic goes side by side.
+/// Draws that are computed side by side.
 const SIDE_BY_SIDE: usize = 4;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
@@ -90,7 +90,8 @@ impl Disorder {
         }
     }
 
-    /// Draws the generations of a contact from `first` on; apart from [`Self::draw`], which is called far more often.
+    /// Draws the generations of a contact from `first` on. Not inlined in [`Self::draw`], which is called far more
+    /// often.
     #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
@@ -138,8 +139,8 @@ fn uniform(word: u64) -> f64 {
     (((word >> 11) as f64 + 0.5) * UNIFORM_STEP).min(1.0 - UNIFORM_STEP)
 }
 
-/// Quantiles of the standard normal distribution, to about 1e-16 (AS 241, PPND16). Most lie in the central part, where all are
-/// taken first, side by side.
+/// Quantiles of the standard normal distribution, to about 1e-16 (AS 241, PPND16). Most lie in the central part, where
+/// all are taken first, side by side.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
 fn standard_normal_quantiles<const COUNT: usize>(probabilities: [f64; COUNT]) -> [f64; COUNT] {
     const CENTRAL_NUMERATOR: [f64; 8] = [
@@ -319,7 +320,7 @@ mod tests {
     fn thresholds_that_are_not_positive_are_drawn_again() {
         let parameters = Parameters { threshold_deviation: 1.37, ..Parameters::default() };
         let mut disorder = Disorder::new(&parameters);
-        let least = (0..1400).map(|c| disorder.draw(c, 0).threshold).fold(f64::INFINITY, f64::min);
-        assert!(least > 0.0);
+        let smallest = (0..1400).map(|c| disorder.draw(c, 0).threshold).fold(f64::INFINITY, f64::min);
+        assert!(smallest > 0.0);
     }
 }

@@ -1,8 +1,9 @@
 //! The drive: a ramp and a cosine, u(t) = V0 t + Δ (cos(2πt/T) - 1), so that the shear force starts at zero.
 //!
 //! T and Δ may themselves be ramped, cycle by cycle: each cycle starts at a maximum, at t_c, and is a plain cosine,
-//! u(t) = V0 t + Δ_c (cos(2π (t - t_c)/T_c) - 1), with the T_c and Δ_c that the ramp has at t_c. So u and u' are continuous
-//! where cycles join. The [`Drive`] is that of one cycle, the one in force; without a ramp, and after it, a cycle has no end.
+//! u(t) = V0 t + Δ_c (cos(2π (t - t_c)/T_c) - 1), with the T_c and Δ_c that the ramp has at t_c. So u and u' are
+//! continuous where cycles join. A [`Drive`] is that of one cycle, the present one; without a ramp, and after it, a
+//! cycle has no end.
 
 use super::Parameters;
 use super::theory::eta;
@@ -28,10 +29,10 @@ pub struct Drive {
     ramp: Option<Ramp>,
 }
 
-/// Period and amplitude on their linear way to the turning point and back.
+/// A linear ramp of period and amplitude to the turning point and back.
 #[derive(Clone, Copy, Debug)]
 struct Ramp {
-    /// Duration of either way, in s.
+    /// Duration in either direction, in s.
     time: f64,
     /// At the start and at the turning point: period in s, amplitude in m.
     period: [f64; 2],
@@ -51,10 +52,10 @@ impl Ramp {
 
     /// Period in s and amplitude in m at a time in s.
     fn at(&self, time: f64) -> (f64, f64) {
-        let way = time / self.time;
-        let turned = if way <= 1.0 { way } else { (2.0 - way).max(0.0) };
-        // So weighed, both ends are met exactly, and nothing between them falls to zero.
-        let between = |[start, turning]: [f64; 2]| (1.0 - turned) * start + turned * turning;
+        let elapsed = time / self.time;
+        let fraction = if elapsed <= 1.0 { elapsed } else { (2.0 - elapsed).max(0.0) };
+        // With these weights both ends are met exactly, and nothing between them is zero.
+        let between = |[start, turning]: [f64; 2]| (1.0 - fraction) * start + fraction * turning;
         (between(self.period), between(self.amplitude))
     }
 
@@ -81,7 +82,7 @@ impl Drive {
         }
     }
 
-    /// Goes on to the next cycle, if there is one.
+    /// Begins the next cycle, if there is one.
     pub fn next_cycle(&mut self) {
         let Some(ramp) = self.ramp else { return };
         let start = self.cycle_end;
@@ -91,7 +92,7 @@ impl Drive {
         self.cycle_end = if ramp.is_over(start) { f64::INFINITY } else { start + self.period };
     }
 
-    /// Goes on to the cycle at a time in s, which is not before the one in force.
+    /// Advances to the cycle at a time in s, which is not before the present one.
     pub fn advance_to(&mut self, time: f64) {
         while time >= self.cycle_end {
             self.next_cycle();
@@ -110,7 +111,8 @@ impl Drive {
         eta(self.angular_frequency, self.amplitude, self.velocity)
     }
 
-    /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long runs.
+    /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long
+    /// runs.
     #[must_use]
     pub fn phase(&self, time: f64) -> f64 {
         if self.is_modulated() { TAU * ((time - self.cycle_start) / self.period).fract() } else { 0.0 }

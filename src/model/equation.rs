@@ -97,8 +97,8 @@ impl StiffnessMatrix {
         below
     }
 
-    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite if an
-    /// entry has overflowed.
+    /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite
+    /// if an entry has overflowed.
     #[must_use]
     pub fn eigenvalue(&self, index: usize) -> f64 {
         let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();

@@ -1,10 +1,11 @@
 //! The interface: the contacts between the blocks and the substrate, and what each block feels of them.
 //!
 //! A block's contacts act together: force on block j = (Σ k_i a_i) - (Σ k_i) x_j over its attached contacts, so a step
-//! costs O(N). Single contacts are looked at only when the block reaches its nearest break position or a reattachment
+//! costs O(N). Single contacts are examined only when the block reaches its nearest break position or a reattachment
 //! is due. Contract: decisions are by contact identity; simultaneous events go in the order of blocks, then contacts.
 
 use super::disorder::Contact;
+use super::lanes::{LANES, Row};
 use super::{BreakOn, Disorder, Parameters};
 use std::array;
 use std::cmp::Reverse;
@@ -66,23 +67,20 @@ impl Due {
     }
 }
 
-/// Width in which sums over the contacts of a block are taken: fixed, so that their rounding does not depend on the
-/// processor.
-const LANES: usize = 8;
-
-/// Times eight bytes that are 0 or 1 each: their bits in the highest byte, in order.
+/// Eight bytes that are 0 or 1 each, times this, hold their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
-/// Eight contacts of a block, side by side in memory as they are looked at. Those beyond the last stay detached for ever.
+/// The contacts of a row, side by side in memory as they are read: contact i of a block lies in row i div 8 of the
+/// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-struct Row {
+struct ContactRow {
     /// Stiffness while attached, else 0.
-    attached_stiffness: [f64; LANES],
-    anchor: [f64; LANES],
+    attached_stiffness: Row,
+    anchor: Row,
     /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
-    upper: [f64; LANES],
-    lower: [f64; LANES],
+    upper: Row,
+    lower: Row,
     /// The present life, or, while detached, the next.
     life: [Contact; LANES],
     generation: [u32; LANES],
@@ -96,7 +94,7 @@ pub struct Interface {
     break_on: BreakOn,
     disorder: Disorder,
     /// The rows of the first block, then of the second, and so on.
-    rows: Vec<Row>,
+    rows: Vec<ContactRow>,
     reattachments: BinaryHeap<Reverse<Due>>,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
@@ -114,11 +112,11 @@ impl Interface {
     pub fn new(parameters: &Parameters) -> Self {
         let blocks = parameters.blocks;
         let rows_per_block = parameters.contacts_per_block.div_ceil(LANES);
-        let detached = Row {
-            attached_stiffness: [0.0; LANES],
-            anchor: [0.0; LANES],
-            upper: [f64::INFINITY; LANES],
-            lower: [f64::NEG_INFINITY; LANES],
+        let detached = ContactRow {
+            attached_stiffness: Row::filled(0.0),
+            anchor: Row::filled(0.0),
+            upper: Row::filled(f64::INFINITY),
+            lower: Row::filled(f64::NEG_INFINITY),
             life: [Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; LANES],
             generation: [0; LANES],
         };
@@ -168,7 +166,7 @@ impl Interface {
     /// Attaches the contact that is due next, unstressed where its block is at that moment.
     ///
     /// # Panics
-    /// When nothing is due: a mistake of the solver.
+    /// When nothing is due: a bug in the solver.
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.block(), due.contact as usize);
@@ -180,13 +178,13 @@ impl Interface {
     }
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
-    /// tells each to `log`.
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is looked at in vectors")]
+    /// passes each to `log`.
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
-        // So many rows as have a bit for each contact.
+        // As many rows at a time as have a bit for each contact.
         for start in (0..self.rows_per_block).step_by(LANES) {
             let mut reached = 0_u64;
-            for (row, Row { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
+            for (row, ContactRow { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
                 let in_row: [u8; LANES] =
                     array::from_fn(|lane| u8::from((upper[lane] <= displacement) | (lower[lane] >= displacement)));
                 reached |= (u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56) << (LANES * row);
@@ -194,7 +192,7 @@ impl Interface {
             while reached != 0 {
                 let contact = LANES * start + reached.trailing_zeros() as usize;
                 if contact >= self.contacts_per_block {
-                    // A displacement that is not finite reaches what no contact has.
+                    // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
                 log(self.event(block, contact, time, displacement, Change::Break));
@@ -208,7 +206,7 @@ impl Interface {
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
         for row in &mut self.rows {
-            for position in row.anchor.iter_mut().chain(&mut row.upper).chain(&mut row.lower) {
+            for position in row.anchor.iter_mut().chain(row.upper.iter_mut()).chain(row.lower.iter_mut()) {
                 *position -= shift;
             }
         }
@@ -222,7 +220,7 @@ impl Interface {
         let due = std::mem::take(&mut self.reattachments);
         self.reattachments = due
             .into_iter()
-            // Not negative, whatever rounding does: see `Due`.
+            // Not negative, whatever rounding does; see `Due`.
             .map(|Reverse(due)| Reverse(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due }))
             .collect();
     }
@@ -230,7 +228,7 @@ impl Interface {
     /// Elastic energy in the attached contacts for given displacements in m, in J.
     #[must_use]
     pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
-        let of_row = |displacement: f64, row: &Row| -> [f64; LANES] {
+        let of_row = |displacement: f64, row: &ContactRow| -> [f64; LANES] {
             array::from_fn(|lane| {
                 let elongation = displacement - row.anchor[lane];
                 0.5 * row.attached_stiffness[lane] * elongation * elongation
@@ -245,13 +243,13 @@ impl Interface {
         (block * self.rows_per_block + contact / LANES, contact % LANES)
     }
 
-    fn rows_of(&self, block: usize) -> &[Row] {
+    fn rows_of(&self, block: usize) -> &[ContactRow] {
         &self.rows[block * self.rows_per_block..][..self.rows_per_block]
     }
 
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
         let (row, lane) = self.place(block, contact);
-        let Row { life, generation, anchor, .. } = &self.rows[row];
+        let ContactRow { life, generation, anchor, .. } = &self.rows[row];
         let Contact { threshold, stiffness, .. } = life[lane];
         ContactEvent {
             time,
@@ -266,7 +264,7 @@ impl Interface {
         }
     }
 
-    /// Begins a life of a contact; returns where it breaks, above and below.
+    /// Begins a life of a contact. Returns the positions above and below at which it breaks.
     fn attach(&mut self, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
         let row = &mut self.rows[row];
@@ -293,39 +291,32 @@ impl Interface {
         self.reattachments.push(Reverse(Due::new(time + row.life[lane].delay, block, contact)));
     }
 
-    /// Takes the sums and nearest break positions of a block anew.
+    /// Computes the sums and nearest break positions of a block again.
     fn gather(&mut self, block: usize) {
         self.sum(block);
-        let (mut upper, mut lower) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
         for row in self.rows_of(block) {
             for lane in 0..LANES {
                 upper[lane] = if row.upper[lane] < upper[lane] { row.upper[lane] } else { upper[lane] };
                 lower[lane] = if row.lower[lane] > lower[lane] { row.lower[lane] } else { lower[lane] };
             }
         }
-        self.block_upper[block] = across(upper, |a, b| if a < b { a } else { b });
-        self.block_lower[block] = across(lower, |a, b| if a > b { a } else { b });
+        self.block_upper[block] = upper.reduce(|a, b| if a < b { a } else { b });
+        self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
     }
 
-    /// Takes the sums of a block anew, in fixed lanes.
+    /// Computes the sums of a block again, in fixed lanes.
     fn sum(&mut self, block: usize) {
-        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
+        let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
         for row in self.rows_of(block) {
             for lane in 0..LANES {
                 stiffness[lane] += row.attached_stiffness[lane];
                 pull[lane] += row.attached_stiffness[lane] * row.anchor[lane];
             }
         }
-        self.block_stiffness[block] = across(stiffness, |a, b| a + b);
-        self.block_pull[block] = across(pull, |a, b| a + b);
+        self.block_stiffness[block] = stiffness.reduce(|a, b| a + b);
+        self.block_pull[block] = pull.reduce(|a, b| a + b);
     }
-}
-
-/// Puts lanes together in pairs.
-#[inline(always)]
-fn across(l: [f64; LANES], together: impl Fn(f64, f64) -> f64) -> f64 {
-    let halves: [f64; LANES / 2] = array::from_fn(|i| together(l[i], l[i + LANES / 2]));
-    together(together(halves[0], halves[2]), together(halves[1], halves[3]))
 }
 
 #[cfg(test)]
@@ -334,7 +325,7 @@ mod tests {
 
     #[test]
     fn a_block_breaks_what_is_reached_in_the_order_of_contacts() {
-        // More contacts than bits that are looked at together.
+        // More contacts than are tested together.
         let parameters =
             Parameters { blocks: 2, contacts_per_block: 150, threshold_deviation: 0.4, ..Parameters::default() };
         let whole = Interface::new(&parameters);

@@ -5,6 +5,7 @@ mod drive;
 pub mod equation;
 pub(crate) mod fields;
 mod interface;
+mod lanes;
 mod parameters;
 pub mod theory;
 pub(crate) mod value;
@@ -13,6 +14,7 @@ pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactEvent, Interface};
+pub(crate) use lanes::{LANES, Row};
 pub use parameters::{ParameterError, Parameters, Symbol};
 #[cfg(feature = "sweeps")]
 pub(crate) use value::Shortest;

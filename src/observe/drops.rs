@@ -153,13 +153,13 @@ mod tests {
         let swing = |start: f64, duration: f64, slid: f64| Segment {
             start,
             duration,
-            path: crate::solver::ForcePath::Harmonic {
+            path: crate::solver::ForcePath::Harmonic(crate::solver::Harmonic {
                 start: stiffness * (drive.velocity * start - amplitude - slid),
                 rate: stiffness * drive.velocity,
                 amplitude: stiffness * amplitude,
                 phase: drive.phase(start),
                 angular_frequency: drive.angular_frequency,
-            },
+            }),
         };
         // Three periods at rest; then, from the middle of a fall on, slid by 0.3 µm: 12 N.
         let mut detector = DropDetector::new(&parameters, 5.0);

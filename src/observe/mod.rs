@@ -15,5 +15,5 @@ pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use recording::{Recording, RecordingKey};
 pub use rupture::{Rupture, advance_speed};
-pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Profile, ProfileRow, Together, Trace, TraceRow};
+pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
 pub use slip::{Modulation, Precursor, Slip, SlipObserver};

@@ -4,15 +4,15 @@ use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
-/// Several observers in step; the first decides when it is enough.
-pub struct Together<'a> {
+/// Several observers of one run; the first decides when it has seen enough.
+pub struct Observers<'a> {
     /// The observer that decides.
     pub lead: &'a mut dyn Observer,
     /// Those that follow.
     pub others: Vec<&'a mut dyn Observer>,
 }
 
-impl Observer for Together<'_> {
+impl Observer for Observers<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
         self.lead.advance(segment);
         self.others.iter_mut().for_each(|other| other.advance(segment));

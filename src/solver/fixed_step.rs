@@ -1,9 +1,9 @@
 //! Fixed step: explicit velocity-Verlet with damping, contacts tested after each step.
 //!
 //! Source: the textbook scheme (Verlet 1967; Swope et al. 1982), the damping taken half before and half after the
-//! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract: first-order
-//! errors in the times of events, second-order between them; O(N) work per step through the block sums. It is kept
-//! plain: the baseline of speed, and a witness for the other solver.
+//! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract:
+//! first-order errors in the times of events, second-order between them; O(N) work per step through the block sums. It
+//! is kept plain: the baseline of speed, and a witness for the other solver.
 
 use super::ledger::Audit;
 use super::polynomial;
@@ -12,7 +12,7 @@ use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
 use std::sync::atomic::Ordering;
 
-/// Steps between two looks at the interrupt flag and at the state's finiteness.
+/// Steps between two checks of the interrupt flag and of whether the state is finite.
 const STEPS_PER_CHECK: u64 = 4096;
 
 /// Displacements, velocities and accelerations of the blocks, in m, m/s, m/s².
@@ -46,7 +46,15 @@ impl Motion {
     }
 
     /// Enters the energies at the end into an audit.
-    fn settle(&self, audit: &mut Audit, interface: &Interface, drive: &Drive, time: f64, coupling: f64, mass: f64) {
+    fn record_final_energy(
+        &self,
+        audit: &mut Audit,
+        interface: &Interface,
+        drive: &Drive,
+        time: f64,
+        coupling: f64,
+        mass: f64,
+    ) {
         let x = &self.displacement[..];
         let stretched: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
         let pulled = drive.motion(time).0 - x[0];
@@ -102,7 +110,7 @@ pub(super) fn run(
             *x += time_step * *v;
         }
         if let Some(audit) = &mut audit {
-            // The velocities of now are those of the middle of the step.
+            // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
             audit.damping += mass * parameters.damping_rate * time_step * squares;
         }
@@ -118,8 +126,9 @@ pub(super) fn run(
         let [constant, linear, square, cube] = coefficients;
         let integral = constant + 0.5 * linear + square / 3.0 + 0.25 * cube;
         let ends = [ForceAt { force, integral: 0.0 }, ForceAt { force: next_force, integral }];
-        let bend = polynomial::second_derivative_bound(&coefficients);
-        let path = ForcePath::Polynomial { coefficients: &coefficients, bend, first: 0.0, scale: time_step, ends };
+        let curvature_bound = polynomial::second_derivative_bound(&coefficients);
+        let path =
+            ForcePath::Polynomial { coefficients: &coefficients, curvature_bound, first: 0.0, scale: time_step, ends };
         observer.advance(&Segment { start, duration: time_step, path });
         (force, force_rate) = (next_force, next_rate);
         summary.end_time = time;
@@ -145,7 +154,7 @@ pub(super) fn run(
         return Err(SimulationError::NotFinite { time: summary.end_time });
     }
     if let Some(audit) = audit {
-        motion.settle(audit, &interface, &drive, summary.end_time, coupling, mass);
+        motion.record_final_energy(audit, &interface, &drive, summary.end_time, coupling, mass);
     }
     observer.end(summary.end_time, &motion.displacement);
     Ok(summary)

@@ -1,19 +1,19 @@
 //! The energy ledger: what the drive put in, against what is stored and what was lost.
 //!
-//! The work of the drive, ∫ F_S u' dt, equals the elastic and kinetic energy at the end (both are zero at the start) and
-//! the losses in damping, ∫ mγ Σ v² dt, and in breaking contacts, f²/2k each. Work and breaks are read off the segments and
-//! events that every observer sees, by Gauss-Legendre quadrature or in closed form; the rest comes from the solver. A
-//! break found late, a contact attached stressed or a series cut short all show as a residual.
+//! The work of the drive, ∫ F_S u' dt, equals the elastic and kinetic energy at the end (both are zero at the start)
+//! and the losses in damping, ∫ mγ Σ v² dt, and in breaking contacts, f²/2k each. Work and breaks are read off the
+//! segments and events that every observer sees, by Gauss-Legendre quadrature or in closed form; the rest comes from
+//! the solver. A break found late, a contact attached stressed or a series cut short all show as a residual.
 //!
-//! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered as
-//! such; [`Ledger::left_out`] tells how much that was. Where a leap carries the free motion on, it is resolved once more for
-//! its damping and for the work on it, which the segment of the leap does not show.
+//! A leap drops the free motion about the driven solution. Its energy is what damping would have taken, and is entered
+//! as such; [`Ledger::left_out`] reports how much that was. Where a leap carries the free motion on, it is resolved
+//! again for its damping and for the work on it, which the segment of the leap does not show.
 
+use super::harmonic::Harmonic;
 use super::quadrature::Quadrature;
 use super::segment::{ForcePath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use std::f64::consts::TAU;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
 const NODES_FOR_DRIVE: usize = 8;
@@ -96,7 +96,7 @@ impl Observer for Meter<'_> {
     }
 }
 
-/// Runs a solver with an audit and draws up the ledger.
+/// Runs a solver with an audit and returns the ledger.
 pub(super) fn audited(
     parameters: &Parameters,
     observer: &mut dyn Observer,
@@ -131,17 +131,18 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             };
             segment.duration * nodes.iter().map(|&(s, weight)| weight * power(s)).sum::<f64>()
         }
-        ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
-            // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + turned)) dτ, term by term.
-            let turned = drive.phase(segment.start);
-            let angle = TAU * (segment.duration * angular_frequency / TAU).fract();
-            let (sine, cosine) = libm::sincos(angle + turned);
-            let (sine_before, cosine_before) = libm::sincos(turned);
+        ForcePath::Harmonic(harmonic) => {
+            let Harmonic { start, rate, amplitude, phase, angular_frequency } = harmonic;
+            // ∫ (start + rate τ + amplitude cos(ωτ + phase)) (-Δω sin(ωτ + drive_phase)) dτ, term by term.
+            let drive_phase = drive.phase(segment.start);
+            let angle = harmonic.turn(segment.duration);
+            let (sine, cosine) = libm::sincos(angle + drive_phase);
+            let (sine_before, cosine_before) = libm::sincos(drive_phase);
             let ramp = (start + rate * segment.duration) * cosine
                 - start * cosine_before
                 - rate / angular_frequency * (sine - sine_before);
-            let beat = 0.25 * (libm::cos(2.0 * angle + phase + turned) - libm::cos(phase + turned));
-            let drift = 0.5 * angular_frequency * segment.duration * libm::sin(turned - phase);
+            let beat = 0.25 * (libm::cos(2.0 * angle + phase + drive_phase) - libm::cos(phase + drive_phase));
+            let drift = 0.5 * angular_frequency * segment.duration * libm::sin(drive_phase - phase);
             drive.velocity * segment.impulse() + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
     }
@@ -151,7 +152,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
 mod tests {
     use super::*;
 
-    /// A modulated drive, and the rule to judge the closed form by.
+    /// A modulated drive, and the rule to check the closed form against.
     fn modulated() -> (Drive, Quadrature) {
         let parameters =
             Parameters { modulation_amplitude: 1e-6, modulation_period: Some(1.0 / 58.0), ..Parameters::default() };
@@ -161,13 +162,9 @@ mod tests {
     #[test]
     fn work_over_a_leap_is_that_of_many_short_quadratures() {
         let (drive, quadrature) = modulated();
-        let path = ForcePath::Harmonic {
-            start: 120.0,
-            rate: 3e3,
-            amplitude: 38.0,
-            phase: 0.7,
-            angular_frequency: drive.angular_frequency,
-        };
+        let angular_frequency = drive.angular_frequency;
+        let path =
+            ForcePath::Harmonic(Harmonic { start: 120.0, rate: 3e3, amplitude: 38.0, phase: 0.7, angular_frequency });
         let segment = Segment { start: 0.3, duration: 0.07, path };
         let pieces = 200;
         let width = segment.duration / f64::from(pieces);

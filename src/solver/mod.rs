@@ -1,15 +1,17 @@
-//! Solvers: advance a model from contact event to contact event and tell an observer what happened.
+//! Solvers: advance a model from contact event to contact event and report to an observer what happens.
 //!
-//! The one door is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear force as
-//! a closed-form function of time. Nothing that it sees tells which solver runs.
+//! The entry point is [`simulate`]. An [`Observer`] sees contact events and, between them, [`Segment`]s: the shear
+//! force as a closed-form function of time. Nothing that it sees depends on which solver runs.
 
 mod event_driven;
 mod fixed_step;
+mod harmonic;
 mod ledger;
 mod polynomial;
 mod quadrature;
 mod segment;
 
+pub use harmonic::Harmonic;
 pub use ledger::Ledger;
 pub use segment::{ForcePath, Segment};
 
@@ -24,7 +26,7 @@ use std::sync::atomic::AtomicBool;
 pub enum Solver {
     /// From contact event to contact event, exact within the tolerance.
     EventDriven {
-        /// Error of displacement that is aimed at, relative to the contact reach f_s/k. 1e-12 to 1e-2.
+        /// Target for the error of displacement, relative to the contact reach f_s/k. 1e-12 to 1e-2.
         tolerance: f64,
     },
     /// Explicit velocity-Verlet with damping, contacts tested after each step.
@@ -63,7 +65,7 @@ impl Solver {
 /// Tolerances of the event-driven solver that make sense: rounding lies below, other physics above.
 pub const TOLERANCES: RangeInclusive<f64> = 1e-12..=1e-2;
 
-/// What follows a simulation and says when it has seen enough.
+/// Follows a simulation and says when it has seen enough.
 pub trait Observer {
     /// Time passes without a contact event. Segments come in order and without gaps.
     fn advance(&mut self, segment: &Segment<'_>);
@@ -74,8 +76,8 @@ pub trait Observer {
     /// Whether the simulation may end. Asked after each segment and its events.
     fn is_satisfied(&self) -> bool;
 
-    /// The simulation has ended, at a time in s, with the blocks at these displacements in m. Told once, and only if nothing
-    /// went wrong.
+    /// The simulation has ended, at a time in s, with the blocks at these displacements in m. Called once, and only if
+    /// nothing went wrong.
     fn end(&mut self, time: f64, displacement: &[f64]) {
         let _ = (time, displacement);
     }
@@ -121,7 +123,11 @@ pub enum SimulationError {
         limit: f64,
     },
     /// The tolerance is out of range.
-    #[error("tolerance = {tolerance:e}: must lie from {:e} to {:e}, relative to fs/k", TOLERANCES.start(), TOLERANCES.end())]
+    #[error(
+        "tolerance = {tolerance:e}: must lie from {:e} to {:e}, relative to fs/k",
+        TOLERANCES.start(),
+        TOLERANCES.end()
+    )]
     BadTolerance {
         /// The refused tolerance.
         tolerance: f64,
@@ -145,7 +151,8 @@ pub enum SimulationError {
     },
     /// More contact events than allowed.
     #[error(
-        "at t = {time} s: {events} contact events, the most allowed; raise the budget (record.max_events) if they are wanted"
+        "at t = {time} s: {events} contact events, the most allowed; raise the budget (record.max_events) if they are \
+         wanted"
     )]
     EventBudget {
         /// Model time, in s.
@@ -174,7 +181,8 @@ pub fn simulate(
     run(parameters, solver, limits, observer, None)
 }
 
-/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last bit.
+/// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last
+/// bit.
 ///
 /// # Errors
 /// As [`simulate`].

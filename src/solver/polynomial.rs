@@ -1,34 +1,34 @@
-//! Polynomials on [0, 1], given by their coefficients: values, and extremes that no wiggle escapes.
+//! Polynomials on [0, 1], given by their coefficients: values, and extremes, none of which is missed.
 //!
 //! Method: `Σ_{p>=1} |c_p| w^p` bounds the excursion from the middle of an interval of half-width w. An interval where
-//! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most one,
-//! found by Newton's method; any other is halved.
+//! the derivative keeps its sign by that bound holds no extreme; one where the second derivative does holds at most
+//! one, found by Newton's method; any other is halved.
 
 /// Largest number of coefficients that [`maximum`] takes.
-pub(crate) const MOST_COEFFICIENTS: usize = 33;
+pub(crate) const MAX_COEFFICIENTS: usize = 33;
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
-const DEEPEST: u32 = 40;
+const MAX_HALVINGS: u32 = 40;
 
 /// A Newton step below this part of its argument leaves an error of the order of its square: rounding.
 const QUADRATIC: f64 = 1e-9;
 
 /// 1/p; 0 for p = 0.
-pub(crate) const INVERSE: [f64; MOST_COEFFICIENTS] = {
-    let mut inverse = [0.0; MOST_COEFFICIENTS];
+pub(crate) const INVERSE: [f64; MAX_COEFFICIENTS] = {
+    let mut inverse = [0.0; MAX_COEFFICIENTS];
     let mut p = 1;
-    while p < MOST_COEFFICIENTS {
+    while p < MAX_COEFFICIENTS {
         inverse[p] = 1.0 / p as f64;
         p += 1;
     }
     inverse
 };
 
-/// p (p-1).
-const TWICE_DERIVED: [f64; MOST_COEFFICIENTS] = {
-    let mut factors = [0.0; MOST_COEFFICIENTS];
+/// p (p-1): factors of the second derivative.
+const SECOND_DERIVATIVE: [f64; MAX_COEFFICIENTS] = {
+    let mut factors = [0.0; MAX_COEFFICIENTS];
     let mut p = 2;
-    while p < MOST_COEFFICIENTS {
+    while p < MAX_COEFFICIENTS {
         factors[p] = (p * (p - 1)) as f64;
         p += 1;
     }
@@ -63,25 +63,25 @@ pub(crate) fn value_and_slope(coefficients: &[f64], s: f64) -> (f64, f64) {
 pub(crate) fn second_derivative_bound(coefficients: &[f64]) -> f64 {
     let (pairs, rest) = coefficients.as_chunks::<2>();
     let mut sums = [0.0; 2];
-    for (pair, factors) in pairs.iter().zip(TWICE_DERIVED.as_chunks::<2>().0) {
+    for (pair, factors) in pairs.iter().zip(SECOND_DERIVATIVE.as_chunks::<2>().0) {
         for i in 0..2 {
             sums[i] += factors[i] * pair[i].abs();
         }
     }
-    let last = rest.first().map_or(0.0, |c| TWICE_DERIVED[coefficients.len() - 1] * c.abs());
+    let last = rest.first().map_or(0.0, |c| SECOND_DERIVATIVE[coefficients.len() - 1] * c.abs());
     (sums[0] + last) + sums[1]
 }
 
-/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in [`value`],
-/// with the derivatives of both sums by s².
+/// The first three coefficients in the variable s - `centre`: value, slope, and half the second derivative. As in
+/// [`value`], with the derivatives of both sums by s².
 pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     let square = centre * centre;
     let (pairs, rest) = coefficients.as_chunks::<2>();
     let mut sums = [rest.first().copied().unwrap_or(0.0), 0.0];
-    let (mut slopes, mut bends) = ([0.0; 2], [0.0; 2]);
+    let (mut slopes, mut half_curvatures) = ([0.0; 2], [0.0; 2]);
     for pair in pairs.iter().rev() {
         for i in 0..2 {
-            bends[i] = bends[i] * square + slopes[i];
+            half_curvatures[i] = half_curvatures[i] * square + slopes[i];
             slopes[i] = slopes[i] * square + sums[i];
             sums[i] = sums[i] * square + pair[i];
         }
@@ -90,19 +90,19 @@ pub(crate) fn expanded(coefficients: &[f64], centre: f64) -> [f64; 3] {
     [
         along(sums),
         sums[1] + 2.0 * centre * along(slopes),
-        slopes[0] + 3.0 * centre * slopes[1] + 4.0 * square * along(bends),
+        slopes[0] + 3.0 * centre * slopes[1] + 4.0 * square * along(half_curvatures),
     ]
 }
 
-/// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value and to
-/// the slope.
+/// `Σ_{p>=2} |c_p|` and `Σ_{p>=2} p |c_p|`: bounds on [0, 1] for what the terms beyond the linear one add to the value
+/// and to the slope.
 pub(crate) fn beyond_linear(coefficients: &[f64]) -> (f64, f64) {
-    let (mut strays, mut slope_varies) = (0.0, 0.0);
+    let (mut value_spread, mut slope_spread) = (0.0, 0.0);
     for c in coefficients.iter().skip(2).rev() {
-        strays += c.abs();
-        slope_varies += strays;
+        value_spread += c.abs();
+        slope_spread += value_spread;
     }
-    (strays, slope_varies + strays)
+    (value_spread, slope_spread + value_spread)
 }
 
 /// `Σ c_p s^p`, and its integral from 0 to s, `Σ c_p s^(p+1)/(p+1)`.
@@ -135,23 +135,23 @@ pub(crate) fn maximum(coefficients: &[f64], first: f64, last: f64) -> (f64, f64)
     best
 }
 
-/// Where the derivative changes its sign on [`first`, `last`], in order. Nowhere, if a coefficient is not finite: halving
-/// would not end before its last depth.
+/// Where the derivative changes its sign on [`first`, `last`], in order. Nowhere, if a coefficient is not finite:
+/// halving would not end before its last depth.
 pub(crate) fn for_each_turn(coefficients: &[f64], first: f64, last: f64, found: &mut impl FnMut(f64)) {
     let order = coefficients.len() - 1;
-    let mut derivative = [0.0; MOST_COEFFICIENTS];
+    let mut derivative = [0.0; MAX_COEFFICIENTS];
     for p in 1..=order {
         derivative[p - 1] = p as f64 * coefficients[p];
     }
-    // A sum that overflows is not finite either.
+    // Nor is a sum that overflows.
     if !derivative.iter().map(|coefficient| coefficient.abs()).sum::<f64>().is_finite() {
         return;
     }
-    for_each_root(&derivative[..order.max(1)], first, last, DEEPEST, found);
+    for_each_root(&derivative[..order.max(1)], first, last, MAX_HALVINGS, found);
 }
 
 /// The same polynomial in the variable r, which runs from -1 to 1 as s does from `low` to `high`.
-pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MOST_COEFFICIENTS] {
+pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MAX_COEFFICIENTS] {
     let half = 0.5 * (high - low);
     let mut about = shifted(coefficients, 0.5 * (low + high));
     let mut power = 1.0;
@@ -163,8 +163,8 @@ pub(crate) fn rescaled(coefficients: &[f64], low: f64, high: f64) -> [f64; MOST_
 }
 
 /// The same polynomial in the variable s - `centre`.
-fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
-    let mut about = [0.0; MOST_COEFFICIENTS];
+fn shifted(coefficients: &[f64], centre: f64) -> [f64; MAX_COEFFICIENTS] {
+    let mut about = [0.0; MAX_COEFFICIENTS];
     about[..coefficients.len()].copy_from_slice(coefficients);
     for p in 0..coefficients.len() {
         for q in (p..coefficients.len() - 1).rev() {
@@ -177,12 +177,12 @@ fn shifted(coefficients: &[f64], centre: f64) -> [f64; MOST_COEFFICIENTS] {
 fn for_each_root(coefficients: &[f64], low: f64, high: f64, depth: u32, found: &mut impl FnMut(f64)) {
     let middle = 0.5 * (low + high);
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
-    let (strays, slope_varies) = beyond_linear(about);
+    let (value_spread, slope_spread) = beyond_linear(about);
     let slope = about.get(1).map_or(0.0, |c| c.abs());
-    if about[0].abs() > slope + strays {
+    if about[0].abs() > slope + value_spread {
         return;
     }
-    if about.len() < 3 || slope > slope_varies {
+    if about.len() < 3 || slope > slope_spread {
         if let Some(root) = root_between(coefficients, low, high) {
             found(root);
         }
@@ -207,22 +207,22 @@ fn root_between(coefficients: &[f64], low: f64, high: f64) -> Option<f64> {
     }))
 }
 
-/// A step of third order below this part of its argument leaves an error of the order of its cube: rounding, unless the slope
-/// vanishes within a thousandth.
+/// A step of third order below this part of its argument leaves an error of the order of its cube: rounding, unless the
+/// slope vanishes within a thousandth.
 const CUBIC: f64 = 1e-7;
 
-/// Root of a polynomial that rises through zero once between `low` and `high`, sought from `first`: Halley's steps, else as
-/// [`safeguarded_newton`].
+/// Root of a polynomial that rises through zero once between `low` and `high`, sought from `first`: Halley's steps,
+/// else as [`safeguarded_newton`].
 pub(crate) fn safeguarded_halley(coefficients: &[f64], mut low: f64, mut high: f64, first: f64) -> f64 {
     let mut s = if first > low && first < high { first } else { 0.5 * (low + high) };
     loop {
-        let [height, slope, bend] = expanded(coefficients, s);
+        let [height, slope, half_curvature] = expanded(coefficients, s);
         if height >= 0.0 {
             high = s;
         } else {
             low = s;
         }
-        let halley = s - height * slope / (slope * slope - height * bend);
+        let halley = s - height * slope / (slope * slope - height * half_curvature);
         if (low..=high).contains(&halley) && (halley - s).abs() <= CUBIC * high.abs().max(low.abs()) {
             return halley;
         }
@@ -250,7 +250,7 @@ pub(crate) fn safeguarded_newton(mut low: f64, mut high: f64, first: f64, functi
         if (low..=high).contains(&newton) && (newton - s).abs() <= QUADRATIC * high.abs().max(low.abs()) {
             return newton;
         }
-        // Strictly inside, or Newton's steps might go to and fro between the ends for ever.
+        // Strictly inside, or Newton's steps might alternate between the ends for ever.
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if next <= low || next >= high {
             return next;
@@ -276,13 +276,13 @@ mod tests {
     fn a_maximum_between_ends_that_both_fall_is_found() {
         // A narrow bump inside the interval, of which the ends show nothing.
         let coefficients = [0.0, -0.1, 0.0, 0.0, 16.0 * 0.5, -40.0 * 0.5, 24.5 * 0.5];
-        let (at, most) = maximum(&coefficients, 0.0, 1.0);
+        let (at, largest) = maximum(&coefficients, 0.0, 1.0);
         let sampled = (0..=100_000).map(|i| value(&coefficients, f64::from(i) * 1e-5)).fold(f64::MIN, f64::max);
-        assert!((most - sampled).abs() < 1e-9, "{most} at {at}, sampled {sampled}");
+        assert!((largest - sampled).abs() < 1e-9, "{largest} at {at}, sampled {sampled}");
     }
 
     #[test]
-    fn newton_does_not_go_to_and_fro_between_the_ends() {
+    fn newton_does_not_alternate_between_the_ends_for_ever() {
         // The arc tangent sends 1.39 to -1.39 and back.
         let swing = 1.391_745_200_270_735;
         let root = safeguarded_newton(-2.0, 2.0, swing, |s| (libm::atan(s), 1.0 / (1.0 + s * s)));
@@ -295,10 +295,10 @@ mod tests {
             coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14), first in 0.0_f64..0.9, length in 0.01_f64..0.1
         ) {
             let last = first + length;
-            let (at, most) = maximum(&coefficients, first, last);
+            let (at, largest) = maximum(&coefficients, first, last);
             prop_assert!((first..=last).contains(&at));
             for i in 0..=500 {
-                prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= most + 1e-13);
+                prop_assert!(value(&coefficients, first + length * f64::from(i) / 500.0) <= largest + 1e-13);
             }
         }
     }

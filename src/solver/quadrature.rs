@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 /// Largest number of nodes of a rule.
-pub(super) const MOST_NODES: usize = 33;
-/// Newton's method doubles the digits of a node each time, and starts with two.
+pub(super) const MAX_NODES: usize = 33;
+/// Newton's method doubles the correct digits of a node each time, and starts with two.
 const NEWTON_STEPS: usize = 6;
 
-/// The rules of 1 to [`MOST_NODES`] nodes.
+/// The rules of 1 to [`MAX_NODES`] nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Quadrature {
     rules: Vec<Vec<(f64, f64)>>,
@@ -15,12 +15,12 @@ pub(super) struct Quadrature {
 
 impl Quadrature {
     pub fn new() -> Self {
-        Self { rules: (1..=MOST_NODES).map(rule).collect() }
+        Self { rules: (1..=MAX_NODES).map(rule).collect() }
     }
 
-    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with so many nodes, brought into 1 to [`MOST_NODES`].
+    /// Nodes in (0, 1) and weights, which sum to 1, of the rule with `count` nodes, limited to 1 to [`MAX_NODES`].
     pub fn nodes(&self, count: usize) -> &[(f64, f64)] {
-        &self.rules[count.clamp(1, MOST_NODES) - 1]
+        &self.rules[count.clamp(1, MAX_NODES) - 1]
     }
 }
 
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn a_rule_is_exact_up_to_twice_its_nodes_less_one() {
         let quadrature = Quadrature::new();
-        for count in 1..=MOST_NODES {
+        for count in 1..=MAX_NODES {
             for degree in 0..2 * count {
                 let terms =
                     quadrature.nodes(count).iter().map(|(s, weight)| weight * s.powi(i32::try_from(degree).unwrap()));

@@ -1,7 +1,7 @@
 //! The shear force between two contact events, as a closed-form function of time: values, extremes and integral of F_S.
 
+use super::harmonic::Harmonic;
 use super::polynomial;
-use std::f64::consts::{PI, TAU};
 
 /// How F_S runs along a segment.
 #[derive(Clone, Copy, Debug)]
@@ -11,27 +11,16 @@ pub enum ForcePath<'a> {
         /// Coefficients c_p, in N.
         coefficients: &'a [f64],
         /// Bound on the second derivative by s over [0, 1], in N.
-        bend: f64,
+        curvature_bound: f64,
         /// Where the segment starts.
         first: f64,
-        /// Time that s = 1 stands for, in s.
+        /// Time per unit of s, in s.
         scale: f64,
         /// The shear force at both ends of the segment.
         ends: [ForceAt; 2],
     },
-    /// `start` + `rate` τ + `amplitude` cos(`angular_frequency` τ + `phase`), with the time τ since the start.
-    Harmonic {
-        /// Ramp at the start, in N.
-        start: f64,
-        /// Rate of the ramp, in N/s.
-        rate: f64,
-        /// Amplitude of the cosine, in N.
-        amplitude: f64,
-        /// Its phase at the start, in rad.
-        phase: f64,
-        /// Its angular frequency, in rad/s.
-        angular_frequency: f64,
-    },
+    /// A ramp with a cosine, in N, with the time since the start.
+    Harmonic(Harmonic),
 }
 
 /// A polynomial shear force at some s.
@@ -66,8 +55,12 @@ impl<'a> Segment<'a> {
     /// A segment along a polynomial from s = 0, with s = 1 after `duration` s.
     pub fn polynomial(start: f64, duration: f64, coefficients: &'a [f64]) -> Self {
         let ends = [0.0, 1.0].map(|s| ForceAt::new(coefficients, s));
-        let bend = polynomial::second_derivative_bound(coefficients);
-        Self { start, duration, path: ForcePath::Polynomial { coefficients, bend, first: 0.0, scale: duration, ends } }
+        let curvature_bound = polynomial::second_derivative_bound(coefficients);
+        Self {
+            start,
+            duration,
+            path: ForcePath::Polynomial { coefficients, curvature_bound, first: 0.0, scale: duration, ends },
+        }
     }
 }
 
@@ -76,7 +69,7 @@ impl Segment<'_> {
     pub fn end_force(&self) -> f64 {
         match self.path {
             ForcePath::Polynomial { ends: [_, end], .. } => end.force,
-            ForcePath::Harmonic { .. } => self.force_after(self.duration),
+            ForcePath::Harmonic(harmonic) => harmonic.value(self.duration),
         }
     }
 
@@ -91,15 +84,7 @@ impl Segment<'_> {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
                 polynomial::value(coefficients, first + elapsed / scale)
             }
-            ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
-                let ramp = start + rate * elapsed;
-                if amplitude == 0.0 {
-                    ramp
-                } else {
-                    let turns = (elapsed * angular_frequency / TAU).fract();
-                    ramp + amplitude * libm::cos(TAU * turns + phase)
-                }
-            }
+            ForcePath::Harmonic(harmonic) => harmonic.value(elapsed),
         }
     }
 
@@ -108,45 +93,44 @@ impl Segment<'_> {
         self.extreme_beyond(floor, 1.0)
     }
 
-    /// Time in s and value in N of the least F_S, if it lies below `ceiling`.
+    /// Time in s and value in N of the smallest F_S, if it lies below `ceiling`.
     pub fn minimum_below(&self, ceiling: f64) -> Option<(f64, f64)> {
         let (time, mirrored) = self.extreme_beyond(-ceiling, -1.0)?;
         Some((time, -mirrored))
     }
 
-    /// Values in N that F_S stays between; not the closest ones.
+    /// Lower and upper bound on F_S, in N; not the tightest.
     pub fn bounds(&self) -> (f64, f64) {
         match self.path {
-            ForcePath::Polynomial { bend, scale, ends, .. } => {
+            ForcePath::Polynomial { curvature_bound, scale, ends, .. } => {
                 let width = self.duration / scale;
-                let strays = 0.125 * bend * width * width;
+                let spread = 0.125 * curvature_bound * width * width;
                 let [start, end] = ends.map(|end| end.force);
-                (start.min(end) - strays, start.max(end) + strays)
+                (start.min(end) - spread, start.max(end) + spread)
             }
-            ForcePath::Harmonic { start, rate, amplitude, .. } => {
+            ForcePath::Harmonic(Harmonic { start, rate, amplitude, .. }) => {
                 let end = start + rate * self.duration;
                 (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
             }
         }
     }
 
-    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the first
-    /// and the last maximum and minimum; those in between lie on lines between them.
+    /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the
+    /// first and the last maximum and minimum; those in between lie on lines between them.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         match self.path {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
                 let last = first + self.duration / scale;
-                let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_varies) {
+                let (_, slope_spread) = polynomial::beyond_linear(coefficients);
+                if coefficients.get(1).is_none_or(|slope| slope.abs() >= slope_spread) {
                     return;
                 }
                 polynomial::for_each_turn(coefficients, first, last, &mut |s| {
                     visit(self.start + (s - first) * scale, polynomial::value(coefficients, s));
                 });
             }
-            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
-                let crests =
-                    |sign: f64| harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+            ForcePath::Harmonic(harmonic) => {
+                let crests = |sign: f64| harmonic.times(sign).crests(self.duration);
                 let mut turns: Vec<f64> = [crests(1.0), crests(-1.0)].concat().into_iter().flatten().collect();
                 turns.sort_by(f64::total_cmp);
                 for elapsed in turns {
@@ -160,38 +144,30 @@ impl Segment<'_> {
     pub fn impulse(&self) -> f64 {
         match self.path {
             ForcePath::Polynomial { scale, ends: [start, end], .. } => scale * (end.integral - start.integral),
-            ForcePath::Harmonic { start, rate, amplitude, phase, angular_frequency } => {
-                let ramp = self.duration * (start + 0.5 * rate * self.duration);
-                if amplitude == 0.0 {
-                    return ramp;
-                }
-                let turns = (self.duration * angular_frequency / TAU).fract();
-                let swing = libm::sin(TAU * turns + phase) - libm::sin(phase);
-                ramp + amplitude / angular_frequency * swing
-            }
+            ForcePath::Harmonic(harmonic) => harmonic.integral(self.duration),
         }
     }
 
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
     fn extreme_beyond(&self, floor: f64, sign: f64) -> Option<(f64, f64)> {
         let (elapsed, extreme) = match self.path {
-            ForcePath::Polynomial { coefficients, bend, first, scale, ends } => {
+            ForcePath::Polynomial { coefficients, curvature_bound, first, scale, ends } => {
                 let [at_first, at_last] = ends.map(|at| sign * at.force);
                 let width = self.duration / scale;
                 let last = first + width;
                 let (s, extreme) = if at_last > at_first { (last, at_last) } else { (first, at_first) };
                 // The second derivative bounds both how far the ends are exceeded and how much the slope turns.
-                if extreme + 0.125 * bend * width * width <= floor {
+                if extreme + 0.125 * curvature_bound * width * width <= floor {
                     return None;
                 }
-                let is_monotone = (at_last - at_first).abs() >= bend * width * width || {
-                    let (_, slope_varies) = polynomial::beyond_linear(coefficients);
-                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_varies
+                let is_monotone = (at_last - at_first).abs() >= curvature_bound * width * width || {
+                    let (_, slope_spread) = polynomial::beyond_linear(coefficients);
+                    coefficients.get(1).map_or(0.0, |c| c.abs()) >= slope_spread
                 };
                 let (s, extreme) = if is_monotone {
                     (s, extreme)
                 } else {
-                    let mut signed = [0.0; polynomial::MOST_COEFFICIENTS];
+                    let mut signed = [0.0; polynomial::MAX_COEFFICIENTS];
                     for (s, c) in signed.iter_mut().zip(coefficients) {
                         *s = sign * c;
                     }
@@ -199,8 +175,8 @@ impl Segment<'_> {
                 };
                 ((s - first) * scale, extreme)
             }
-            ForcePath::Harmonic { rate, amplitude, phase, angular_frequency, .. } => {
-                let turns = harmonic_crests(sign * rate, sign * amplitude, phase, angular_frequency, self.duration);
+            ForcePath::Harmonic(harmonic) => {
+                let turns = harmonic.times(sign).crests(self.duration);
                 [Some(0.0), Some(self.duration)].into_iter().chain(turns).flatten().fold(
                     (0.0, f64::NEG_INFINITY),
                     |best: (f64, f64), elapsed| {
@@ -214,30 +190,12 @@ impl Segment<'_> {
     }
 }
 
-/// First and last local maximum of r τ + A cos(ω τ + φ) in [0, `duration`], if any: the largest is one of the two.
-fn harmonic_crests(rate: f64, amplitude: f64, phase: f64, angular_frequency: f64, duration: f64) -> [Option<f64>; 2] {
-    let speed = amplitude.abs() * angular_frequency;
-    if speed <= rate.abs() {
-        return [None; 2];
-    }
-    // With A < 0 the cosine is shifted by half a turn.
-    let shift = if amplitude < 0.0 { phase + PI } else { phase };
-    let crest = libm::asin(rate / speed);
-    let period = TAU / angular_frequency;
-    let first = (crest - shift).rem_euclid(TAU) / angular_frequency;
-    if first > duration {
-        return [None; 2];
-    }
-    let last = first + ((duration - first) / period).floor() * period;
-    [Some(first), Some(last)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Between the turns, in order, the force goes one way; and it stays within its bounds.
+    /// Between the turns, in order, the force is monotone, and it stays within its bounds.
     fn assert_turns(segment: &Segment<'_>) {
         let mut turns = vec![segment.start];
         segment.for_each_turn(|time, _| turns.push(time));
@@ -264,8 +222,8 @@ mod tests {
         /// With at most two maxima and minima there is no other turn in between.
         #[test]
         fn a_short_swing_turns_nowhere_else(rate in -1.0_f64..1.0, amplitude in -1.0_f64..1.0, phase in 0.0_f64..6.3) {
-            let path = ForcePath::Harmonic { start: 0.2, rate, amplitude, phase, angular_frequency: 9.0 };
-            assert_turns(&Segment { start: 3.0, duration: 1.3, path });
+            let harmonic = Harmonic { start: 0.2, rate, amplitude, phase, angular_frequency: 9.0 };
+            assert_turns(&Segment { start: 3.0, duration: 1.3, path: ForcePath::Harmonic(harmonic) });
         }
     }
 }

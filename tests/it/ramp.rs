@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use stickslip::model::{Change, Parameters};
-use stickslip::observe::{ContactLog, Together, Trace};
+use stickslip::observe::{ContactLog, Observers, Trace};
 use stickslip::solver::{Limits, Solver, simulate, simulate_audited};
 
 /// Period and amplitude change a lot before the first break, near 0.06 s.
@@ -55,7 +55,7 @@ fn both_solvers_show_the_same_trace() {
     let traced = |solver| {
         let (mut lead, mut trace) = (ContactLog::default(), Trace::new(&parameters, 1e-4));
         let limits = Limits { end_time: 0.05, events: 1_000_000, interrupt: None };
-        simulate(&parameters, solver, limits, &mut Together { lead: &mut lead, others: vec![&mut trace] }).unwrap();
+        simulate(&parameters, solver, limits, &mut Observers { lead: &mut lead, others: vec![&mut trace] }).unwrap();
         trace.rows
     };
     let (exact, stepped) = (traced(EXACT), traced(Solver::FixedStep { time_step: 1e-7 }));

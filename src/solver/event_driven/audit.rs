@@ -1,19 +1,21 @@
-//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at the end.
+//! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at
+//! the end.
 
-use super::Run;
-use super::chain::Chain;
+use super::Integration;
+use super::chain::{Chain, State};
+use super::driven_solution::DrivenSolution;
 use super::kernels::Kernels;
-use super::leap::{DriveNow, Driving};
-use super::taylor::{Series, State};
-use crate::model::Interface;
+use super::series::Series;
+use super::slider::Slider;
+use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::{Audit, work};
-use crate::solver::segment::{ForceAt, ForcePath, Segment};
+use crate::solver::segment::Segment;
 
 impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
     pub(super) fn follow_series(
         &mut self,
-        kernels: Kernels,
+        kernels: &dyn Kernels,
         chain: &Chain,
         series: &Series,
         [first, last]: [f64; 2],
@@ -31,13 +33,13 @@ impl Audit {
         self.damping += chain.mass * chain.damping_rate * (last - first) * length * mean_square;
     }
 
-    /// Enters a leap of so many seconds from `state`: the damping loss along the driven solution, in closed form, and the
-    /// energy of the free motion that is dropped at its start.
+    /// Enters a leap of `elapsed` s from `state`: the damping loss along the driven solution, in closed form, and
+    /// the energy of the free motion that is dropped at its start.
     pub(super) fn follow_leap(
         &mut self,
         chain: &Chain,
-        drive: &DriveNow,
-        driven: Driving<'_>,
+        drive: &Harmonic,
+        driven: &DrivenSolution,
         state: &State,
         elapsed: f64,
     ) {
@@ -58,8 +60,7 @@ impl Audit {
             let middle = x + 0.5 * y;
             let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);
             if j == 0 {
-                let displacement = drive.ramp + drive.amplitude * libm::cos(drive.phase);
-                force -= drive.stiffness / chain.mass * displacement;
+                force -= chain.drive_stiffness / chain.mass * drive.value(0.0);
             }
             dropped += y * force + w * (v + 0.5 * w);
             if j > 0 {
@@ -71,8 +72,8 @@ impl Audit {
         self.left_out += chain.mass * dropped;
         let mut integral = ramp * elapsed;
         if drive.amplitude > 0.0 {
-            let (sine, versine) = turned(frequency, elapsed);
-            let (sine_twice, versine_twice) = turned(2.0 * frequency, elapsed);
+            let (sine, versine) = sine_and_versine(frequency, elapsed);
+            let (sine_twice, versine_twice) = sine_and_versine(2.0 * frequency, elapsed);
             integral -= 2.0 * (mixed[0] * versine + mixed[1] * sine);
             let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
             integral += 0.5 * frequency * (size * frequency * elapsed - swing);
@@ -81,55 +82,52 @@ impl Audit {
     }
 
     /// Enters the energies at the end, with the drive at `driven` m.
-    pub(super) fn settle(&mut self, chain: &Chain, interface: &Interface, state: &State, stiffness: f64, driven: f64) {
-        let blocks = chain.layout.blocks;
-        let displacements: Vec<f64> = (0..blocks).map(|j| chain.at(&state.displacement, j)).collect();
-        let speeds = (0..blocks).map(|j| chain.at(&state.velocity, j));
+    pub(super) fn record_final_energy(&mut self, slider: &Slider, driven: f64) {
+        let Slider { interface, chain, state } = slider;
+        let displacements: Vec<f64> = slider.displacements().collect();
+        let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
         let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
-        let sprung = stiffness * (driven - displacements[0]) * (driven - displacements[0]);
+        let sprung = chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
         self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
         self.elastic =
             0.5 * (chain.mass * chain.coupling[0][0] * stretched + sprung) + interface.elastic_energy(&displacements);
     }
 }
 
-impl Run<'_> {
-    /// Goes over a glide, of which `shown` told the force without free motion, once more in Taylor steps, for the energies.
-    pub(super) fn audit_glide(&mut self, before: State, shown: &Segment<'_>) {
-        let elapsed = shown.duration;
-        let after = std::mem::replace(&mut self.state, before);
-        let (start, least_orders, mut done) = (self.time, self.least_orders, 0.0);
+impl Integration<'_> {
+    /// Resolves a leap that carried the free motion over again in Taylor steps, for the energies. `reported` is its
+    /// force without the free motion.
+    pub(super) fn audit_carried_leap(&mut self, before: State, reported: &Segment<'_>) {
+        let elapsed = reported.duration;
+        let after = std::mem::replace(&mut self.slider.state, before);
+        let (start, min_orders, mut done) = (self.frame.time, self.control.min_orders, 0.0);
         while done < elapsed {
             let left = elapsed - done;
-            let Ok(length) = self.expand(left) else { break };
+            if self.expand(left).is_err() {
+                break;
+            }
+            let length = self.step.length;
             let s = (left / length).min(1.0);
             if let Some(audit) = &mut self.audit {
-                audit.follow_series(self.kernels, &self.chain, &self.series, [0.0, s], length);
-                let path = ForcePath::Polynomial {
-                    coefficients: &self.force,
-                    bend: self.force_bend,
-                    first: 0.0,
-                    scale: length,
-                    ends: [0.0, s].map(|s| ForceAt::new(&self.force, s)),
-                };
-                let resolved = Segment { start: self.epoch + self.time, duration: s * length, path };
-                audit.unseen_work += work(&self.drive, &audit.quadrature, &resolved);
+                audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
+                let resolved = self.step.segment_to(s, self.frame.now());
+                audit.unseen_work += work(&self.frame.drive, &audit.quadrature, &resolved);
             }
-            self.kernels.evaluate(&self.series, s, length, &mut self.state);
+            self.kernels.evaluate(&self.step.series, s, length, &mut self.slider.state);
             done = if s < 1.0 { elapsed } else { done + length };
-            self.set_time(start + done);
+            self.frame.set_time(start + done);
         }
-        self.state = after;
-        self.least_orders = least_orders;
-        self.set_time(start);
+        self.slider.state = after;
+        self.control.min_orders = min_orders;
+        self.frame.set_time(start);
         if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.drive, &audit.quadrature, shown);
+            audit.unseen_work -= work(&self.frame.drive, &audit.quadrature, reported);
         }
     }
 }
 
 /// sin ωt and 1 - cos ωt; whole turns are taken off first.
-fn turned(frequency: f64, elapsed: f64) -> (f64, f64) {
+fn sine_and_versine(frequency: f64, elapsed: f64) -> (f64, f64) {
     let angle = std::f64::consts::TAU * (frequency * elapsed / std::f64::consts::TAU).fract();
     let half = libm::sin(0.5 * angle);
     (libm::sin(angle), 2.0 * half * half)

@@ -1,12 +1,12 @@
-//! The chain of blocks as the solver sees it: its coefficients in lanes, kept up with what the contacts become.
+//! The chain of blocks as the solver sees it: its coefficients in lanes, updated as contacts break and attach.
 
-use super::lanes::{Layout, Row};
+use super::layout::Layout;
 use crate::model::equation::StiffnessMatrix;
-use crate::model::{Interface, Parameters};
+use crate::model::{Interface, Parameters, Row};
 
-/// What the contacts make of each block, one entry a block.
+/// The coefficients that depend on contacts, one entry a block.
 #[derive(Clone, Debug)]
-pub(super) struct InLine {
+pub(super) struct PerBlock {
     /// Diagonal of S/m, in 1/s².
     pub diagonal: Vec<f64>,
     /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
@@ -14,6 +14,15 @@ pub(super) struct InLine {
     /// Nearest break positions, in m.
     pub upper: Vec<f64>,
     pub lower: Vec<f64>,
+}
+
+/// Displacements and velocities in lanes.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// In m.
+    pub displacement: Vec<Row>,
+    /// In m/s.
+    pub velocity: Vec<Row>,
 }
 
 /// The chain's coefficients in lanes, all divided by the block mass.
@@ -34,7 +43,9 @@ pub(super) struct Chain {
     pub upper: Vec<Row>,
     pub lower: Vec<Row>,
     /// The same four for the eliminations of a leap, which go from block to block.
-    pub in_line: InLine,
+    pub per_block: PerBlock,
+    /// Stiffness K_d of the driving spring, in N/m.
+    pub drive_stiffness: f64,
     /// Damping rate γ, in 1/s.
     pub damping_rate: f64,
 }
@@ -51,12 +62,13 @@ impl Chain {
             pull: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
             lower: layout.filled(f64::NEG_INFINITY),
-            in_line: InLine {
+            per_block: PerBlock {
                 diagonal: vec![0.0; layout.blocks],
                 pull: vec![0.0; layout.blocks],
                 upper: vec![f64::INFINITY; layout.blocks],
                 lower: vec![f64::NEG_INFINITY; layout.blocks],
             },
+            drive_stiffness: parameters.drive_stiffness,
             damping_rate: parameters.damping_rate,
         };
         let bare = StiffnessMatrix::new(parameters, &vec![0.0; layout.blocks]);
@@ -65,21 +77,21 @@ impl Chain {
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
             let diagonal = diagonal / chain.mass;
-            (chain.diagonal[row][lane], chain.in_line.diagonal[block]) = (diagonal, diagonal);
+            (chain.diagonal[row][lane], chain.per_block.diagonal[block]) = (diagonal, diagonal);
         }
         chain
     }
 
-    /// Takes over what the contacts of a block have become.
+    /// Updates the coefficients of a block whose contacts have changed.
     pub fn update(&mut self, block: usize, interface: &Interface) {
         let (row, lane) = self.layout.slot(block);
         let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
         let pull = interface.block_pull[block] / self.mass;
         let (upper, lower) = (interface.block_upper[block], interface.block_lower[block]);
-        (self.diagonal[row][lane], self.in_line.diagonal[block]) = (diagonal, diagonal);
-        (self.pull[row][lane], self.in_line.pull[block]) = (pull, pull);
-        (self.upper[row][lane], self.in_line.upper[block]) = (upper, upper);
-        (self.lower[row][lane], self.in_line.lower[block]) = (lower, lower);
+        (self.diagonal[row][lane], self.per_block.diagonal[block]) = (diagonal, diagonal);
+        (self.pull[row][lane], self.per_block.pull[block]) = (pull, pull);
+        (self.upper[row][lane], self.per_block.upper[block]) = (upper, upper);
+        (self.lower[row][lane], self.per_block.lower[block]) = (lower, lower);
     }
 
     /// The entry of a block.

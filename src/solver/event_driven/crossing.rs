@@ -1,59 +1,61 @@
 //! First crossings: the first instant at which a polynomial, or a ramp with a cosine, reaches a level from below.
 //!
-//! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong order:
-//! an interval is dismissed only if a bound on the excursion excludes the level, or the function falls throughout.
+//! Contract: no crossing is missed but one that touches the level within rounding, and none is found in the wrong
+//! order: an interval is dismissed only if a bound on the excursion excludes the level, or the function falls
+//! throughout.
 
+use crate::solver::harmonic::Harmonic;
 use crate::solver::polynomial::{beyond_linear, expanded, rescaled, safeguarded_halley, safeguarded_newton, value};
 use std::f64::consts::{PI, TAU};
 
 /// Halvings after which an interval counts as a point: 2^-40 of a step.
-const DEEPEST: u32 = 40;
+const MAX_HALVINGS: u32 = 40;
 
 /// First s in [`from`, `end`], within [0, 1], at which the polynomial leaves the open interval between two levels. The
 /// coefficients are changed.
 pub(super) fn first_exit(coefficients: &mut [f64], [lower, upper]: [f64; 2], from: f64, end: f64) -> Option<f64> {
     let (start, slope) = (coefficients[0], coefficients[1]);
-    let (strays, slope_varies) = beyond_linear(coefficients);
+    let (value_spread, slope_spread) = beyond_linear(coefficients);
     let mut first = None;
-    if start + slope.max(0.0) + strays >= upper {
+    if start + slope.max(0.0) + value_spread >= upper {
         coefficients[0] = start - upper;
-        first = first_reach(coefficients, slope_varies, from, end);
+        first = first_reach(coefficients, slope_spread, from, end);
     }
-    if start + slope.min(0.0) - strays <= lower {
+    if start + slope.min(0.0) - value_spread <= lower {
         coefficients[0] = start - lower;
         for coefficient in &mut *coefficients {
             *coefficient = -*coefficient;
         }
-        first = first_reach(coefficients, slope_varies, from, first.unwrap_or(end)).or(first);
+        first = first_reach(coefficients, slope_spread, from, first.unwrap_or(end)).or(first);
     }
     first
 }
 
-/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the slope by
-/// at most `slope_varies`.
-fn first_reach(coefficients: &[f64], slope_varies: f64, from: f64, end: f64) -> Option<f64> {
-    let [here, slope, bend] =
+/// First s in [`from`, `end`] at which the polynomial is not below zero. What is beyond its linear term changes the
+/// slope by at most `slope_spread`.
+fn first_reach(coefficients: &[f64], slope_spread: f64, from: f64, end: f64) -> Option<f64> {
+    let [here, slope, half_curvature] =
         if from > 0.0 { expanded(coefficients, from) } else { [coefficients[0], coefficients[1], coefficients[2]] };
     if here >= 0.0 {
         return Some(from);
     }
-    if coefficients[1].abs() > slope_varies {
-        // First where the parabola crosses.
-        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * bend).max(0.0).sqrt());
+    if coefficients[1].abs() > slope_spread {
+        // Start where the parabola crosses.
+        let guess = from - 2.0 * here / (slope + (slope * slope - 4.0 * here * half_curvature).max(0.0).sqrt());
         return if slope > 0.0 { rising_root(coefficients, from, end, guess) } else { None };
     }
-    first_in(coefficients, from, end, DEEPEST)
+    first_in(coefficients, from, end, MAX_HALVINGS)
 }
 
 fn first_in(coefficients: &[f64], low: f64, high: f64, depth: u32) -> Option<f64> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let about = &rescaled(coefficients, low, high)[..coefficients.len()];
-    let (strays, slope_varies) = beyond_linear(about);
+    let (value_spread, slope_spread) = beyond_linear(about);
     let slope = about[1];
-    if about[0] + slope.abs() + strays < 0.0 {
+    if about[0] + slope.abs() + value_spread < 0.0 {
         return None;
     }
-    if slope.abs() > slope_varies {
+    if slope.abs() > slope_spread {
         // It may start at or above the level only if the interval before ended there.
         if value(about, -1.0) >= 0.0 {
             return Some(low);
@@ -73,35 +75,9 @@ fn rising_root(coefficients: &[f64], low: f64, high: f64, first: f64) -> Option<
     (value(coefficients, high) >= 0.0).then(|| safeguarded_halley(coefficients, low, high, first))
 }
 
-/// A ramp with a cosine, p0 + p1 τ + A cos(ω τ + θ): the driven motion of a block. p1 >= 0.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Driven {
-    pub start: f64,
-    pub rate: f64,
-    pub amplitude: f64,
-    pub phase: f64,
-    pub angular_frequency: f64,
-}
-
-impl Driven {
-    pub fn value(&self, elapsed: f64) -> f64 {
-        let ramp = self.start + self.rate * elapsed;
-        if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }
-    }
-
-    fn angle(&self, elapsed: f64) -> f64 {
-        // Whole periods are taken off first, so that long leaps lose no digits of the phase.
-        TAU * (elapsed * self.angular_frequency / TAU).fract() + self.phase
-    }
-
-    fn value_and_slope(&self, elapsed: f64) -> (f64, f64) {
-        let (sine, cosine) = libm::sincos(self.angle(elapsed));
-        let ramp = self.start + self.rate * elapsed;
-        (ramp + self.amplitude * cosine, self.rate - self.amplitude * self.angular_frequency * sine)
-    }
-
+impl Harmonic {
     /// First instant at or after `from` at which the motion is not below `level`; infinite if never.
-    pub fn first_rise_to(&self, level: f64, from: f64) -> f64 {
+    pub(super) fn first_rise_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) >= level {
             return from;
         }
@@ -133,14 +109,14 @@ impl Driven {
             return f64::INFINITY;
         };
         let high = first + skipped * period;
-        // The branch that rises to a maximum begins at the minimum before, π - 2 asin(p1/Aω) earlier... in phase.
+        // The branch that rises to a maximum begins at the minimum before it: π + 2 asin(p1/Aω) earlier in phase.
         let low = (high - (PI + 2.0 * crest) / self.angular_frequency).max(from);
         if self.value(high) < level { high } else { newton(low, high) }
     }
 
-    /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too, so it
-    /// lies within the first period.
-    pub fn first_fall_to(&self, level: f64, from: f64) -> f64 {
+    /// First instant at or after `from` at which the motion is not above `level`; infinite if never. Minima grow too,
+    /// so it lies within the first period.
+    pub(super) fn first_fall_to(&self, level: f64, from: f64) -> f64 {
         if self.value(from) <= level {
             return from;
         }
@@ -209,7 +185,7 @@ mod tests {
             start in -1.0_f64..1.0, rate in 0.001_f64..2.0, amplitude in 0.0_f64..1.5, phase in -7.0_f64..7.0,
             level in 0.0_f64..4.0, from in 0.0_f64..9.0
         ) {
-            let driven = Driven { start, rate, amplitude, phase, angular_frequency: 2.5 };
+            let driven = Harmonic { start, rate, amplitude, phase, angular_frequency: 2.5 };
             let rise = driven.first_rise_to(level, from);
             prop_assert!(rise >= from);
             let fall = driven.first_fall_to(-level, from);

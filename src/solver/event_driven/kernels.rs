@@ -1,137 +1,94 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
-use super::chain::Chain;
-use super::glide::{Glide, advance};
-use super::leap::{DriveNow, Leap, split};
-use super::taylor::{Series, State, StepInput, evaluate, expand, reachable};
-use super::vector::Plain;
+use super::chain::{Chain, State};
+use super::chebyshev::{ChebyshevPropagator, propagate};
+use super::free_motion::{SplitMotion, split};
+use super::series::{Series, evaluate, reachable};
+use super::simd::Simd;
+use super::taylor::{StepInput, expand};
+use crate::solver::harmonic::Harmonic;
+use pulp::Scalar512b;
 #[cfg(target_arch = "x86_64")]
-use super::vector::{Avx2, Avx512};
+use pulp::x86::{V3, V4};
 
-/// The hot loops, compiled for the features of one kind of processor.
-#[derive(Clone, Copy)]
-pub(super) struct Kernels {
-    expand: unsafe fn(&Chain, &State, &StepInput, &mut Series) -> bool,
-    evaluate: unsafe fn(&Series, f64, f64, &mut State),
-    reachable: unsafe fn(&Chain, &mut Series, &mut Vec<(usize, usize)>),
-    split: unsafe fn(&Chain, &DriveNow, &mut Leap) -> Option<f64>,
-    glide: unsafe fn(&Chain, f64, f64, &mut Glide),
-    /// Name of the processor features, for tests and reports.
-    #[cfg_attr(not(test), expect(dead_code, reason = "names the path in tests"))]
-    pub name: &'static str,
-}
-
-/// Compiles the loops for one set of processor features.
-macro_rules! kernels {
-    ($module:ident, $vector:ident, $rows:literal $(, $features:literal)?) => {
-        mod $module {
-            use super::{Chain, DriveNow, Glide, Kernels, Leap, Series, State, StepInput};
-            use super::{advance, evaluate, expand, reachable, split};
-            use super::$vector;
-
-            $(#[target_feature(enable = $features)])?
-            fn expand_here(chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-                expand::<$vector, $rows>(chain, state, input, series)
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn evaluate_here(series: &Series, s: f64, length: f64, state: &mut State) {
-                evaluate::<$vector, $rows>(series, s, length, state);
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn reachable_here(chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
-                reachable::<$vector, $rows>(chain, series, blocks);
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn split_here(chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
-                split(chain, drive, leap)
-            }
-
-            $(#[target_feature(enable = $features)])?
-            fn glide_here(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
-                advance::<$vector>(chain, seconds, error, glide);
-            }
-
-            pub(super) const KERNELS: Kernels = Kernels {
-                expand: expand_here,
-                evaluate: evaluate_here,
-                reachable: reachable_here,
-                split: split_here,
-                glide: glide_here,
-                name: stringify!($module),
-            };
-        }
-    };
-}
-
-kernels!(baseline, Plain, 0);
-#[cfg(target_arch = "x86_64")]
-kernels!(avx2, Avx2, 0, "avx2,fma");
-#[cfg(target_arch = "x86_64")]
-kernels!(avx512, Avx512, 0, "avx512f,fma");
-// The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.
-#[cfg(target_arch = "x86_64")]
-kernels!(avx2_nine_rows, Avx2, 9, "avx2,fma");
-#[cfg(target_arch = "x86_64")]
-kernels!(avx512_nine_rows, Avx512, 9, "avx512f,fma");
-
-impl Kernels {
-    /// Every path that this processor can run for so many rows, the fastest last.
-    pub fn available(rows: usize) -> Vec<Self> {
-        let mut paths = vec![baseline::KERNELS];
-        #[cfg(target_arch = "x86_64")]
-        {
-            let fuses = is_x86_feature_detected!("fma");
-            if fuses && is_x86_feature_detected!("avx2") {
-                paths.push(avx2::KERNELS);
-                if rows == 9 {
-                    paths.push(avx2_nine_rows::KERNELS);
-                }
-            }
-            if fuses && is_x86_feature_detected!("avx512f") {
-                paths.push(avx512::KERNELS);
-                if rows == 9 {
-                    paths.push(avx512_nine_rows::KERNELS);
-                }
-            }
-        }
-        paths
-    }
-
+/// The hot loops for one set of processor features.
+pub(super) trait Kernels {
     /// Expands the state into a series; false if it does not converge within the largest order; see [`expand`].
-    #[inline]
-    pub fn expand(self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
-        // SAFETY: `available` yields only paths whose features this processor has.
-        unsafe { (self.expand)(chain, state, input, series) }
-    }
-
-    /// State at s in [0, 1] of a step of so many seconds.
-    #[inline]
-    pub fn evaluate(self, series: &Series, s: f64, length: f64, state: &mut State) {
-        // SAFETY: as above.
-        unsafe { (self.evaluate)(series, s, length, state) }
-    }
-
+    fn expand(&self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool;
+    /// State at s in [0, 1] of a step of `length` s.
+    fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State);
     /// Row and lane of every block that may reach a break position within the step.
-    #[inline]
-    pub fn reachable(self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
-        // SAFETY: as above.
-        unsafe { (self.reachable)(chain, series, blocks) }
+    fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>);
+    /// Splits the motion into driven solution and free motion; see [`split`].
+    fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64>;
+    /// Carries the free motion over `seconds` s; see [`propagate`].
+    fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator);
+}
+
+/// The loops compiled for the features of `S` and for `R` rows, or for any number if that is 0.
+struct Compiled<S, const R: usize>(S);
+
+impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
+    fn expand(&self, chain: &Chain, state: &State, input: &StepInput, series: &mut Series) -> bool {
+        self.0.run(
+            #[inline(always)]
+            |simd| expand::<S, R>(simd, chain, state, input, series),
+        )
     }
 
-    /// Splits the state into driven solution and free motion; see [`split`].
-    #[inline]
-    pub fn split(self, chain: &Chain, drive: &DriveNow, leap: &mut Leap) -> Option<f64> {
-        // SAFETY: as above.
-        unsafe { (self.split)(chain, drive, leap) }
+    fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State) {
+        self.0.run(
+            #[inline(always)]
+            |simd| evaluate::<S, R>(simd, series, s, length, state),
+        );
     }
 
-    /// Carries the free motion over so many seconds; see [`advance`].
-    #[inline]
-    pub fn glide(self, chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
-        // SAFETY: as above.
-        unsafe { (self.glide)(chain, seconds, error, glide) }
+    fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>) {
+        self.0.run(
+            #[inline(always)]
+            |simd| reachable::<S, R>(simd, chain, series, blocks),
+        );
     }
+
+    fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64> {
+        self.0.run(
+            #[inline(always)]
+            |_| split(chain, drive, motion),
+        )
+    }
+
+    fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator) {
+        self.0.run(
+            #[inline(always)]
+            |simd| propagate(simd, chain, seconds, error, propagator),
+        );
+    }
+}
+
+/// The fastest loops that this processor can run for this many rows.
+pub(super) fn fastest(rows: usize) -> Box<dyn Kernels> {
+    let (_, fastest) = available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
+    fastest
+}
+
+/// All loops that this processor can run for this many rows, with their names; the fastest last.
+pub(super) fn available(rows: usize) -> Vec<(&'static str, Box<dyn Kernels>)> {
+    let mut paths: Vec<(&'static str, Box<dyn Kernels>)> = vec![("baseline", Box::new(Compiled::<_, 0>(Scalar512b)))];
+    // The slider of the paper, 70 blocks in nine rows: loops of known length cost a quarter less.
+    #[cfg(target_arch = "x86_64")]
+    {
+        if let Some(avx2) = V3::try_new() {
+            paths.push(("AVX2", Box::new(Compiled::<_, 0>(avx2))));
+            if rows == 9 {
+                paths.push(("AVX2, nine rows", Box::new(Compiled::<_, 9>(avx2))));
+            }
+        }
+        if let Some(avx512) = V4::try_new() {
+            paths.push(("AVX-512", Box::new(Compiled::<_, 0>(avx512))));
+            if rows == 9 {
+                paths.push(("AVX-512, nine rows", Box::new(Compiled::<_, 9>(avx512))));
+            }
+        }
+    }
+    paths
 }

@@ -1,54 +1,45 @@
 //! Event-driven: from contact event to contact event, in closed form where nothing happens.
 //!
-//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and locates
-//! the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap follows the
-//! driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of displacement of the
-//! order of `tolerance` · f_s/k.
+//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and
+//! locates the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap
+//! follows the driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of
+//! displacement of the order of `tolerance` · f_s/k.
 //!
-//! Displacements and times are kept in a moving frame, so that neither loses digits in long runs.
+//! Displacements and times are kept in a moving [`frame`], so that neither loses digits in long runs.
 
 mod audit;
 mod chain;
+mod chebyshev;
 mod crossing;
-mod glide;
+mod driven_solution;
+mod frame;
+mod free_motion;
 mod kernels;
-mod lanes;
+mod layout;
 mod leap;
+mod series;
+mod simd;
+mod slider;
 mod step;
 mod taylor;
-mod vector;
+mod tolerances;
 
-use self::chain::Chain;
+use self::frame::{FRAME_SPAN, Frame};
 use self::kernels::Kernels;
-use self::lanes::Layout;
-use self::leap::{Attempt, Bounds, DriveNow, Leap};
-use self::taylor::{Series, State};
+use self::layout::Layout;
+use self::leap::{Attempt, Bounds, Leap};
+use self::slider::Slider;
+use self::step::{Step, StepControl};
+use self::tolerances::Tolerances;
 use super::ledger::Audit;
 use super::segment::Segment;
 use super::{Limits, Observer, SimulationError, Summary};
-use crate::model::equation::largest_frequency;
-use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use crate::model::{Drive, Parameters};
 use std::sync::atomic::Ordering;
 
-/// Longest step, in units of the shortest time scale: the cheapest per unit of time, and still far from where the series
-/// would lose digits.
-const LONGEST_STEP: f64 = 4.0;
-/// Steps are halved at most so often where events crowd; further only if a series does not converge.
-const MOST_HALVINGS: usize = 7;
-/// A leap is tried only if no reattachment is due within so many longest steps.
+/// A leap is tried only if no reattachment is due within this many longest steps.
 const WORTHWHILE_LEAP: f64 = 6.0;
-/// Part of the tolerance that one step's truncation may take at most.
-const TRUNCATION_SHARE: f64 = 0.1;
-/// Multiple of the tolerance that the truncations of all steps may add up to within the slider's memory.
-const REMEMBERED_SHARE: f64 = 4.0;
-/// Steps that an undamped slider is taken to remember.
-const MOST_REMEMBERED: f64 = 1e6;
-/// Local time at which the frame moves, in s.
-const FRAME_SPAN: f64 = 0.0625;
-/// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
-const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
-const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
-/// Steps between two looks at the interrupt flag.
+/// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
 /// Runs the method with this tolerance, relative to the contact reach; see [`super::simulate`].
@@ -60,228 +51,135 @@ pub(super) fn run(
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let rows = Layout::new(parameters.blocks).rows;
-    let kernels = Kernels::available(rows).pop().unwrap_or_else(|| unreachable!("there is always the baseline"));
-    let run = Run::new(parameters, tolerance, limits, kernels);
-    Run { audit, ..run }.finished(observer)
+    let integration = Integration::new(parameters, tolerance, limits, kernels::fastest(rows));
+    Integration { audit, ..integration }.integrate(observer)
 }
 
-/// Part of the tolerance that one step's truncation may take, so that the sum of what the slider remembers stays bounded.
-///
-/// An error decays at the rate γ/2 if the motion of the attached slider oscillates, else at that of its slowest mode: with
-/// very little and with very much damping, a million steps may add up, mostly with one sign.
-fn truncation_share(parameters: &Parameters, longest_step: f64) -> f64 {
-    let half = 0.5 * parameters.damping_rate;
-    // The contacts alone bound the lowest squared frequency of the attached slider.
-    let squared = parameters.block_contact_stiffness() / parameters.block_mass();
-    let overdamped = (half * half - squared).max(0.0);
-    let rate = if overdamped > 0.0 { squared / (half + overdamped.sqrt()) } else { half };
-    let remembered = (1.0 / (rate * longest_step)).min(MOST_REMEMBERED);
-    TRUNCATION_SHARE.min(REMEMBERED_SHARE / remembered)
-}
-
-/// One simulation in progress. Times and displacements are local to the frame but where said otherwise.
-struct Run<'a> {
+/// One simulation in progress. Times and displacements are those of the frame unless stated otherwise.
+struct Integration<'a> {
     limits: Limits<'a>,
-    drive: Drive,
-    mass: f64,
-    kernels: Kernels,
-    interface: Interface,
-    chain: Chain,
-    state: State,
-    series: Series,
+    kernels: Box<dyn Kernels>,
+    tolerances: Tolerances,
+    frame: Frame,
+    slider: Slider,
+    control: StepControl,
+    step: Step,
     leap: Leap,
-    candidates: Vec<(usize, usize)>,
-    /// Breaks to come in the step: where in it, and the block.
-    breaks: Vec<(f64, usize)>,
-    /// Blocks whose series an event has changed.
-    amended: Vec<usize>,
-    /// How long the step could go on after the last break and after the last reattachment, in s.
-    break_window: f64,
-    attach_window: f64,
-    /// Coefficients of F_S over the step, in N, and room for those of a block.
-    force: Vec<f64>,
-    coefficients: Vec<f64>,
-    /// Bound on the second derivative of F_S by s, in N.
-    force_bend: f64,
-    /// Order from which on terms are checked, by the number of halvings.
-    least_orders: [usize; MOST_HALVINGS + 1],
-    /// Largest error left in one step and by one leap, in m.
-    truncation: f64,
-    left_out: f64,
-    /// Absolute time and displacement of the frame's origin, in s and m.
-    epoch: f64,
-    origin: f64,
-    time: f64,
-    /// Displacement of the drive's ramp at the epoch.
-    ramp_at_epoch: f64,
-    /// Δ cos θ and -Δ sin θ at the phase θ of now.
-    swing: [f64; 2],
-    longest_step: f64,
-    typical_advance: f64,
+    /// Time before which no leap is tried, in s.
     next_leap: f64,
     /// Largest shear force at the last break and at the ends of steps since, in N.
-    passed_force: f64,
+    largest_force: f64,
     summary: Summary,
     audit: Option<&'a mut Audit>,
 }
 
-impl<'a> Run<'a> {
-    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Kernels) -> Self {
-        let drive = Drive::new(parameters);
-        let layout = Layout::new(parameters.blocks);
-        let interface = Interface::new(parameters);
-        let mass = parameters.block_mass();
-        let fastest =
-            largest_frequency(parameters).max(parameters.largest_modulation_frequency()).max(parameters.damping_rate);
-        let longest_step = LONGEST_STEP / fastest;
-        let mut run = Self {
+impl<'a> Integration<'a> {
+    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Box<dyn Kernels>) -> Self {
+        let tolerances = Tolerances::new(parameters, tolerance);
+        let slider = Slider::new(parameters);
+        let layout = slider.chain.layout;
+        Self {
             limits,
-            drive,
-            mass,
             kernels,
-            chain: Chain::new(parameters, layout),
-            interface,
-            state: State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) },
-            series: Series::new(layout),
+            tolerances,
+            frame: Frame::new(Drive::new(parameters)),
+            slider,
+            control: StepControl::new(tolerances.max_step),
+            step: Step::new(layout),
             leap: Leap::new(layout),
-            candidates: Vec::new(),
-            breaks: Vec::new(),
-            amended: Vec::new(),
-            break_window: 0.0,
-            attach_window: 0.0,
-            force: Vec::new(),
-            coefficients: Vec::new(),
-            force_bend: 0.0,
-            least_orders: [0; MOST_HALVINGS + 1],
-            truncation: truncation_share(parameters, longest_step) * tolerance * parameters.contact_reach(),
-            left_out: tolerance * parameters.contact_reach(),
-            epoch: 0.0,
-            origin: 0.0,
-            time: 0.0,
-            // The cosine is counted from its own zero, so the ramp starts Δ below.
-            ramp_at_epoch: -drive.amplitude,
-            swing: [drive.amplitude, 0.0],
-            longest_step,
-            typical_advance: longest_step,
             next_leap: 0.0,
-            passed_force: 0.0,
+            largest_force: 0.0,
             summary: Summary::default(),
             audit: None,
-        };
-        for block in 0..parameters.blocks {
-            run.chain.update(block, &run.interface);
         }
-        run
     }
 
-    /// Apart from where the run is owned, and what is rare apart from here: the loop is short, and has nothing to drop if
-    /// an observer panics.
+    /// The loop is not inlined where the integration is owned, nor is what is rare inlined here: so it is short, and
+    /// has nothing to drop if an observer panics.
     #[inline(never)]
-    fn finished(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
-        for event in self.interface.initial_attachments() {
+    fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+        for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
         }
         while !observer.is_satisfied() {
-            let until_end = self.limits.end_time - self.epoch - self.time;
-            if until_end <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
-                return self.ended(false, observer);
+            let until_end = self.frame.until(self.limits.end_time);
+            if self.frame.has_come(until_end) {
+                return self.finish(false, observer);
             }
-            let mut until_turn = self.drive.cycle_end - self.epoch - self.time;
-            if until_turn <= 4.0 * f64::EPSILON * (self.epoch + self.time) {
-                self.next_cycle();
-                until_turn = self.drive.cycle_end - self.epoch - self.time;
+            let mut until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
+            if self.frame.has_come(until_cycle_end) {
+                self.frame.next_cycle();
+                until_cycle_end = self.frame.until(self.frame.drive.cycle_end);
             }
-            let until_change = until_turn.min(until_end);
-            let until_attach = self.interface.next_reattachment() - self.time;
+            let until_change = until_cycle_end.min(until_end);
+            let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
             let horizon = until_attach.min(until_change);
-            let leapt = horizon > WORTHWHILE_LEAP * self.longest_step
-                && self.time >= self.next_leap
-                && self.try_leap(horizon, until_turn, observer);
+            let leapt = horizon > WORTHWHILE_LEAP * self.tolerances.max_step
+                && self.frame.time >= self.next_leap
+                && self.try_leap(horizon, until_cycle_end, observer);
             if !leapt {
-                self.step(until_change, observer)?;
+                self.take_step(until_change, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
-                let (time, events) = (self.epoch + self.time, self.limits.events);
+                let (time, events) = (self.frame.now(), self.limits.events);
                 return Err(SimulationError::EventBudget { time, events });
             }
-            // What is not finite anywhere comes to the driven edge, if the run lasts.
-            if !self.state.displacement[0][0].is_finite() {
-                return Err(SimulationError::NotFinite { time: self.epoch + self.time });
+            // A value that is not finite spreads to the driven edge, if the run lasts.
+            if !self.slider.state.displacement[0][0].is_finite() {
+                return Err(SimulationError::NotFinite { time: self.frame.now() });
             }
-            if self.time > FRAME_SPAN {
+            if self.frame.time > FRAME_SPAN {
                 self.move_frame();
             }
             let is_check = self.summary.steps.is_multiple_of(STEPS_PER_CHECK);
             if is_check && self.limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
-                return Err(SimulationError::Interrupted { time: self.epoch + self.time });
+                return Err(SimulationError::Interrupted { time: self.frame.now() });
             }
         }
-        self.ended(true, observer)
+        self.finish(true, observer)
     }
 
     #[inline(never)]
-    fn ended(&mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
-        self.summary.end_time = self.epoch + self.time;
-        let blocks = 0..self.chain.layout.blocks;
-        let displacement: Vec<f64> =
-            blocks.map(|block| self.origin + self.chain.at(&self.state.displacement, block)).collect();
+    fn finish(&mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+        self.summary.end_time = self.frame.now();
+        let displacement: Vec<f64> = self.slider.displacements().map(|x| self.frame.absolute_displacement(x)).collect();
         if !displacement.iter().sum::<f64>().is_finite() {
             return Err(SimulationError::NotFinite { time: self.summary.end_time });
         }
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
         if let Some(audit) = self.audit.take() {
-            let driven =
-                self.ramp_at_epoch + self.drive.velocity * self.time + self.drive.amplitude * libm::cos(self.phase());
-            audit.settle(&self.chain, &self.interface, &self.state, self.drive.stiffness, driven);
+            audit.record_final_energy(&self.slider, self.frame.drive_motion().value(0.0));
         }
         Ok(self.summary)
     }
 
-    fn phase(&self) -> f64 {
-        self.drive.phase(self.epoch) + self.drive.angular_frequency * self.time
-    }
-
-    /// Takes up the next cycle of a ramped modulation, at the maximum where the two join.
-    fn next_cycle(&mut self) {
-        let before = self.drive.amplitude;
-        self.drive.next_cycle();
-        self.ramp_at_epoch += before - self.drive.amplitude;
-        self.swing = [self.drive.amplitude, 0.0];
-    }
-
-    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_turn` s; false if it is
-    /// not yet allowed.
+    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_cycle_end` s;
+    /// false if none is allowed yet.
     #[inline(never)]
-    fn try_leap(&mut self, horizon: f64, until_turn: f64, observer: &mut dyn Observer) -> bool {
-        let drive = DriveNow {
-            stiffness: self.drive.stiffness,
-            mass: self.mass,
-            ramp: self.ramp_at_epoch + self.drive.velocity * self.time,
-            velocity: self.drive.velocity,
-            amplitude: self.drive.amplitude,
-            phase: self.phase(),
-            angular_frequency: self.drive.angular_frequency,
-        };
-        let start = self.epoch + self.time;
-        let bounds = Bounds { horizon, until_turn, error: self.left_out, passed: self.passed_force };
-        let mut shown = None;
-        let emit = |segment: Segment<'static>| {
+    fn try_leap(&mut self, horizon: f64, until_cycle_end: f64, observer: &mut dyn Observer) -> bool {
+        let drive = self.frame.drive_motion();
+        let start = self.frame.now();
+        let bounds =
+            Bounds { horizon, until_cycle_end, error: self.tolerances.leap_error, largest_force: self.largest_force };
+        let mut reported = None;
+        let report = |segment: Segment<'static>| {
             let segment = Segment { start, ..segment };
-            shown = Some(segment);
+            reported = Some(segment);
             observer.advance(&segment);
         };
-        let before = self.audit.is_some().then(|| self.state.clone());
-        let (state, audit) = (&mut self.state, self.audit.as_deref_mut());
-        let attempt = self.leap.attempt(&self.chain, self.kernels, &drive, bounds, state, emit, audit);
+        let Slider { chain, state, .. } = &mut self.slider;
+        let before = self.audit.is_some().then(|| state.clone());
+        let audit = self.audit.as_deref_mut();
+        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, bounds, state, report, audit);
         match attempt {
             Attempt::Wait { seconds } => {
-                self.next_leap = self.time + seconds.max(self.longest_step);
+                self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
                 false
             }
-            Attempt::Leapt { elapsed, reached, glided } => {
-                if let (Some(before), Some(shown)) = (before.filter(|_| glided), shown) {
-                    self.audit_glide(before, &shown);
+            Attempt::Leapt { elapsed, reached, is_carried } => {
+                if let (Some(before), Some(reported)) = (before.filter(|_| is_carried), reported) {
+                    self.audit_carried_leap(before, &reported);
                 }
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
@@ -289,8 +187,8 @@ impl<'a> Run<'a> {
                 self.arrive(elapsed, elapsed == horizon);
                 match reached {
                     Some(block) => {
-                        let x = self.chain.at(&self.state.displacement, block);
-                        self.break_block(block, x, self.shear_force(), observer);
+                        let (x, trailing) = (self.slider.displacement(block), self.slider.state.displacement[0][0]);
+                        self.break_block(block, x, self.frame.shear_force(trailing), observer);
                     }
                     None => self.reattach_due(observer),
                 }
@@ -299,89 +197,54 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Moves time on, exactly to the next reattachment if that is what came.
+    /// Advances time by `elapsed` s, exactly to the next reattachment if that ended the leap.
     fn arrive(&mut self, elapsed: f64, at_horizon: bool) {
-        let due = self.interface.next_reattachment();
-        let reached = self.time + elapsed;
+        let due = self.slider.interface.next_reattachment();
+        let reached = self.frame.time + elapsed;
         let is_due = at_horizon && (due - reached).abs() <= 4.0 * f64::EPSILON * reached;
-        self.set_time(if is_due { due } else { reached });
+        self.frame.set_time(if is_due { due } else { reached });
     }
 
-    fn set_time(&mut self, time: f64) {
-        self.time = time;
-        if self.drive.is_modulated() {
-            let (sine, cosine) = libm::sincos(self.phase());
-            self.swing = [self.drive.amplitude * cosine, -self.drive.amplitude * sine];
-        }
-    }
-
-    /// Breaks what is reached at a block that was found at a break position, at displacement `x` m and shear force `force` N.
+    /// Breaks the contacts of a block that has reached a break position, at displacement `x` m and shear force `force`
+    /// N.
     fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
-        let (row, lane) = self.chain.layout.slot(block);
-        let (upper, lower) = (self.chain.upper[row][lane], self.chain.lower[row][lane]);
-        self.passed_force = force;
-        // Rounding may leave the block a hair before the position that it was found to reach.
-        let reached = if upper - x <= x - lower { x.max(upper) } else { x.min(lower) };
-        let (epoch, origin, summary) = (self.epoch, self.origin, &mut self.summary);
-        self.interface.break_reached(block, self.time, reached, |event| {
+        self.largest_force = force;
+        let (frame, summary) = (&self.frame, &mut self.summary);
+        self.slider.break_reached(block, frame.time, x, |event| {
             summary.breaks += 1;
-            observer.contact(&absolute(event, epoch, origin));
+            observer.contact(&frame.absolute(event));
         });
-        self.chain.update(block, &self.interface);
     }
 
-    /// F_S now, in N.
-    fn shear_force(&self) -> f64 {
-        let ramp = self.ramp_at_epoch + self.drive.velocity * self.time;
-        self.drive.stiffness * (ramp + self.swing[0] - self.state.displacement[0][0])
-    }
-
-    /// Reattaches what is due now.
+    /// Reattaches all contacts that are due.
     fn reattach_due(&mut self, observer: &mut dyn Observer) {
-        while self.interface.next_reattachment() <= self.time
-            && let Some(block) = self.interface.next_reattachment_block()
+        while self.slider.interface.next_reattachment() <= self.frame.time
+            && let Some(block) = self.slider.interface.next_reattachment_block()
         {
-            self.attach_next(self.chain.at(&self.state.displacement, block), observer);
+            self.attach_next(self.slider.displacement(block), observer);
         }
     }
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
-        let event = self.interface.reattach_next(x);
+        let event = self.slider.attach_next(x);
         self.summary.reattachments += 1;
-        observer.contact(&absolute(event, self.epoch, self.origin));
-        self.chain.update(event.block, &self.interface);
+        observer.contact(&self.frame.absolute(event));
     }
 
     /// Moves the frame to where the slider and the clock are.
     #[inline(never)]
     fn move_frame(&mut self) {
-        let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
-        let displacement = (self.state.displacement[0][0] / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
-        self.interface.shift_time(time);
-        self.interface.shift(displacement);
-        for block in 0..self.chain.layout.blocks {
-            let (row, lane) = self.chain.layout.slot(block);
-            self.state.displacement[row][lane] -= displacement;
-            self.chain.update(block, &self.interface);
-        }
-        self.ramp_at_epoch += self.drive.velocity * time - displacement;
+        let (time, displacement) = self.frame.move_origin(self.slider.state.displacement[0][0]);
+        self.slider.move_origin(time, displacement);
         self.next_leap -= time;
-        self.time -= time;
-        self.epoch += time;
-        self.origin += displacement;
     }
-}
-
-/// An event with time and displacement counted from the start.
-fn absolute(event: ContactEvent, epoch: f64, origin: f64) -> ContactEvent {
-    ContactEvent { time: epoch + event.time, displacement: origin + event.displacement, ..event }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Change;
+    use crate::model::{Change, ContactEvent};
     use crate::observe::{ContactLog, Recording, SlipObserver};
 
     #[test]
@@ -395,13 +258,13 @@ mod tests {
             ..Parameters::default()
         };
         for parameters in [plain, modulated] {
-            let logs: Vec<(&str, Vec<ContactEvent>)> = Kernels::available(Layout::new(parameters.blocks).rows)
+            let logs: Vec<(&str, Vec<ContactEvent>)> = kernels::available(Layout::new(parameters.blocks).rows)
                 .into_iter()
-                .map(|kernels| {
+                .map(|(name, kernels)| {
                     let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
                     let mut log = ContactLog::default();
-                    Run::new(&parameters, 1e-6, limits, kernels).finished(&mut log).unwrap();
-                    (kernels.name, log.events)
+                    Integration::new(&parameters, 1e-6, limits, kernels).integrate(&mut log).unwrap();
+                    (name, log.events)
                 })
                 .collect();
             assert!(logs[0].1.len() > 2 * parameters.blocks * parameters.contacts_per_block, "no slip to compare");
@@ -434,7 +297,7 @@ mod tests {
                 assert_eq!(merged.len(), alone.len());
                 assert!(merged.is_sorted_by_key(|event| event.time));
                 if tolerance > 1e-4 {
-                    // Some breaks at different blocks lie closer than their errors by now.
+                    // Some breaks at different blocks lie closer together than their errors.
                     merged.sort_by_key(which);
                     alone.sort_by_key(which);
                 }
@@ -456,11 +319,11 @@ mod tests {
         for parameters in [plain, modulated] {
             let slips = |next_leap: f64| {
                 let limits = Limits { end_time: 0.5, events: u64::MAX, interrupt: None };
-                let kernels = Kernels::available(Layout::new(parameters.blocks).rows).pop().unwrap();
+                let kernels = kernels::fastest(Layout::new(parameters.blocks).rows);
                 let recording = Recording { discard: 0, ..Recording::default() };
                 let mut observer = SlipObserver::new(&parameters, &recording);
-                let mut run = Run { next_leap, ..Run::new(&parameters, 1e-10, limits, kernels) };
-                let summary = run.finished(&mut observer).unwrap();
+                let integration = Integration::new(&parameters, 1e-10, limits, kernels);
+                let summary = Integration { next_leap, ..integration }.integrate(&mut observer).unwrap();
                 (summary, observer.into_rows().0)
             };
             let ((leaping, leapt), (stepping, stepped)) = (slips(0.0), slips(f64::INFINITY));

@@ -1,40 +1,9 @@
-//! The chain in lanes: block j lies in row j mod R of lane j div R, with R = ceil(N/8).
+//! Where blocks lie in rows: block j in row j mod R of lane j div R, with R = ceil(N/8).
 //!
 //! The neighbours of a block are then the rows above and below in the same lane; beyond the first and the last row they
 //! lie in the next lane. Slots beyond the last block keep a coupling, a stiffness and a force of zero and stay at rest.
 
-use std::ops::{Deref, DerefMut};
-
-/// Lanes of a row.
-pub(super) const LANES: usize = 8;
-
-/// One row: eight blocks that lie R apart, in one line of the cache.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(super) struct Row(pub [f64; LANES]);
-
-impl Row {
-    /// The same value in every lane.
-    pub const fn filled(value: f64) -> Self {
-        Self([value; LANES])
-    }
-}
-
-impl Deref for Row {
-    type Target = [f64; LANES];
-
-    #[inline(always)]
-    fn deref(&self) -> &[f64; LANES] {
-        &self.0
-    }
-}
-
-impl DerefMut for Row {
-    #[inline(always)]
-    fn deref_mut(&mut self) -> &mut [f64; LANES] {
-        &mut self.0
-    }
-}
+use crate::model::{LANES, Row};
 
 /// Where blocks lie.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,8 @@
-//! Free motion over many periods at once, by Chebyshev polynomials of the stiffness matrix.
+//! Chebyshev propagator: carries the free motion over many periods at once, by Chebyshev polynomials of the stiffness
+//! matrix.
+//!
+//! Source: H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984), in the form for equations of second order in
+//! time: D. Kosloff et al., Geophys. Prospect. 37, 383 (1989).
 //!
 //! With u = e^{γt/2} y the free motion obeys u'' = -A u, A = S'/m, so that
 //!
@@ -8,26 +12,32 @@
 //! ```
 //!
 //! The spectrum of A lies in (0, Λ]. In x = 2A/Λ - 1 and θ = t√Λ, the Jacobi-Anger expansion gives
-//! cos(t√A) = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x) and √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x) with
-//! s_k = 2 Σ_{m>=k} J_{2m+1}(θ); with A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel
-//! functions vanish fast beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor
-//! steps need, and nothing is evaluated on the way. Contract: the terms left out are a given part of the motion.
+//!
+//! ```text
+//! cos(t√A)       = J_0 + 2 Σ (-1)^k J_2k(θ) T_k(x)
+//! √Λ sin(t√A)/√A = s_0 + 2 Σ (-1)^k s_k T_k(x),    s_k = 2 Σ_{m>=k} J_{2m+1}(θ)
+//! ```
+//!
+//! With A = Λ (x + 1)/2, the series of the last term follows from that of the sine. The Bessel functions vanish fast
+//! beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor steps need, and
+//! nothing is evaluated on the way. Contract: each term left out is at most a given part of the motion.
 
 use super::chain::Chain;
-use super::lanes::{LANES, Layout, Row};
-use super::vector::Vector;
+use super::layout::Layout;
+use super::simd::{Simd, Vector};
+use crate::model::{LANES, Row};
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
 const TAIL: f64 = 12.0;
-const LEAST_TAIL: f64 = 10.0;
+const MIN_TAIL: f64 = 10.0;
 
 /// Two vectors: u(0) and u'(0), or what became of them.
 type Pair = [Vec<Row>; 2];
 
-/// Work space of the recurrence.
+/// The propagator and its work space.
 #[derive(Clone, Debug)]
-pub(super) struct Glide {
-    /// T_{k-1} and T_k applied to u(0) and to u'(0).
+pub(super) struct ChebyshevPropagator {
+    /// T_{k-1} and T_k, applied to u(0) and to u'(0).
     before: Pair,
     here: Pair,
     /// u(t) and u'(t).
@@ -40,7 +50,7 @@ pub(super) struct Glide {
     weights: Vec<[f64; 3]>,
 }
 
-impl Glide {
+impl ChebyshevPropagator {
     pub fn new(layout: Layout) -> Self {
         let rows = || layout.filled(0.0);
         let pair = || [rows(), rows()];
@@ -61,14 +71,14 @@ impl Glide {
         layout.fold(velocity, &mut self.here[1]);
     }
 
-    /// Tells u(t) and u'(t) after [`advance`], one entry a block.
+    /// Writes u(t) and u'(t) after [`propagate`], one entry a block.
     pub fn end(&self, layout: Layout, displacement: &mut [f64], velocity: &mut [f64]) {
         layout.unfold(&self.sums[0], displacement);
         layout.unfold(&self.sums[1], velocity);
     }
 
     /// The coefficients for a spectrum up to Λ and θ = t√Λ, as far as they exceed `error`.
-    fn weigh(&mut self, widest: f64, angle: f64, error: f64) {
+    fn update_weights(&mut self, widest: f64, angle: f64, error: f64) {
         bessel(angle, &mut self.bessel);
         let (pairs, _) = self.bessel.as_chunks::<2>();
         let terms = pairs.iter().rposition(|pair| pair[0].abs().max(pair[1].abs()) > error).map_or(1, |last| last + 1);
@@ -96,10 +106,16 @@ impl Glide {
     }
 }
 
-/// Carries u and u' over so many seconds; `error` is the part of them that may be left out.
+/// Carries u and u' over `seconds` s; `error` is the part of them that may be left out.
 #[inline(always)]
-pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, error: f64, glide: &mut Glide) {
-    let rows = glide.diagonal.len();
+pub(super) fn propagate<S: Simd>(
+    simd: S,
+    chain: &Chain,
+    seconds: f64,
+    error: f64,
+    propagator: &mut ChebyshevPropagator,
+) {
+    let rows = propagator.diagonal.len();
     let shift = 0.25 * chain.damping_rate * chain.damping_rate;
     let mut widest = 0.0_f64;
     for (diagonal, coupling) in chain.diagonal.iter().zip(&chain.coupling) {
@@ -111,63 +127,63 @@ pub(super) fn advance<V: Vector>(chain: &Chain, seconds: f64, error: f64, glide:
     for r in 0..rows {
         for l in 0..LANES {
             // In padding both are zero there, and zeros stay zero.
-            glide.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
-            glide.coupling[r][l] = -scale * chain.coupling[r][l];
+            propagator.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
+            propagator.coupling[r][l] = -scale * chain.coupling[r][l];
         }
     }
-    glide.weigh(widest, seconds * widest.sqrt(), error);
-    for pair in [&mut glide.before, &mut glide.sums] {
+    propagator.update_weights(widest, seconds * widest.sqrt(), error);
+    for pair in [&mut propagator.before, &mut propagator.sums] {
         for rows in pair {
             rows.fill(Row::filled(0.0));
         }
     }
-    add_terms::<V>(&glide.here, &mut glide.sums, glide.weights[0]);
-    for k in 1..glide.weights.len() {
+    add_terms(simd, &propagator.here, &mut propagator.sums, propagator.weights[0]);
+    for k in 1..propagator.weights.len() {
         // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let twice = V::splat(if k == 1 { 1.0 } else { 2.0 });
-        for (here, before) in glide.here.iter().zip(&mut glide.before) {
-            recur::<V>([&glide.diagonal, &glide.coupling], here, before, twice);
+        let twice = simd.splat(if k == 1 { 1.0 } else { 2.0 });
+        for (here, before) in propagator.here.iter().zip(&mut propagator.before) {
+            recur(simd, [&propagator.diagonal, &propagator.coupling], here, before, twice);
         }
-        add_terms::<V>(&glide.before, &mut glide.sums, glide.weights[k]);
-        std::mem::swap(&mut glide.before, &mut glide.here);
+        add_terms(simd, &propagator.before, &mut propagator.sums, propagator.weights[k]);
+        std::mem::swap(&mut propagator.before, &mut propagator.here);
     }
 }
 
 /// `twice` x times one term, minus the term before it, which `next` holds.
 #[inline(always)]
-fn recur<V: Vector>([diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: V) {
+fn recur<S: Simd>(simd: S, [diagonal, coupling]: [&[Row]; 2], terms: &[Row], next: &mut [Row], twice: S::Vector) {
     let last = terms.len() - 1;
-    let mut before = V::load(&terms[last]).to_next_lane();
-    let mut here = V::load(&terms[0]);
+    let mut before = simd.load(&terms[last]).to_next_lane();
+    let mut here = simd.load(&terms[0]);
     let last_after = here.to_lane_before();
     for (((next, diagonal), coupling), after) in
         next[..last].iter_mut().zip(&diagonal[..last]).zip(&coupling[..last]).zip(&terms[1..])
     {
-        let after = V::load(after);
-        let product = here.fused(V::load(diagonal), before.plus(after).times(V::load(coupling)));
-        product.fused(twice, V::splat(0.0).minus(V::load(next))).store(next);
+        let after = simd.load(after);
+        let product = here.mul_add(simd.load(diagonal), before.plus(after).times(simd.load(coupling)));
+        product.mul_add(twice, simd.splat(0.0).minus(simd.load(next))).store(next);
         (before, here) = (here, after);
     }
-    let product = here.fused(V::load(&diagonal[last]), before.plus(last_after).times(V::load(&coupling[last])));
-    product.fused(twice, V::splat(0.0).minus(V::load(&next[last]))).store(&mut next[last]);
+    let product = here.mul_add(simd.load(&diagonal[last]), before.plus(last_after).times(simd.load(&coupling[last])));
+    product.mul_add(twice, simd.splat(0.0).minus(simd.load(&next[last]))).store(&mut next[last]);
 }
 
 /// Adds T_k, applied to u(0) and to u'(0), to u(t) and u'(t).
 #[inline(always)]
-fn add_terms<V: Vector>([displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
-    let (cosine, sine, rooted) = (V::splat(cosine), V::splat(sine), V::splat(-rooted));
+fn add_terms<S: Simd>(simd: S, [displaced, moved]: &Pair, sums: &mut Pair, [cosine, sine, rooted]: [f64; 3]) {
+    let (cosine, sine, rooted) = (simd.splat(cosine), simd.splat(sine), simd.splat(-rooted));
     let [displacement, velocity] = sums;
     for (((displaced, moved), x), v) in displaced.iter().zip(moved).zip(displacement).zip(velocity) {
-        let (displaced, moved) = (V::load(displaced), V::load(moved));
-        displaced.fused(cosine, moved.fused(sine, V::load(x))).store(x);
-        moved.fused(cosine, displaced.fused(rooted, V::load(v))).store(v);
+        let (displaced, moved) = (simd.load(displaced), simd.load(moved));
+        displaced.mul_add(cosine, moved.mul_add(sine, simd.load(x))).store(x);
+        moved.mul_add(cosine, displaced.mul_add(rooted, simd.load(v))).store(v);
     }
 }
 
 /// J_0(θ), J_1(θ), ... in pairs as far as they matter, by Miller's backward recurrence.
 fn bessel(argument: f64, values: &mut Vec<f64>) {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of terms")]
-    let pairs = (0.5 * (argument + TAIL * libm::cbrt(argument) + LEAST_TAIL)).ceil() as usize + 1;
+    let pairs = (0.5 * (argument + TAIL * libm::cbrt(argument) + MIN_TAIL)).ceil() as usize + 1;
     values.clear();
     values.resize(2 * pairs, 0.0);
     let twice_inverse = 2.0 / argument;

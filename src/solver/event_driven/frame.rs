@@ -1,0 +1,141 @@
+//! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time
+//! nor displacement loses digits in long runs.
+
+use super::series::DriveDerivatives;
+use crate::model::{ContactEvent, Drive};
+use crate::solver::harmonic::Harmonic;
+
+/// Local time at which the frame moves, in s.
+pub(super) const FRAME_SPAN: f64 = 0.0625;
+/// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
+const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
+const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
+
+/// The frame, and the drive in it.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub drive: Drive,
+    /// Time and displacement of the origin since the start of the run, in s and m.
+    origin_time: f64,
+    origin_displacement: f64,
+    /// Time since the origin, in s.
+    pub time: f64,
+    /// Displacement of the drive's ramp at the origin of time, in m.
+    ramp_at_origin: f64,
+    /// Δ cos θ and -Δ sin θ at the present phase θ.
+    swing: [f64; 2],
+}
+
+impl Frame {
+    /// The frame at the start of a run.
+    pub fn new(drive: Drive) -> Self {
+        Self {
+            drive,
+            origin_time: 0.0,
+            origin_displacement: 0.0,
+            time: 0.0,
+            // The cosine is counted from its own zero, so the ramp starts Δ below.
+            ramp_at_origin: -drive.amplitude,
+            swing: [drive.amplitude, 0.0],
+        }
+    }
+
+    /// The present time since the start of the run, in s.
+    #[inline]
+    pub fn now(&self) -> f64 {
+        self.origin_time + self.time
+    }
+
+    /// Time since the start of the run, in s, for a time in the frame.
+    #[inline]
+    pub fn absolute_time(&self, time: f64) -> f64 {
+        self.origin_time + time
+    }
+
+    /// Displacement since the start of the run, in m, for a displacement in the frame.
+    pub fn absolute_displacement(&self, displacement: f64) -> f64 {
+        self.origin_displacement + displacement
+    }
+
+    /// An event of the frame with time and displacement counted from the start of the run.
+    #[inline]
+    pub fn absolute(&self, event: ContactEvent) -> ContactEvent {
+        let time = self.absolute_time(event.time);
+        ContactEvent { time, displacement: self.absolute_displacement(event.displacement), ..event }
+    }
+
+    /// Seconds until a time that is counted from the start of the run.
+    #[inline]
+    pub fn until(&self, time: f64) -> f64 {
+        time - self.origin_time - self.time
+    }
+
+    /// Whether an instant that is `seconds` s away has come, within rounding.
+    #[inline]
+    pub fn has_come(&self, seconds: f64) -> bool {
+        seconds <= 4.0 * f64::EPSILON * self.now()
+    }
+
+    /// Sets the time in the frame, in s.
+    #[inline]
+    pub fn set_time(&mut self, time: f64) {
+        self.time = time;
+        if self.drive.is_modulated() {
+            let (sine, cosine) = libm::sincos(self.phase());
+            self.swing = [self.drive.amplitude * cosine, -self.drive.amplitude * sine];
+        }
+    }
+
+    /// Begins the next cycle of a ramped modulation, at the maximum where the two join.
+    pub fn next_cycle(&mut self) {
+        let before = self.drive.amplitude;
+        self.drive.next_cycle();
+        self.ramp_at_origin += before - self.drive.amplitude;
+        self.swing = [self.drive.amplitude, 0.0];
+    }
+
+    /// Moves the origin close to the present time and a displacement. Returns by how much, in s and m.
+    pub fn move_origin(&mut self, displacement: f64) -> (f64, f64) {
+        let time = (self.time / TIME_QUANTUM).floor() * TIME_QUANTUM;
+        let displacement = (displacement / DISPLACEMENT_QUANTUM).floor() * DISPLACEMENT_QUANTUM;
+        self.ramp_at_origin += self.drive.velocity * time - displacement;
+        self.time -= time;
+        self.origin_time += time;
+        self.origin_displacement += displacement;
+        (time, displacement)
+    }
+
+    /// Present phase of the modulation, in rad.
+    #[inline]
+    fn phase(&self) -> f64 {
+        self.drive.phase(self.origin_time) + self.drive.angular_frequency * self.time
+    }
+
+    /// Present displacement of the drive's ramp, without the cosine, in m.
+    #[inline]
+    fn ramp(&self) -> f64 {
+        self.ramp_at_origin + self.drive.velocity * self.time
+    }
+
+    /// F_S at a displacement of the trailing edge, in N.
+    #[inline]
+    pub fn shear_force(&self, displacement: f64) -> f64 {
+        self.drive.stiffness * (self.ramp() + self.swing[0] - displacement)
+    }
+
+    /// The drive's displacement from now on, within the cycle, in m.
+    pub fn drive_motion(&self) -> Harmonic {
+        let Drive { velocity, amplitude, angular_frequency, .. } = self.drive;
+        Harmonic { start: self.ramp(), rate: velocity, amplitude, phase: self.phase(), angular_frequency }
+    }
+
+    /// The derivatives of the drive's displacement, for a step of `length` s.
+    #[inline]
+    pub fn drive_derivatives(&self, length: f64) -> DriveDerivatives {
+        DriveDerivatives {
+            ramp: [self.ramp(), self.drive.velocity * length],
+            swing: self.swing,
+            angle: self.drive.angular_frequency * length,
+        }
+    }
+}
