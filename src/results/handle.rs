@@ -138,7 +138,7 @@ impl<'a> Results<'a> {
     }
 
     /// Names of the tables, that of the jobs last.
-    pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
+    pub fn tables(&self) -> impl Iterator<Item = &'static str> + use<> {
         let precursors = self.sweep().recording().precursors.then(|| tables::precursors().name);
         [Some(tables::slips().name), precursors, Some(tables::jobs().name)].into_iter().flatten()
     }
