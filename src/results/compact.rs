@@ -93,21 +93,23 @@ impl Results<'_> {
 
     pub(crate) fn compact_by(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
         self.exclusively(|| {
+            // It may have been extended before the lock was ours.
+            let results = Self::read(self.storage(), self.layout().root())?;
             let problems = Self::verify(self.storage(), self.layout().root())?.problems;
             if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
                 return Err(ResultsError::damaged(&problem.path, problem.problem));
             }
             let staging = self.layout().staging(WRITER);
             self.storage().remove_folder(&staging)?;
-            let plan = self.plan_compaction(parts_per_file)?;
-            let mut there = self.table_files(tables::JOBS)?;
+            let plan = results.plan_compaction(parts_per_file)?;
+            let mut there = results.table_files(tables::JOBS)?;
             there.retain(|_, file| file.is_compacted());
             let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
             let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
             if changed {
-                self.build(&plan, &staging)?;
+                results.build(&plan, &staging)?;
             }
-            Ok(self.report_compaction(&plan, changed)?)
+            Ok(results.report_compaction(&plan, changed)?)
         })
     }
 

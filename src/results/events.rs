@@ -5,9 +5,9 @@
 
 use crate::results::commit::create_folder;
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, TableFile};
+use crate::results::layout::TableFile;
 use crate::table::file::PROGRAM;
-use crate::table::storage::{Storage, StorageError, StoredFile};
+use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -160,15 +160,6 @@ fn now() -> f64 {
 pub struct Log(StoredFile);
 
 impl Log {
-    fn create(storage: &dyn Storage, layout: &Layout) -> Result<Self, StorageError> {
-        let folder = layout.logs();
-        create_folder(storage, &folder)?;
-        let plain: String =
-            host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
-        let path = folder.join(format!("{:.3}-{plain}-{}.jsonl", now(), std::process::id()));
-        Ok(Self(storage.create(&path)?))
-    }
-
     /// Appends an event, if it is one that the log keeps.
     ///
     /// # Errors
@@ -183,51 +174,11 @@ impl Log {
     }
 }
 
-/// Goes through the events of all logs, in order of the beginnings of their runs. What a killed run left half-written
-/// is passed over.
-fn read(storage: &dyn Storage, layout: &Layout, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
-    let folder = layout.logs();
-    for name in storage.list(&folder)? {
-        let path = folder.join(name);
-        for line in BufReader::new(storage.open(&path)?).split(b'\n') {
-            let line = line.map_err(StorageError::at("read", &path))?;
-            if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
-                visit(event);
-            }
-        }
-    }
-    Ok(())
-}
-
 /// How the rows of a part were kept last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
     Alone,
     Compacted,
-}
-
-/// The parts that were committed and not taken away since, by their names, as the logs say.
-pub(super) fn committed_parts(storage: &dyn Storage, layout: &Layout) -> Result<BTreeMap<String, Kept>, StorageError> {
-    let mut parts = BTreeMap::new();
-    read(storage, layout, |event| match event {
-        RunEvent::PartCommitted { part, .. } => {
-            parts.insert(part, Kept::Alone);
-        }
-        RunEvent::PartQuarantined { part } => {
-            parts.remove(&part);
-        }
-        RunEvent::Compacted { files } => {
-            parts.extend(
-                files
-                    .iter()
-                    .filter_map(|name| TableFile::parse(name))
-                    .flat_map(|file| file.part_names())
-                    .map(|part| (part, Kept::Compacted)),
-            );
-        }
-        _ => (),
-    })?;
-    Ok(parts)
 }
 
 impl Results<'_> {
@@ -236,15 +187,31 @@ impl Results<'_> {
     /// # Errors
     /// When it cannot be created.
     pub fn begin_log(&self) -> Result<Log, StorageError> {
-        Log::create(self.storage(), self.layout())
+        let folder = self.layout().logs();
+        create_folder(self.storage(), &folder)?;
+        let plain: String =
+            host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+        let path = folder.join(format!("{:.3}-{plain}-{}.jsonl", now(), std::process::id()));
+        Ok(Log(self.storage().create(&path)?))
     }
 
-    /// Goes through all events that are logged, in order of the beginnings of their runs.
+    /// Goes through all events that are logged, in order of the beginnings of their runs. What a killed run left
+    /// half-written is passed over.
     ///
     /// # Errors
     /// When a log cannot be read.
-    pub fn events(&self, visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
-        read(self.storage(), self.layout(), visit)
+    pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
+        let folder = self.layout().logs();
+        for name in self.storage().list(&folder)? {
+            let path = folder.join(name);
+            for line in BufReader::new(self.storage().open(&path)?).split(b'\n') {
+                let line = line.map_err(StorageError::at("read", &path))?;
+                if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
+                    visit(event);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Measured over predicted cost of all parts in the logs; `None` before the first.
@@ -261,18 +228,40 @@ impl Results<'_> {
         })?;
         Ok((predicted > 0.0).then(|| measured / predicted))
     }
+
+    /// The parts that were committed and not taken away since, by their names, as the logs say.
+    pub(super) fn committed_parts(&self) -> Result<BTreeMap<String, Kept>, StorageError> {
+        let mut parts = BTreeMap::new();
+        self.events(|event| match event {
+            RunEvent::PartCommitted { part, .. } => {
+                parts.insert(part, Kept::Alone);
+            }
+            RunEvent::PartQuarantined { part } => {
+                parts.remove(&part);
+            }
+            RunEvent::Compacted { files } => {
+                let files = files.iter().filter_map(|name| TableFile::parse(name));
+                parts.extend(files.flat_map(|file| file.part_names()).map(|part| (part, Kept::Compacted)));
+            }
+            _ => (),
+        })?;
+        Ok(parts)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sweep::Sweep;
     use crate::table::storage::Disk;
+    use std::path::Path;
 
     #[test]
     fn a_log_reads_back_without_its_half_written_end() {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
-        let mut log = Log::create(&Disk, &layout).unwrap();
+        let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
+        let results = Results::open(&Disk, root.path(), &sweep).unwrap();
+        let mut log = results.begin_log().unwrap();
         let events = [
             RunEvent::started("1/1".to_owned(), 2, 3, 0, 4.0),
             RunEvent::Finished(RunReport { jobs_run: 3, time_wanted: Some(1.5), ..RunReport::default() }),
@@ -285,7 +274,7 @@ mod tests {
         log.write(&RunEvent::JobDone { slips: 3, predicted_cost: 1.0, wall: 1.0 }).unwrap();
         log.0.write(b"{\"time\": 1, \"ev").unwrap();
         let mut read_back = Vec::new();
-        read(&Disk, &layout, |event| read_back.push(event)).unwrap();
+        results.events(|event| read_back.push(event)).unwrap();
         assert_eq!(read_back, events);
     }
 }

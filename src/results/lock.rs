@@ -16,9 +16,8 @@ use crate::results::commit::{create_folder, token};
 use crate::results::error::ResultsError;
 use crate::results::events::{UNKNOWN_HOST, host};
 use crate::results::handle::Results;
-use crate::results::layout::Layout;
 use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -37,6 +36,79 @@ const EXCLUSIVE: &str = "exclusive";
 /// What the names of the locks of shards begin with.
 const SHARD: &str = "shard-";
 
+/// The locks of a directory.
+#[derive(Clone)]
+struct Locks<'a> {
+    storage: &'a dyn Storage,
+    folder: PathBuf,
+}
+
+impl<'a> Locks<'a> {
+    /// Takes the lock of this name; `None` if another process has it.
+    fn take(&self, name: &str, timeout: Duration) -> Result<Option<HeldLock<'a>>, StorageError> {
+        create_folder(self.storage, &self.folder)?;
+        let file = self.folder.join(name);
+        let lock = wait_for_lock(self.storage, &file, MAX_WAIT)?;
+        if matches!(lock, Lock::Taken) {
+            return Ok(None);
+        }
+        let before = self.storage.read(&file)?;
+        let is_dead = !is_whole(&before) || (matches!(lock, Lock::Ours(_)) && is_of_this_host(&before));
+        if !is_dead && self.grows(name, &before, timeout)? {
+            return Ok(None);
+        }
+        let owner = format!("{}{SEPARATOR}{}{SEPARATOR}{}", host(), std::process::id(), token());
+        let held = HeldLock { storage: self.storage, file, owner, _lock: lock };
+        held.beat(0)?;
+        Ok(Some(held))
+    }
+
+    /// Whether a process has a lock: by the operating system, or by a heartbeat of another host that is recent, as far as
+    /// the hosts' clocks agree.
+    fn is_locked(&self, name: &str) -> Result<bool, StorageError> {
+        let (storage, file) = (self.storage, self.folder.join(name));
+        if !storage.exists(&file)? {
+            return Ok(false);
+        }
+        // A lock that cannot be tried, as in a read-only copy, is nobody's.
+        let Ok(lock) = storage.lock(&file) else { return Ok(false) };
+        let heartbeat = storage.read(&file)?;
+        Ok(match lock {
+            Lock::Taken => true,
+            _ if !is_whole(&heartbeat) => false,
+            Lock::Ours(_) if is_of_this_host(&heartbeat) => false,
+            Lock::Ours(_) | Lock::Unknown => {
+                let modified = storage.open(&file)?.metadata().and_then(|metadata| metadata.modified());
+                modified.is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age < TIMEOUT))
+            }
+        })
+    }
+
+    /// Whether a process has a lock, and does not give it back within an instant, as who looks at it does.
+    fn stays_locked(&self, name: &str) -> Result<bool, StorageError> {
+        let begin = Instant::now();
+        while self.is_locked(name)? {
+            if begin.elapsed() >= MAX_WAIT {
+                return Ok(true);
+            }
+            std::thread::sleep(POLL);
+        }
+        Ok(false)
+    }
+
+    /// Watches a heartbeat for some time.
+    fn grows(&self, name: &str, before: &[u8], timeout: Duration) -> Result<bool, StorageError> {
+        let begin = Instant::now();
+        while begin.elapsed() < timeout {
+            std::thread::sleep(timeout / 20);
+            if self.storage.read(&self.folder.join(name))? != before {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
 /// A lock, until it is dropped.
 pub struct HeldLock<'a> {
     storage: &'a dyn Storage,
@@ -46,31 +118,7 @@ pub struct HeldLock<'a> {
     _lock: Lock,
 }
 
-impl<'a> HeldLock<'a> {
-    /// Takes the lock of this name; `None` if another process has it.
-    fn take(
-        storage: &'a dyn Storage,
-        layout: &Layout,
-        name: &str,
-        timeout: Duration,
-    ) -> Result<Option<Self>, StorageError> {
-        create_folder(storage, &layout.locks())?;
-        let file = layout.locks().join(name);
-        let lock = wait_for_lock(storage, &file, MAX_WAIT)?;
-        if matches!(lock, Lock::Taken) {
-            return Ok(None);
-        }
-        let before = storage.read(&file)?;
-        let is_dead = !is_whole(&before) || (matches!(lock, Lock::Ours(_)) && is_of_this_host(&before));
-        if !is_dead && grows(storage, &file, &before, timeout)? {
-            return Ok(None);
-        }
-        let owner = format!("{}{SEPARATOR}{}{SEPARATOR}{}", host(), std::process::id(), token());
-        let held = Self { storage, file, owner, _lock: lock };
-        held.beat(0)?;
-        Ok(Some(held))
-    }
-
+impl HeldLock<'_> {
     /// Runs `body` while renewing the heartbeat.
     pub fn while_held<T>(&self, body: impl FnOnce() -> T) -> T {
         std::thread::scope(|scope| {
@@ -102,14 +150,17 @@ impl Drop for HeldLock<'_> {
 }
 
 impl<'a> Results<'a> {
+    fn locks(&self) -> Locks<'a> {
+        Locks { storage: self.storage(), folder: self.layout().locks() }
+    }
+
     /// Locks the shard of this name, which begins with `shard-`; `None` if another process has it.
     ///
     /// # Errors
     /// When another process has the whole directory to itself.
     pub fn lock_shard(&self, name: &str) -> Result<Option<HeldLock<'a>>, ResultsError> {
-        let (storage, layout) = (self.storage(), self.layout());
-        let lock = HeldLock::take(storage, layout, name, TIMEOUT)?;
-        if lock.is_some() && stays_locked(storage, layout, EXCLUSIVE)? { Err(is_repaired(layout)) } else { Ok(lock) }
+        let lock = self.locks().take(name, TIMEOUT)?;
+        if lock.is_some() && self.locks().stays_locked(EXCLUSIVE)? { Err(self.is_repaired()) } else { Ok(lock) }
     }
 
     /// Whether a process has the lock of this name, without waiting.
@@ -117,7 +168,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When the lock cannot be looked at.
     pub fn is_locked(&self, name: &str) -> Result<bool, StorageError> {
-        is_locked(self.storage(), self.layout(), name)
+        self.locks().is_locked(name)
     }
 
     /// Runs `body` while nobody else changes the directory.
@@ -125,16 +176,21 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When a shard is being run, or another process has the directory to itself; and what `body` says.
     pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
-        let (storage, layout) = (self.storage(), self.layout());
-        let lock = HeldLock::take(storage, layout, EXCLUSIVE, TIMEOUT)?.ok_or_else(|| is_repaired(layout))?;
-        for name in storage.list(&layout.locks())? {
+        let locks = self.locks();
+        let lock = locks.take(EXCLUSIVE, TIMEOUT)?.ok_or_else(|| self.is_repaired())?;
+        for name in self.storage().list(&locks.folder)? {
             let shard = name.to_string_lossy();
-            if shard.starts_with(SHARD) && stays_locked(storage, layout, &shard)? {
+            if shard.starts_with(SHARD) && locks.stays_locked(&shard)? {
                 let problem = format!("is being run ({shard}); wait for it or stop it, then try again");
-                return Err(ResultsError::busy(layout.root(), problem));
+                return Err(ResultsError::busy(self.layout().root(), problem));
             }
         }
         lock.while_held(body)
+    }
+
+    fn is_repaired(&self) -> ResultsError {
+        let problem = "is being repaired or compacted by another process; try again when it has ended";
+        ResultsError::busy(self.layout().root(), problem)
     }
 
     /// Removes what dead processes left in the staging folders of shards.
@@ -156,44 +212,6 @@ impl<'a> Results<'a> {
     }
 }
 
-fn is_repaired(layout: &Layout) -> ResultsError {
-    let problem = "is being repaired or compacted by another process; try again when it has ended";
-    ResultsError::busy(layout.root(), problem)
-}
-
-/// Whether a process has a lock, and does not give it back within an instant, as who looks at it does.
-fn stays_locked(storage: &dyn Storage, layout: &Layout, name: &str) -> Result<bool, StorageError> {
-    let begin = Instant::now();
-    while is_locked(storage, layout, name)? {
-        if begin.elapsed() >= MAX_WAIT {
-            return Ok(true);
-        }
-        std::thread::sleep(POLL);
-    }
-    Ok(false)
-}
-
-/// Whether a process has a lock: by the operating system, or by a heartbeat of another host that is recent, as far as
-/// the hosts' clocks agree.
-fn is_locked(storage: &dyn Storage, layout: &Layout, name: &str) -> Result<bool, StorageError> {
-    let file = layout.locks().join(name);
-    if !storage.exists(&file)? {
-        return Ok(false);
-    }
-    // A lock that cannot be tried, as in a read-only copy, is nobody's.
-    let Ok(lock) = storage.lock(&file) else { return Ok(false) };
-    let heartbeat = storage.read(&file)?;
-    Ok(match lock {
-        Lock::Taken => true,
-        _ if !is_whole(&heartbeat) => false,
-        Lock::Ours(_) if is_of_this_host(&heartbeat) => false,
-        Lock::Ours(_) | Lock::Unknown => {
-            let modified = storage.open(&file)?.metadata().and_then(|metadata| metadata.modified());
-            modified.is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age < TIMEOUT))
-        }
-    })
-}
-
 /// Whether this is a heartbeat: released locks are empty, and a power cut may leave part of one.
 fn is_whole(heartbeat: &[u8]) -> bool {
     heartbeat.split(|&byte| byte == SEPARATOR as u8).count() == 4
@@ -205,24 +223,13 @@ fn is_of_this_host(heartbeat: &[u8]) -> bool {
     host != UNKNOWN_HOST && heartbeat.starts_with(format!("{host}{SEPARATOR}").as_bytes())
 }
 
-/// Watches a heartbeat for some time.
-fn grows(storage: &dyn Storage, file: &Path, before: &[u8], timeout: Duration) -> Result<bool, StorageError> {
-    let begin = Instant::now();
-    while begin.elapsed() < timeout {
-        std::thread::sleep(timeout / 20);
-        if storage.read(file)? != before {
-            return Ok(true);
-        }
-    }
-    Ok(false)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::table::storage::Disk;
     use crate::table::storage::over_disk::OverDisk;
     use std::fs::{self, File};
+    use std::path::Path;
 
     const SHORT: Duration = Duration::from_millis(200);
 
@@ -236,49 +243,54 @@ mod tests {
         }
     }
 
-    fn take<'a>(storage: &'a dyn Storage, layout: &Layout) -> Option<HeldLock<'a>> {
-        HeldLock::take(storage, layout, "shard-1-of-1", SHORT).unwrap()
+    const NAME: &str = "shard-1-of-1";
+
+    fn locks<'a>(storage: &'a dyn Storage, root: &tempfile::TempDir) -> Locks<'a> {
+        Locks { storage, folder: root.path().to_owned() }
+    }
+
+    fn take<'a>(locks: &Locks<'a>) -> Option<HeldLock<'a>> {
+        locks.take(NAME, SHORT).unwrap()
     }
 
     /// Leaves the heartbeat of a process that was killed.
-    fn die(layout: &Layout, host: &str) {
-        fs::create_dir_all(layout.locks()).unwrap();
-        fs::write(layout.locks().join("shard-1-of-1"), format!("{host}\t77\tabc\t5")).unwrap();
+    fn die(locks: &Locks<'_>, host: &str) {
+        fs::write(locks.folder.join(NAME), format!("{host}\t77\tabc\t5")).unwrap();
     }
 
     #[test]
     fn a_lock_is_refused_while_held_and_free_afterwards() {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
-        let held = take(&Disk, &layout).unwrap();
-        assert!(take(&Disk, &layout).is_none() && is_locked(&Disk, &layout, "shard-1-of-1").unwrap());
-        assert!(HeldLock::take(&Disk, &layout, "shard-1-of-2", SHORT).unwrap().is_some());
+        let locks = locks(&Disk, &root);
+        let held = take(&locks).unwrap();
+        assert!(take(&locks).is_none() && locks.is_locked(NAME).unwrap());
+        assert!(locks.take("shard-1-of-2", SHORT).unwrap().is_some());
         drop(held);
-        assert!(!is_locked(&Disk, &layout, "shard-1-of-1").unwrap());
-        assert!(take(&Disk, &layout).is_some());
+        assert!(!locks.is_locked(NAME).unwrap());
+        assert!(take(&locks).is_some());
     }
 
     #[test]
     fn the_lock_of_a_dead_process_is_taken_over_at_once_on_its_host_and_after_a_while_from_another() {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
+        let locks = locks(&Disk, &root);
         for (dead_host, waits) in [(host(), false), ("elsewhere".to_owned(), true)] {
-            die(&layout, &dead_host);
+            die(&locks, &dead_host);
             let begin = Instant::now();
-            assert!(take(&Disk, &layout).is_some());
+            assert!(take(&locks).is_some());
             assert_eq!(begin.elapsed() >= SHORT, waits, "{dead_host}");
         }
         // What a power cut leaves of a heartbeat.
-        fs::write(layout.locks().join("shard-1-of-1"), "elsewh").unwrap();
+        fs::write(locks.folder.join(NAME), "elsewh").unwrap();
         let begin = Instant::now();
-        assert!(take(&Disk, &layout).is_some() && begin.elapsed() < SHORT);
+        assert!(take(&locks).is_some() && begin.elapsed() < SHORT);
     }
 
     #[test]
     fn where_locks_are_not_seen_a_heartbeat_that_grows_keeps_others_out() {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
-        let held = take(&WithoutLocks, &layout).unwrap();
+        let locks = locks(&WithoutLocks, &root);
+        let held = take(&locks).unwrap();
         let refused = std::thread::scope(|scope| {
             scope.spawn(|| {
                 for count in 1..8 {
@@ -286,21 +298,20 @@ mod tests {
                     held.beat(count).unwrap();
                 }
             });
-            take(&WithoutLocks, &layout).is_none()
+            take(&locks).is_none()
         });
-        assert!(refused && is_locked(&WithoutLocks, &layout, "shard-1-of-1").unwrap());
+        assert!(refused && locks.is_locked(NAME).unwrap());
         drop(held);
-        assert!(!is_locked(&WithoutLocks, &layout, "shard-1-of-1").unwrap());
-        assert!(take(&WithoutLocks, &layout).is_some());
+        assert!(!locks.is_locked(NAME).unwrap());
+        assert!(take(&locks).is_some());
     }
 
     #[test]
     fn a_lock_that_is_held_grows() {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
-        let held = take(&Disk, &layout).unwrap();
-        let file = layout.locks().join("shard-1-of-1");
-        let first = fs::read(&file).unwrap();
-        held.while_held(|| assert!(grows(&Disk, &file, &first, 2 * BEAT).unwrap()));
+        let locks = locks(&Disk, &root);
+        let held = take(&locks).unwrap();
+        let first = fs::read(locks.folder.join(NAME)).unwrap();
+        held.while_held(|| assert!(locks.grows(NAME, &first, 2 * BEAT).unwrap()));
     }
 }

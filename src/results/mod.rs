@@ -6,7 +6,7 @@
 //! layout.rs, manifest.rs      where everything lies, and which sweeps it belongs to
 //! handle.rs                   a directory that fits this program
 //!   parts.rs                  which parts are done, and the rows of one, in all tables at once
-//!   lock.rs                   who runs a shard, and who has the directory to himself
+//!   lock.rs                   who runs a shard, and who has the whole directory
 //!   events.rs                 what happens, and its log
 //!   compact.rs                many parts in one file
 //!   verify/                   what is damaged, and its repair

@@ -22,7 +22,7 @@ pub(super) fn salvage<'a>(
     problems: &mut Vec<Problem>,
 ) -> Result<Results<'a>, ResultsError> {
     let layout = Layout::new(root);
-    let (manifest, texts) = texts(storage, &layout, problems)?;
+    let (manifest, texts) = Remains { storage, layout: &layout }.texts(problems)?;
     let sweeps = parse(&layout, &texts)?;
     let first = sweeps.first().ok_or_else(|| no_results(root))?;
     if let Some(manifest) = &manifest {
@@ -45,83 +45,88 @@ pub(super) fn restore_manifest(results: &Results<'_>) -> Result<(), ResultsError
     manifest.write(results.storage(), results.layout())
 }
 
-/// The manifest, if it is to be believed, and the texts of all sweeps.
-fn texts(
-    storage: &dyn Storage,
-    layout: &Layout,
-    problems: &mut Vec<Problem>,
-) -> Result<(Option<Manifest>, Vec<String>), ResultsError> {
-    let copies = copies(storage, layout)?;
-    let damaged = match Manifest::read(storage, layout) {
-        Ok(Some(manifest)) => match foreign(storage, layout, &manifest, &copies) {
-            None => {
-                for (extension, text) in manifest.sweeps.iter().enumerate() {
-                    if copies.get(extension) != Some(text) {
-                        let path = layout.sweep(extension);
-                        let is_there = storage.exists(&path)?;
-                        let problem =
-                            if is_there { "it is not the text that the manifest has" } else { "it is missing" };
-                        problems.push(Problem::of_file(path, problem, Remedy::Manifest));
+/// What is left of a directory.
+struct Remains<'a> {
+    storage: &'a dyn Storage,
+    layout: &'a Layout,
+}
+
+impl Remains<'_> {
+    /// The manifest, if it is to be believed, and the texts of all sweeps.
+    fn texts(&self, problems: &mut Vec<Problem>) -> Result<(Option<Manifest>, Vec<String>), ResultsError> {
+        let Self { storage, layout } = *self;
+        let copies = self.copies()?;
+        let damaged = match Manifest::read(storage, layout) {
+            Ok(Some(manifest)) => match self.foreign(&manifest, &copies) {
+                None => {
+                    for (extension, text) in manifest.sweeps.iter().enumerate() {
+                        if copies.get(extension) != Some(text) {
+                            let path = layout.sweep(extension);
+                            let is_there = storage.exists(&path)?;
+                            let problem =
+                                if is_there { "it is not the text that the manifest has" } else { "it is missing" };
+                            problems.push(Problem::of_file(path, problem, Remedy::Manifest));
+                        }
                     }
+                    let texts = manifest.sweeps.clone();
+                    return Ok((Some(manifest), texts));
                 }
-                let texts = manifest.sweeps.clone();
-                return Ok((Some(manifest), texts));
-            }
-            Some(problem) => problem,
-        },
-        Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
-        Ok(None) => "it is missing".to_owned(),
-        Err(error) if error.kind == ErrorKind::Damaged => error.problem,
-        Err(error) => return Err(error),
-    };
-    // Nothing else says what a damaged copy was, and nothing may be guessed.
-    for (extension, text) in copies.iter().enumerate() {
-        if text_in_tables(storage, layout, extension).is_some_and(|found| found != *text) {
-            let problem = "it and the manifest are both damaged; restore one of them from a backup";
-            return Err(ResultsError::damaged(&layout.sweep(extension), problem));
-        }
-    }
-    if copies.is_empty() {
-        let problem = format!("{damaged}, and so are the copies of the sweep files; restore one of them from a backup");
-        return Err(ResultsError::damaged(&layout.manifest(), problem));
-    }
-    problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
-    Ok((None, copies))
-}
-
-/// The copies of sweep files, as far as they can be read.
-fn copies(storage: &dyn Storage, layout: &Layout) -> Result<Vec<String>, ResultsError> {
-    let mut copies = Vec::new();
-    loop {
-        let path = layout.sweep(copies.len());
-        if !storage.exists(&path)? {
-            return Ok(copies);
-        }
-        match read_text(storage, &path) {
-            Ok(text) => copies.push(text),
-            Err(error) if error.kind == ErrorKind::Damaged => copies.push(String::new()),
+                Some(problem) => problem,
+            },
+            Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
+            Ok(None) => "it is missing".to_owned(),
+            Err(error) if error.kind == ErrorKind::Damaged => error.problem,
             Err(error) => return Err(error),
+        };
+        // Nothing else says what a damaged copy was, and nothing may be guessed.
+        for (extension, text) in copies.iter().enumerate() {
+            if self.text_in_tables(extension).is_some_and(|found| found != *text) {
+                let problem = "it and the manifest are both damaged; restore one of them from a backup";
+                return Err(ResultsError::damaged(&layout.sweep(extension), problem));
+            }
+        }
+        if copies.is_empty() {
+            let problem =
+                format!("{damaged}, and so are the copies of the sweep files; restore one of them from a backup");
+            return Err(ResultsError::damaged(&layout.manifest(), problem));
+        }
+        problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
+        Ok((None, copies))
+    }
+
+    /// The copies of sweep files, as far as they can be read.
+    fn copies(&self) -> Result<Vec<String>, ResultsError> {
+        let mut copies = Vec::new();
+        loop {
+            let path = self.layout.sweep(copies.len());
+            if !self.storage.exists(&path)? {
+                return Ok(copies);
+            }
+            match read_text(self.storage, &path) {
+                Err(error) if error.kind == ErrorKind::Damaged => copies.push(String::new()),
+                text => copies.push(text?),
+            }
         }
     }
-}
 
-/// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
-fn foreign(storage: &dyn Storage, layout: &Layout, manifest: &Manifest, copies: &[String]) -> Option<String> {
-    let is_in_tables = |extension: usize, text: &String| {
-        manifest.sweeps.get(extension) != Some(text)
-            && text_in_tables(storage, layout, extension).as_ref() == Some(text)
-    };
-    let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
-    Some(format!("it does not belong to these tables: their sweep {extension} is another"))
-}
+    /// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
+    fn foreign(&self, manifest: &Manifest, copies: &[String]) -> Option<String> {
+        let is_in_tables = |extension: usize, text: &String| {
+            manifest.sweeps.get(extension) != Some(text) && self.text_in_tables(extension).as_ref() == Some(text)
+        };
+        let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
+        Some(format!("it does not belong to these tables: their sweep {extension} is another"))
+    }
 
-/// The sweep in the first whole file with parts of an extension.
-fn text_in_tables(storage: &dyn Storage, layout: &Layout, extension: usize) -> Option<String> {
-    let is_of_extension = |path: &Path| {
-        let file = path.file_name().and_then(|name| TableFile::parse(name.to_str()?));
-        file.is_some_and(|file| file.extension == extension)
-    };
-    let files = files(storage, &layout.table(tables::JOBS)).ok()?;
-    let mut whole = files.iter().filter(|path| is_of_extension(path) && checksum::check(storage, path).is_ok());
-    footer(storage, whole.next()?).ok()?.remove("sweep")
+    /// The sweep in the first whole file with parts of an extension.
+    fn text_in_tables(&self, extension: usize) -> Option<String> {
+        let is_of_extension = |path: &Path| {
+            let file = path.file_name().and_then(|name| TableFile::parse(name.to_str()?));
+            file.is_some_and(|file| file.extension == extension)
+        };
+        let files = files(self.storage, &self.layout.table(tables::JOBS)).ok()?;
+        let is_whole = |path: &Path| checksum::check(self.storage, path).is_ok();
+        let whole = files.iter().find(|path| is_of_extension(path) && is_whole(path))?;
+        footer(self.storage, whole).ok()?.remove("sweep")
+    }
 }

@@ -16,14 +16,14 @@ mod rows;
 
 use crate::results::commit::move_away;
 use crate::results::error::ResultsError;
-use crate::results::events::{Kept, RunEvent, committed_parts};
+use crate::results::events::RunEvent;
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, part_name};
+use crate::results::layout::part_name;
 use crate::table::checksum;
 use crate::table::file::DatasetError;
 use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Version of [`Verification`] as JSON.
@@ -169,10 +169,10 @@ impl<'a> Results<'a> {
 
     /// Verifies a directory; gives it as it is restored.
     fn examine(storage: &'a dyn Storage, root: &Path) -> Result<(Self, Verification), ResultsError> {
-        // First, so that what the logs say is there was there when the files were listed.
-        let committed: BTreeMap<String, Kept> = committed_parts(storage, &Layout::new(root))?;
         let mut verification = Verification { format: FORMAT, ..Verification::default() };
         let results = manifest::salvage(storage, root, &mut verification.problems)?;
+        // First, so that what the logs say is there was there when the files were listed.
+        let committed = results.committed_parts()?;
         files::verify(&results, &committed, &mut verification)?;
         let reduced = results.layout().reduced();
         for name in storage.list(&reduced)? {

@@ -165,6 +165,16 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
 }
 
 #[test]
+fn what_was_run_after_a_directory_was_opened_is_compacted_too() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), FEWER);
+    let opened = Results::read(&Disk, root.path()).unwrap();
+    run_all(root.path(), SEEDS);
+    assert_eq!(opened.compact().unwrap().jobs, 2 * SEEDS);
+    assert_eq!(ids(root.path()).len() as u64, 2 * SEEDS);
+}
+
+#[test]
 fn a_repair_that_ends_at_any_operation_can_be_done_again() {
     let whole = extended();
     let expected = tables_of(whole.path());
