@@ -62,7 +62,7 @@ impl Chunk {
     }
 
     fn goes_on_with(&self, part: &Part) -> bool {
-        (self.extension, self.parts.end() + 1) == (part.epoch, part.index)
+        (self.extension, self.parts.end() + 1) == (part.extension, part.index)
     }
 
     /// Whether a file holds these parts, compacted.
@@ -121,12 +121,12 @@ impl Results<'_> {
             let Some(failures) = self.failures(&done, &part)? else { continue };
             let jobs = part.jobs.len() as u64;
             match plan.chunks.last_mut() {
-                _ if !failures.is_empty() => plan.failed.push((part.epoch, part.index)),
+                _ if !failures.is_empty() => plan.failed.push((part.extension, part.index)),
                 Some(chunk) if chunk.goes_on_with(&part) && !part.index.is_multiple_of(parts_per_file) => {
                     chunk.parts = *chunk.parts.start()..=part.index;
                     chunk.jobs += jobs;
                 }
-                _ => plan.chunks.push(Chunk { extension: part.epoch, parts: part.index..=part.index, jobs }),
+                _ => plan.chunks.push(Chunk { extension: part.extension, parts: part.index..=part.index, jobs }),
             }
         }
         Ok(plan)

@@ -146,20 +146,20 @@ impl<'a> Results<'a> {
     /// Whether a part is to be there: it holds a job of the sweep that was asked for last.
     #[must_use]
     pub fn wants(&self, part: &Part) -> bool {
-        part.epoch == self.current || part.jobs.iter().any(|job| self.sweep().contains(&job.parameters))
+        part.extension == self.current || part.jobs.iter().any(|job| self.sweep().contains(&job.parameters))
     }
 
     /// How many jobs of a part are not of the sweep that was asked for last.
     #[must_use]
     pub fn unwanted_jobs(&self, part: &Part) -> u64 {
-        let is_wanted = |job: &&Job| part.epoch == self.current || self.sweep().contains(&job.parameters);
+        let is_wanted = |job: &&Job| part.extension == self.current || self.sweep().contains(&job.parameters);
         (part.jobs.len() - part.jobs.iter().filter(is_wanted).count()) as u64
     }
 
     /// The id of a job of a part.
     #[must_use]
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.sweeps[part.epoch].job_id(&part.jobs[position].parameters).to_string()
+        self.sweeps[part.extension].job_id(&part.jobs[position].parameters).to_string()
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a

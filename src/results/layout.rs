@@ -129,7 +129,7 @@ const CHECKSUM_CHARACTERS: usize = 16;
 /// Name of a part, which is that of its file in every table.
 #[must_use]
 pub fn part_name(part: &Part) -> String {
-    part_name_of(part.epoch, part.index)
+    part_name_of(part.extension, part.index)
 }
 
 /// Name of a part by its extension and its number.

@@ -36,13 +36,13 @@ impl DoneParts {
     /// Whether a part is done.
     #[must_use]
     pub fn has(&self, part: &Part) -> bool {
-        self.is_compacted(part) || self.own.contains(&(part.epoch, part.index))
+        self.is_compacted(part) || self.own.contains(&(part.extension, part.index))
     }
 
     /// Whether the rows of a part are in a compacted file.
     #[must_use]
     pub fn is_compacted(&self, part: &Part) -> bool {
-        let before = self.compacted.range((part.epoch, 0)..=(part.epoch, part.index)).next_back();
+        let before = self.compacted.range((part.extension, 0)..=(part.extension, part.index)).next_back();
         before.is_some_and(|(_, &last)| part.index <= last)
     }
 }
@@ -71,7 +71,7 @@ impl Results<'_> {
     /// The file of a part in a table.
     #[must_use]
     pub fn part_file(&self, table: &str, part: &Part) -> PathBuf {
-        self.layout().table(table).join(TableFile::of_part(part.epoch, part.index).to_string())
+        self.layout().table(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 
     /// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done. Parts with
@@ -109,7 +109,7 @@ impl Results<'_> {
     /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
     /// counts as before, or as done, but never as half done.
     pub fn commit(&self, staging: &Path, part: &Part, outcomes: &BTreeMap<usize, Outcome>) -> Result<(), ResultsError> {
-        let sweep = &self.sweeps()[part.epoch];
+        let sweep = &self.sweeps()[part.extension];
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let jobs: Jobs<'_> = (0..part.jobs.len()).map(|position| (label(position), outcomes.get(&position))).collect();
         let mut commit = Commit::begin(self.storage(), staging)?;
@@ -140,7 +140,7 @@ impl Results<'_> {
         create_folder(self.storage(), &self.layout().table(R::NAME))?;
         let keeps = jobs.iter().any(|(_, outcome)| outcome.is_none());
         let kept = if keeps { KeptRows::read(self.storage(), &target)? } else { KeptRows::default() };
-        let footer = self.footer(part.epoch);
+        let footer = self.footer(part.extension);
         let mut writer = TableWriter::create(self.storage(), &commit.stage(&target), &footer)?;
         for (job, outcome) in jobs {
             match outcome {

@@ -120,13 +120,13 @@ impl<'a, 'e> Collector<'a, 'e> {
             Err(reason) => RunEvent::JobFailed {
                 job_id: self.share.results.job_id(&of.part, of.position),
                 reason: reason.clone(),
-                command: self.share.results.sweeps()[of.part.epoch].command(job),
+                command: self.share.results.sweeps()[of.part.extension].command(job),
                 predicted_cost,
                 wall,
             },
         };
         self.events.send(&event)?;
-        let key = (of.part.epoch, of.part.index);
+        let key = (of.part.extension, of.part.index);
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             part: Arc::clone(&of.part),
             outcomes: BTreeMap::new(),

@@ -82,7 +82,7 @@ mod tests {
 
     fn plan(costs: &[f64]) -> impl Iterator<Item = Part> {
         let parts = costs.iter().enumerate().map(|(index, &cost)| Part {
-            epoch: index / 7,
+            extension: index / 7,
             index: index as u64,
             jobs: Vec::new(),
             cost,

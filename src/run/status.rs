@@ -51,7 +51,7 @@ pub struct Failure {
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
     let overview = Share::look_up(results, Shard::default(), false)?.overview(|part, failed| {
-        let command = |position: usize| results.sweeps()[part.epoch].command(&part.jobs[position]);
+        let command = |position: usize| results.sweeps()[part.extension].command(&part.jobs[position]);
         let failure =
             |(position, reason)| Failure { job_id: results.job_id(part, position), reason, command: command(position) };
         failures.extend(failed.into_iter().take(MAX_FAILURES - failures.len()).map(failure));

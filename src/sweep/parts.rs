@@ -1,7 +1,7 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
-//! Each sweep that is run in a directory opens an *epoch*, which owns the jobs that are in no earlier sweep. A *part* is a
-//! run of consecutive jobs of an epoch, committed together: it ends with the job that brings its predicted cost to
+//! Each sweep that is run in a directory opens an *extension*, which owns the jobs that are in no earlier sweep. A *part* is a
+//! run of consecutive jobs of an extension, committed together: it ends with the job that brings its predicted cost to
 //! [`PART_COST`], or its jobs to [`PART_JOBS`]. Contract: parts are a function of the texts of the sweeps and of
 //! [`PLAN_VERSION`] alone. Memory: one part.
 
@@ -18,15 +18,15 @@ pub const PLAN_VERSION: u32 = 2;
 /// The sweeps of a directory in the order in which they were run.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
-    epochs: &'a [Sweep],
+    extensions: &'a [Sweep],
 }
 
-/// Consecutive jobs of an epoch.
+/// Consecutive jobs of an extension.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Number of the epoch, from 0.
-    pub epoch: usize,
-    /// Number of the part within its epoch, from 0.
+    /// Number of the extension, from 0.
+    pub extension: usize,
+    /// Number of the part within its extension, from 0.
     pub index: u64,
     /// Its jobs, in plan order. At least one.
     pub jobs: Vec<Job>,
@@ -48,19 +48,19 @@ pub struct Totals {
 impl<'a> Plan<'a> {
     /// The plan of these sweeps. Sweeps of one directory differ in axes and conditions only, see [`Sweep::difference`].
     #[must_use]
-    pub const fn new(epochs: &'a [Sweep]) -> Self {
-        Self { epochs }
+    pub const fn new(extensions: &'a [Sweep]) -> Self {
+        Self { extensions }
     }
 
-    /// The jobs that an epoch owns, those that are in no earlier sweep, in grid order.
-    pub(super) fn jobs(self, epoch: usize) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
-        let (earlier, sweep) = (&self.epochs[..epoch], &self.epochs[epoch]);
+    /// The jobs that an extension owns, those that are in no earlier sweep, in grid order.
+    pub(super) fn jobs(self, extension: usize) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
+        let (earlier, sweep) = (&self.extensions[..extension], &self.extensions[extension]);
         sweep.jobs().filter(move |job| !earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
     }
 
-    /// The parts of an epoch, in order.
-    pub fn parts_of(self, epoch: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
-        let mut source = self.jobs(epoch);
+    /// The parts of an extension, in order.
+    pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
+        let mut source = self.jobs(extension);
         (0..).map_while(move |index| {
             let (mut jobs, mut cost) = (Vec::new(), 0.0);
             while cost < PART_COST
@@ -70,13 +70,13 @@ impl<'a> Plan<'a> {
                 cost += job.cost;
                 jobs.push(job);
             }
-            (!jobs.is_empty()).then_some(Part { epoch, index, jobs, cost })
+            (!jobs.is_empty()).then_some(Part { extension, index, jobs, cost })
         })
     }
 
-    /// The parts of all epochs, in order.
+    /// The parts of all extensions, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
-        (0..self.epochs.len()).flat_map(move |epoch| self.parts_of(epoch))
+        (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }
 
     /// Walks through the plan and adds up.

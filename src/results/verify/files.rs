@@ -86,7 +86,7 @@ impl FilesCheck<'_> {
         let jobs_file = results.part_file(tables::JOBS, part);
         let state = || -> Result<State, StorageError> {
             let is_done = results.storage().exists(&jobs_file)?;
-            state(results, part.epoch, &files, is_done, ids(results, part))
+            state(results, part.extension, &files, is_done, ids(results, part))
         };
         let mut found = state()?;
         if matches!(found, State::Damaged(_)) {

@@ -192,7 +192,7 @@ impl<'a> Results<'a> {
             return Vec::new();
         }
         let unwanted = self.plan().parts().filter(|part| lost.contains(part_name(part).as_str()) && !self.wants(part));
-        let mut extensions: BTreeSet<usize> = unwanted.map(|part| part.epoch).collect();
+        let mut extensions: BTreeSet<usize> = unwanted.map(|part| part.extension).collect();
         extensions.remove(&self.current());
         extensions.into_iter().chain([self.current()]).collect()
     }

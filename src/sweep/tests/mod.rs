@@ -148,18 +148,18 @@ fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
 
 #[test]
 fn an_extended_sweep_owns_its_new_jobs_alone() {
-    let epochs = [
+    let extensions = [
         sweep("[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 2 }"),
         sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
         sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
     ];
-    let plan = Plan::new(&epochs);
+    let plan = Plan::new(&extensions);
     let new: Vec<u64> = plan.jobs(1).map(|job| job.parameters.seed).collect();
     assert_eq!(new, [2, 2]);
     assert_eq!((plan.jobs(0).count(), plan.jobs(2).count()), (4, 0));
     let totals = plan.totals();
     assert_eq!((totals.jobs, totals.parts), (6, 2));
-    assert_eq!(plan.parts().map(|part| part.epoch).collect::<Vec<_>>(), [0, 1]);
+    assert_eq!(plan.parts().map(|part| part.extension).collect::<Vec<_>>(), [0, 1]);
 }
 
 #[test]
@@ -183,15 +183,16 @@ fn ten_million_jobs_are_planned_in_seconds() {
     let text = "where = \"frequency < 1e9\"\n[axes]\nV0 = { log = [3e-5, 2e-4], points = 100 }\n\
                 Delta = { log = [3e-7, 1e-6], points = 10 }\neta = { log = [0.2, 1000], points = 100 }\n\
                 seed = { count = 100 }";
-    let epochs = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
+    let extensions = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
     let start = std::time::Instant::now();
-    let totals = Plan::new(&epochs[..1]).totals();
+    let totals = Plan::new(&extensions[..1]).totals();
     println!("{totals:?} in {:?}", start.elapsed());
     let start = std::time::Instant::now();
-    let new = Plan::new(&epochs).jobs(1).count();
+    let new = Plan::new(&extensions).jobs(1).count();
     println!("{new} new jobs found in {:?}", start.elapsed());
     let start = std::time::Instant::now();
-    let hashed = epochs[0].jobs().take(1_000_000).filter(|job| epochs[0].job_id(&job.parameters).as_bytes()[0] > 0);
+    let hashed =
+        extensions[0].jobs().take(1_000_000).filter(|job| extensions[0].job_id(&job.parameters).as_bytes()[0] > 0);
     println!("{} of 1e6 ids in {:?}", hashed.count(), start.elapsed());
     assert_eq!((totals.jobs, new), (10_000_000, 100_000));
 }

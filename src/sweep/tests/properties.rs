@@ -119,24 +119,24 @@ proptest! {
     }
 
     #[test]
-    fn parts_cover_the_jobs_of_all_epochs_once_and_in_order(texts in prop::collection::vec(texts(), 1..4)) {
-        let epochs: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
-        let identity = Identity::new(epochs[0].solver(), epochs[0].recording());
+    fn parts_cover_the_jobs_of_all_extensions_once_and_in_order(texts in prop::collection::vec(texts(), 1..4)) {
+        let extensions: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
+        let identity = Identity::new(extensions[0].solver(), extensions[0].recording());
         let mut seen = HashSet::new();
         let mut expected = Vec::new();
-        for (epoch, sweep) in epochs.iter().enumerate() {
-            expected.extend(sweep.jobs().filter(|job| seen.insert(identity.job(&job.parameters))).map(|job| (epoch, job)));
+        for (extension, sweep) in extensions.iter().enumerate() {
+            expected.extend(sweep.jobs().filter(|job| seen.insert(identity.job(&job.parameters))).map(|job| (extension, job)));
         }
-        let plan = Plan::new(&epochs);
+        let plan = Plan::new(&extensions);
         let mut covered = Vec::new();
-        let mut next = vec![0; epochs.len()];
+        let mut next = vec![0; extensions.len()];
         for part in plan.parts() {
-            prop_assert_eq!(part.index, next[part.epoch]);
-            next[part.epoch] += 1;
+            prop_assert_eq!(part.index, next[part.extension]);
+            next[part.extension] += 1;
             prop_assert!(!part.jobs.is_empty() && part.jobs.len() <= PART_JOBS);
             let before_last: f64 = part.jobs[..part.jobs.len() - 1].iter().map(|job| job.cost).sum();
             prop_assert!(before_last < PART_COST);
-            covered.extend(part.jobs.into_iter().map(|job| (part.epoch, job)));
+            covered.extend(part.jobs.into_iter().map(|job| (part.extension, job)));
         }
         prop_assert_eq!(covered, expected);
     }
