@@ -2,13 +2,15 @@
 //! "Stabilizing stick-slip friction", PRL 107, 024301 (2011).
 //!
 //! ```text
-//! sweep file -> plan -> jobs -> kernel -> events -> tables -> reduced data -> figures
-//!               sweep/    run/    solver/   observe/  results/   reduce/         figure/
-//!                                 model/
+//! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures
+//!     sweep/             run/   solver/         results/   reduce/         figure/
+//!                               observe/        table/
+//!                               model/
 //! ```
 //!
 //! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`.
-//! The feature `sweeps` gates all but `model`, `solver` and `observe`, the physics alone. `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
+//! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
+//! `sweeps`. `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -17,11 +19,13 @@
 //! | segment | a stretch of time without a contact event ([`solver::Segment`]) |
 //! | rupture | a run of breaks without a gap longer than the wave crossing time |
 //! | slip, precursor | a rupture of all blocks; any other of at least one block's worth of breaks ([`observe::Slip`]) |
+//! | recording | what a job measures, and when it ends ([`observe::Recording`]) |
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
-//! | job | one point of a sweep: canonical parameters, solver and what is recorded, known by a hash of all three |
-//! | part | consecutive jobs of the plan, committed together |
-//! | shard | a share of the parts, run by one process beside others; a lock keeps it from being run twice at once |
+//! | job | one point of a sweep, known by a hash of parameters, solver and recording |
 //! | set | all jobs that differ in the seed alone |
+//! | extension | a further sweep in a results directory; it owns the jobs that are in no earlier one |
+//! | part | consecutive jobs of an extension, committed together |
+//! | shard | a share of the parts, run by one process beside others and locked while it runs |
 
 #[cfg(feature = "sweeps")]
 pub mod accuracy;

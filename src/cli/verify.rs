@@ -46,8 +46,7 @@ struct Report<'a> {
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let root = &arguments.directory;
-    let verification =
-        if arguments.repair { Results::repair(&Disk, root)?.verification } else { Results::verify(&Disk, root)? };
+    let verification = if arguments.repair { Results::repair(&Disk, root)? } else { Results::verify(&Disk, root)? };
     let repaired = arguments.repair && verification.wants_repair();
     let commands = commands(root, &verification, !arguments.repair);
     if arguments.json {

@@ -91,15 +91,6 @@ pub enum Remedy {
     Reduce,
 }
 
-/// What a repair did.
-#[derive(Clone, Debug)]
-pub struct Repaired {
-    /// What was found.
-    pub verification: Verification,
-    /// Names of the parts that are now missing, and were not before.
-    pub parts: BTreeSet<String>,
-}
-
 impl Problem {
     fn of_file(path: PathBuf, problem: impl Into<String>, remedy: Remedy) -> Self {
         let moved = if remedy == Remedy::File { vec![path.clone()] } else { Vec::new() };
@@ -141,12 +132,12 @@ impl<'a> Results<'a> {
         Ok(Self::examine(storage, root)?.1)
     }
 
-    /// Takes away what is damaged, so that the next run makes it again.
+    /// Takes away what is damaged, so that the next run makes it again; returns what was found.
     ///
     /// # Errors
     /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the
     /// same can be tried again.
-    pub fn repair(storage: &'a dyn Storage, root: &Path) -> Result<Repaired, ResultsError> {
+    pub fn repair(storage: &'a dyn Storage, root: &Path) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
         let (results, _) = Self::examine(storage, root)?;
         results.exclusively(|| {
@@ -158,12 +149,13 @@ impl<'a> Results<'a> {
             for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
                 move_away(storage, path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
             }
-            let parts: BTreeSet<String> = verification.lost_parts().into_iter().map(str::to_owned).collect();
-            if !parts.is_empty() {
+            let lost = verification.lost_parts();
+            if !lost.is_empty() {
                 let mut log = results.begin_log()?;
-                parts.iter().try_for_each(|part| log.write(&RunEvent::PartQuarantined { part: part.clone() }))?;
+                let event = |part: &str| RunEvent::PartQuarantined { part: part.to_owned() };
+                lost.iter().try_for_each(|part| log.write(&event(part)))?;
             }
-            Ok(Repaired { verification, parts })
+            Ok(verification)
         })
     }
 
