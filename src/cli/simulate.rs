@@ -232,7 +232,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let wall = begin.elapsed().as_secs_f64();
     let result = Measurements::new(slips, summary);
 
-    let footer = Footer::default().with_sweep(&sweep).with("parameters", &as_json(parameters));
+    let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
     let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
     write_records(arguments, &footer, recorded)?;
     let label = tables::label::<Drive>(&sweep, parameters);

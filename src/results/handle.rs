@@ -134,7 +134,7 @@ impl<'a> Results<'a> {
     /// What the footers of table files with rows of an extension hold.
     #[must_use]
     pub fn footer(&self, extension: usize) -> Footer {
-        Footer::default().with_sweep(&self.sweeps[extension])
+        Footer::default().with_sweep(self.sweeps[extension].name(), self.sweeps[extension].text())
     }
 
     /// Names of the tables, that of the jobs last.

@@ -5,7 +5,6 @@
 //! not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
-use crate::sweep::Sweep;
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
@@ -110,8 +109,8 @@ impl Default for Footer {
 impl Footer {
     /// The same, with the name and the text of a sweep.
     #[must_use]
-    pub fn with_sweep(self, sweep: &Sweep) -> Self {
-        self.with("sweep_name", sweep.name()).with("sweep", sweep.text())
+    pub fn with_sweep(self, name: &str, text: &str) -> Self {
+        self.with("sweep_name", name).with("sweep", text)
     }
 
     /// The same, with one more text.

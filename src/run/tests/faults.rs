@@ -60,7 +60,7 @@ fn attempt(storage: &dyn Storage, root: &Path, scenario: &Scenario, faults: bool
     let sweep = small_sweep(scenario.seeds);
     let report = run(storage, &sweep, root, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
     if scenario.reduces {
-        let footer = Footer::default().with_sweep(&sweep);
+        let footer = Footer::default().with_sweep(sweep.name(), sweep.text());
         reduce(storage, &Layout::new(root), &footer).map_err(|error| error.to_string())?;
     }
     Ok(report)
