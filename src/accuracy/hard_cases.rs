@@ -30,7 +30,7 @@ enum Expected {
     Ends,
     /// Parameters or solver are refused, in a message that contains this.
     Refused(&'static str),
-    /// It cannot go on, and its message contains this.
+    /// It cannot continue, and its message contains this.
     Stops(&'static str),
 }
 

@@ -37,7 +37,7 @@ use std::sync::atomic::AtomicBool;
 /// A study that cannot be made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
-    /// A simulation cannot go on.
+    /// A simulation cannot continue.
     #[error("{case}, seed {seed}, {solver}: {source}")]
     Simulation {
         /// Its parameters, in words.

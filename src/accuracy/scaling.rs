@@ -127,7 +127,7 @@ impl Scaling {
     /// Runs it; `report` gets a line before each size.
     ///
     /// # Errors
-    /// When a simulation cannot go on.
+    /// When a simulation cannot continue.
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<ScalingFindings, AccuracyError> {
         let mut sizes = Vec::new();
         for parameters in &self.cases() {

@@ -263,7 +263,7 @@ impl Study {
     /// Runs it; `report` gets a line before each stage.
     ///
     /// # Errors
-    /// When a simulation cannot go on.
+    /// When a simulation cannot continue.
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
         let mut findings = Findings::default();
         for (drive, parameters) in self.drives().iter().enumerate() {

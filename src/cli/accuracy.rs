@@ -17,7 +17,7 @@ use stickslip::table::storage::Disk;
 Before chaos: errors of the first break times against the tightest tolerance. After chaos: distances of the
 distributions of slips from a reference ensemble, and biases, with bootstrap intervals. And the residual of the
 energy ledger. Cost is CPU time of one thread, that of the cheapest realisation; keep the machine free of other
-work: the spread over realisations tells how free it was.
+work: the spread over realisations shows how free it was.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute

@@ -15,7 +15,7 @@ pub enum Exit {
     Failed = 1,
     /// The command line, a sweep file or a directory does not fit.
     Usage = 2,
-    /// Stopped early; the same command goes on.
+    /// Stopped early; the same command resumes.
     Stopped = 3,
     /// Data are damaged.
     Damaged = 4,

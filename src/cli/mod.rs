@@ -71,9 +71,9 @@ pub fn main() -> ExitCode {
 
 /// An error and its causes, without those that it already quotes.
 fn message(error: &anyhow::Error) -> String {
-    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told.as_str() {
+    error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message.as_str() {
         "" => cause,
-        _ if told.contains(&cause) => told,
-        _ => format!("{told}: {cause}"),
+        _ if message.contains(&cause) => message,
+        _ => format!("{message}: {cause}"),
     })
 }

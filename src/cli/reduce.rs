@@ -64,7 +64,7 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
         let (jobs, parts) =
             (output::count(overview.jobs_missing, "job"), output::count(overview.parts_missing, "part"));
         output::report(&format!(
-            "reduced what is there: {jobs} in {parts} are missing; stickslip run goes on with them"
+            "reduced what is there: {jobs} in {parts} are missing; stickslip run continues with them"
         ));
     }
     Ok(())

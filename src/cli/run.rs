@@ -18,7 +18,7 @@ use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
 use stickslip::table::storage::Disk;
 
-/// Run a sweep, or go on with it; then reduce and plot
+/// Run or resume a sweep; then reduce and plot
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -27,7 +27,7 @@ Examples:
   stickslip run sweeps/fig3.toml --shard 2/8     the second of eight processes on one directory
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
-Ctrl-C and SIGTERM keep what is done; the same command goes on from there.")]
+Ctrl-C and SIGTERM keep what is done; the same command resumes from there.")]
 pub struct Arguments {
     /// Sweep file
     #[arg(value_name = "SWEEP.toml")]
@@ -167,7 +167,7 @@ fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
         None if has_walltime && report.jobs_run == 0 => {
             "No part ended in this time: give a longer --walltime.".to_owned()
         }
-        _ => "The same command goes on.".to_owned(),
+        _ => "The same command resumes.".to_owned(),
     };
     format!("stopped with {left} left; finished parts are kept. {hint}")
 }

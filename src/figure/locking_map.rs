@@ -76,7 +76,7 @@ fn whole_periods(set: &SetSummary) -> Option<usize> {
     Some(periods.round() as usize)
 }
 
-/// The colour of a number of periods, which colour-blind readers, too, can tell from its neighbours.
+/// The colour of a number of periods, which colour-blind readers, too, can distinguish from its neighbours.
 fn colour(periods: usize) -> Color {
     match periods {
         0 => Color::from(WHITE),

@@ -70,7 +70,7 @@ pub(super) const RED: Ink = "#d62020";
 /// The paper's averages.
 pub(super) const BLUE: Ink = "#1f55c4";
 
-/// For lines side by side: colours that colour-blind readers tell apart (Okabe and Ito).
+/// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// A line's look.

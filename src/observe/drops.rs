@@ -68,7 +68,7 @@ impl DropDetector {
         self.follow(segment.end(), segment.end_force());
     }
 
-    /// Goes on along a force that does not turn in between.
+    /// Follows a force that does not turn in between.
     fn follow(&mut self, time: f64, force: f64) {
         self.drive.advance_to(time);
         let now = Instant { time, force, driven: self.drive.motion(time).0 };

@@ -32,7 +32,7 @@ impl Measurements {
 /// Simulates one realisation and measures what is to be recorded. The result is a function of the first three arguments.
 ///
 /// # Errors
-/// When the simulation cannot go on, or is interrupted.
+/// When the simulation cannot continue, or is interrupted.
 pub fn measure(
     parameters: &Parameters,
     recording: &Recording,

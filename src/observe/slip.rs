@@ -46,7 +46,7 @@ impl Modulation {
 
 columns! {
     /// One slip: a rupture that breaks contacts at every block.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Slip {
         number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up";
         onset: f64 = "s", "time of the largest shear force since the previous slip's end";
@@ -70,7 +70,7 @@ columns! {
 
 columns! {
     /// One precursor: a rupture of at least the precursor size that does not break contacts at every block.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Precursor {
         slip: u64 = "", "number of the slip that it precedes";
         precursor: u64 = "", "number of the precursor before that slip, from 0";

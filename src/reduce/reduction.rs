@@ -284,12 +284,12 @@ fn gather(
 
 #[cfg(test)]
 mod tests {
+    use super::super::read_reduced;
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::{Drops, Measurements, Modulation};
+    use crate::observe::{Measurements, Modulation};
     use crate::results::tables::{Drive, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
-    use crate::table::file::Reader;
     use crate::table::storage::Disk;
     use std::fs;
 
@@ -323,10 +323,8 @@ mod tests {
             nucleation_block: 1,
             duration: 0.005,
             size: 1400,
-            front_speed: None,
             precursors: 2,
-            slow_front_speed: None,
-            drops: Drops::default(),
+            ..Slip::default()
         };
         let summary = Summary { satisfied: true, ..Summary::default() };
         Measurements {
@@ -382,13 +380,11 @@ mod tests {
         assert_eq!((summary.jobs, summary.failed_jobs, summary.sets), (6, 2, 3));
         assert_eq!((summary.slips, summary.points, summary.locked_sets), (120, 120, 2));
         assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
-        let path = reduced_file(&Layout::new(root.path()), "sets");
-        let batch = Reader::new(&Disk, vec![path]).next().unwrap().unwrap();
-        assert_eq!(batch.reals("Delta").unwrap().values().to_vec(), [0.0, 1e-6, 2e-6]);
-        assert_eq!(batch.counts("intervals").unwrap().values().to_vec(), [38, 38, 38]);
-        assert_eq!(batch.counts("failed_jobs").unwrap().values().to_vec(), [0, 0, 2]);
-        assert!((batch.reals("mean_friction").unwrap().value(1) - 430.0).abs() < 1e-9);
-        assert!((batch.reals("periods_mean").unwrap().value(1) - 12.0).abs() < 0.01);
+        let sets: Vec<SetRow> = read_reduced(&Disk, &Layout::new(root.path())).unwrap();
+        let counts = |set: &SetRow| (set.parameters.modulation_amplitude, set.intervals, set.failed_jobs);
+        assert_eq!(sets.iter().map(counts).collect::<Vec<_>>(), [(0.0, 38, 0), (1e-6, 38, 0), (2e-6, 38, 2)]);
+        assert!((sets[1].mean_friction.unwrap() - 430.0).abs() < 1e-9);
+        assert!((sets[1].periods_mean.unwrap() - 12.0).abs() < 0.01);
     }
 
     #[test]

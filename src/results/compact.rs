@@ -213,7 +213,7 @@ impl Results<'_> {
                 let problem = format!("{rows} jobs were read where the plan has {}", chunk.jobs);
                 return Err(ResultsError::damaged(&old_folder, problem));
             }
-            let file = TableFile::compacted(chunk.extension, &chunk.parts, &writer.seal()?).to_string();
+            let file = TableFile::compacted(chunk.extension, &chunk.parts, &writer.finish_with_checksum()?).to_string();
             storage.rename(&staged, &new_folder.join(&file))?;
             names.push(file);
         }

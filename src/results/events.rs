@@ -45,7 +45,7 @@ pub enum RunEvent {
         /// Its wall time.
         wall: f64,
     },
-    /// A job failed; the others go on.
+    /// A job failed; the others continue.
     JobFailed {
         /// Its id.
         job_id: String,

@@ -30,7 +30,7 @@ impl fmt::Debug for Results<'_> {
 }
 
 impl<'a> Results<'a> {
-    /// Opens the directory of a sweep: begins it, goes on with it, or extends it.
+    /// Opens the directory of a sweep: begins it, resumes it, or extends it.
     ///
     /// # Errors
     /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.

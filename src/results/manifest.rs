@@ -32,7 +32,7 @@ pub(super) const WRITER: &str = "manifest";
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
     format: u32,
-    /// The program that began the directory; any with the same versions below may go on.
+    /// The program that began the directory; any with the same versions below may continue.
     program: String,
     name: String,
     model_version: u32,

@@ -9,13 +9,12 @@ use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::{Layout, TableFile};
 use crate::results::tables::{
-    self, Drive, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, SlipRow, label, relabel,
+    self, Drive, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
 };
 use crate::sweep::Part;
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Batch, DatasetError, Reader, TableWriter, files, read_rows};
 use crate::table::storage::{Storage, StorageError};
-use arrow_array::Array;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -193,12 +192,10 @@ impl KeptRows {
         let mut kept = Self::default();
         for batch in Reader::new(storage, vec![path.to_owned()]) {
             let batch = batch?;
-            let jobs = batch.texts("job_id")?;
             let mut begin = 0;
-            while begin < jobs.len() {
-                let job = jobs.value(begin);
-                let end = (begin..jobs.len()).find(|&row| jobs.value(row) != job).unwrap_or(jobs.len());
-                kept.by_job.entry(job.to_owned()).or_default().push((kept.batches.len(), begin..end));
+            for rows in batch.rows_of::<RowOfJob>()?.chunk_by(|row, next| row.job_id == next.job_id) {
+                let end = begin + rows.len();
+                kept.by_job.entry(rows[0].job_id.clone()).or_default().push((kept.batches.len(), begin..end));
                 begin = end;
             }
             kept.batches.push(batch);

@@ -1,6 +1,6 @@
 //! The tables of a sweep: slips, precursors, jobs. What is measured is described in [`crate::observe`], what labels it here.
 //!
-//! Quantities are SI. Nothing in a table tells when, where or how fast it was computed.
+//! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, MapRow, Measurements, Precursor, ProfileRow, Slip, TraceRow};
@@ -154,6 +154,13 @@ impl JobRecord {
     }
 }
 
+columns! {
+    /// Any row of a job, in any table.
+    pub(super) struct RowOfJob {
+        job_id: String;
+    }
+}
+
 /// All tables of a sweep, and those that one simulation writes on request, in Markdown, one section each.
 #[must_use]
 pub fn documentation() -> String {
@@ -166,7 +173,6 @@ pub fn documentation() -> String {
 pub(crate) mod tests {
     use super::*;
     use crate::documented::assert_documented;
-    use crate::observe::{Drops, Modulation};
     use crate::table::columns::Row;
     use std::collections::HashSet;
 
@@ -175,9 +181,6 @@ pub(crate) mod tests {
             number,
             onset: 1.0,
             interval: Some(0.137),
-            modulation: Modulation::default(),
-            periods: None,
-            phase: None,
             peak_force: 477.0,
             drop: 100.0,
             nucleation: 1.001,
@@ -186,8 +189,7 @@ pub(crate) mod tests {
             size: 1400,
             front_speed: Some(300.0),
             precursors: 2,
-            slow_front_speed: None,
-            drops: Drops::default(),
+            ..Slip::default()
         }
     }
 

@@ -7,7 +7,7 @@
 //! collect.rs on the calling thread: outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
-//! What is done is what is committed, so a run that was killed goes on by looking which part files are missing.
+//! What is done is what is committed, so a killed run resumes by looking which part files are missing.
 //! Contract: the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a
 //! job in flight.
 
@@ -39,7 +39,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// What runs a job: until it is done, cannot go on, or the flag turns true, which is [`SimulationError::Interrupted`].
+/// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
 pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
 
 /// How to run.
@@ -76,7 +76,7 @@ impl Events<'_> {
 ///
 /// # Errors
 /// When the directory belongs to something else or another process has it, or the disk fails. What was committed is
-/// kept, and the same command goes on from there.
+/// kept, and the same command resumes from there.
 pub fn run(
     storage: &dyn Storage,
     sweep: &Sweep,

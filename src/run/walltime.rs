@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// Least time set aside for ending, in s: for the last commits and for those who wait.
 const MIN_RESERVE: f64 = 0.5;
-/// More is set aside where commits are slow: so many times the slowest.
+/// More is set aside where commits are slow: this many times the slowest.
 const COMMITS_IN_RESERVE: f64 = 3.0;
 
 /// The time that a run has.
@@ -42,7 +42,7 @@ impl State {
 }
 
 impl Walltime {
-    /// Of a run that began then and may last so long, with so many threads.
+    /// Of a run that began at `begin` and may last `longest`, with `threads` threads.
     pub fn new(begin: Instant, longest: Option<Duration>, threads: usize, earlier_pace: Option<f64>) -> Self {
         let state =
             State { earlier_pace, predicted: 0.0, measured: 0.0, under_way: 0.0, slowest_commit: 0.0, refused: None };

@@ -111,7 +111,7 @@ pub struct Summary {
     pub reattachments: u64,
 }
 
-/// Why a simulation could not go on.
+/// Why a simulation could not continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// The time step is not stable.
@@ -171,7 +171,7 @@ pub enum SimulationError {
 /// Runs one realisation until the observer is satisfied or the end time is reached.
 ///
 /// # Errors
-/// When the solver's setting does not fit the parameters, or the run cannot go on: see [`SimulationError`].
+/// When the solver's setting does not fit the parameters, or the run cannot continue: see [`SimulationError`].
 pub fn simulate(
     parameters: &Parameters,
     solver: Solver,

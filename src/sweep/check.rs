@@ -87,7 +87,7 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     let Some(first) = sweep.admitted().next() else {
         return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
-    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others go on.
+    // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
     let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
     let time_step = solver.and_then(|solver| solver.entry("dt")).map_or(0, |entry| entry.at);
     sweep.solver.check(&first.parameters).map_err(|error| file.source.error(time_step, error.to_string()))

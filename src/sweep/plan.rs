@@ -159,7 +159,7 @@ impl Sweep {
         self.walk(self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect())
     }
 
-    /// Walks through so many rows of each axis, past points that repeat an earlier one. Yields canonical points.
+    /// Walks through this many rows of each axis, past points that repeat an earlier one. Yields canonical points.
     fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         (0..counts.iter().product()).filter_map(move |number: u64| {

@@ -1,15 +1,15 @@
 //! Datasets: a table as Parquet files, written with the same bytes for the same rows, and read file by file.
 //!
-//! zstd; doubles as byte streams, which saved 8 to 17 % against plain ones, other columns with dictionaries. The footer tells
-//! program, model and sweep, sorted, and a checksum, but no clock, host or thread count. Row groups are cut by row count alone, so bytes do
-//! not depend on how the rows came in.
+//! zstd; doubles as byte streams, which saved 8 to 17 % against plain ones, other columns with dictionaries. The footer
+//! holds program, model and sweep, sorted, and a checksum, but no clock, host or thread count. Row groups are cut by row
+//! count alone, so bytes do not depend on how the rows came in.
 
 use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
 use crate::table::storage::{Storage, StorageError, StoredFile};
-use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_array::RecordBatch;
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::ProjectionMask;
@@ -29,7 +29,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The program's name and version, as files tell it.
+/// The program's name and version, as files have it.
 pub const PROGRAM: &str = concat!("stickslip ", env!("CARGO_PKG_VERSION"));
 
 /// How the names of table files end.
@@ -59,7 +59,7 @@ pub enum DatasetError {
     },
     /// A file is cut off, changed or no table.
     #[error(
-        "{}: damaged: {problem}; `stickslip verify` on its results directory tells how to repair it",
+        "{}: damaged: {problem}; `stickslip verify` on its results directory reports how to repair it",
         .path.display()
     )]
     Damaged {
@@ -94,7 +94,7 @@ impl DatasetError {
     }
 }
 
-/// What the footer of a file tells beside the columns: sorted texts under keys.
+/// What the footer of a file holds beside the columns: sorted texts under keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Footer(BTreeMap<String, String>);
 
@@ -143,7 +143,7 @@ impl Footer {
 /// The footer's key of the units.
 const UNITS: &str = "units";
 
-/// What the metadata of all fields tell under a key, as JSON.
+/// What the metadata of all fields hold under a key, as JSON.
 fn by_name(schema: &Schema, key: &str) -> String {
     let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
     let entries = schema.fields().iter().map(|field| (field.name().clone(), text(field).into()));
@@ -222,26 +222,27 @@ impl<R: Row> TableWriter<R> {
     /// # Errors
     /// When that fails; the file is then unreadable.
     pub fn finish(self) -> Result<(), DatasetError> {
-        self.seal().map(|_| ())
+        self.finish_with_checksum().map(|_| ())
     }
 
-    /// Finishes the file and gives its [seal].
+    /// Finishes the file and gives its [checksum].
     ///
     /// # Errors
     /// As [`TableWriter::finish`].
-    pub fn seal(mut self) -> Result<String, DatasetError> {
+    pub fn finish_with_checksum(mut self) -> Result<String, DatasetError> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }
         let (path, mut file) = (self.path, self.file);
         let footer = self.writer.into_inner().and_then(|mut footer| {
-            let sealed = checksum::close(self.hasher, &mut footer);
-            sealed.map(|seal| (seal, footer)).ok_or_else(|| ParquetError::General("the footer has no seal".to_owned()))
+            let checksum = checksum::close(self.hasher, &mut footer);
+            let missing = || ParquetError::General("the footer has no place for a checksum".to_owned());
+            Ok((checksum.ok_or_else(missing)?, footer))
         });
-        let (seal, footer) = footer.map_err(|source| DatasetError::Write { path: path.clone(), source })?;
+        let (checksum, footer) = footer.map_err(|source| DatasetError::Write { path: path.clone(), source })?;
         file.write(&footer)?;
         file.sync()?;
-        Ok(seal)
+        Ok(checksum)
     }
 }
 
@@ -261,43 +262,6 @@ impl Batch {
     /// When the file lacks a column, or holds a value that the type cannot have.
     pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
         arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
-    }
-
-    /// A column of doubles.
-    ///
-    /// # Errors
-    /// When the file has no such column.
-    pub fn reals(&self, name: &str) -> Result<&Float64Array, DatasetError> {
-        self.column(name, "doubles")
-    }
-
-    /// A column of whole numbers.
-    ///
-    /// # Errors
-    /// When the file has no such column.
-    pub fn counts(&self, name: &str) -> Result<&Int64Array, DatasetError> {
-        self.column(name, "whole numbers")
-    }
-
-    /// A column of texts.
-    ///
-    /// # Errors
-    /// When the file has no such column.
-    pub fn texts(&self, name: &str) -> Result<&StringArray, DatasetError> {
-        self.column(name, "texts")
-    }
-
-    /// A column of flags.
-    ///
-    /// # Errors
-    /// When the file has no such column.
-    pub fn flags(&self, name: &str) -> Result<&BooleanArray, DatasetError> {
-        self.column(name, "flags")
-    }
-
-    fn column<A: Array + 'static>(&self, name: &str, kind: &str) -> Result<&A, DatasetError> {
-        let array = self.rows.column_by_name(name).and_then(|array| array.as_any().downcast_ref());
-        array.ok_or_else(|| DatasetError::damaged(&self.path)(format!("there is no column {name} of {kind}")))
     }
 }
 
@@ -345,7 +309,7 @@ fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result
 }
 
 /// Reads the rows of files, one batch after the other, holding one of them; an error ends it. Each file is held against its
-/// seal first.
+/// checksum first.
 pub struct Reader<'a> {
     storage: &'a dyn Storage,
     files: std::vec::IntoIter<PathBuf>,
@@ -458,10 +422,10 @@ mod tests {
         writer.finish().unwrap();
     }
 
-    fn numbers(reader: Reader<'_>) -> Result<Vec<i64>, DatasetError> {
+    fn numbers(reader: Reader<'_>) -> Result<Vec<u64>, DatasetError> {
         let mut numbers = Vec::new();
         for batch in reader {
-            numbers.extend(batch?.counts("number")?.values());
+            numbers.extend(batch?.rows_of()?.into_iter().map(|number: Number| number.value));
         }
         Ok(numbers)
     }

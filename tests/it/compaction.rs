@@ -1,5 +1,5 @@
 //! Compaction by the built program: the same bytes whatever the history, every row once for readers at any time and after
-//! any kill, and a directory that goes on working.
+//! any kill, and a directory that keeps working.
 
 use crate::program::Folder;
 use parquet::file::reader::{FileReader, SerializedFileReader};

@@ -8,7 +8,7 @@ const LIMITS: Limits<'static> = Limits { end_time: 0.25, events: 1_000_000, inte
 
 fn residual(parameters: &Parameters, solver: Solver) -> f64 {
     let (summary, ledger) =
-        simulate_audited(parameters, solver, LIMITS, &mut ContactLog::default()).expect("the simulation must go on");
+        simulate_audited(parameters, solver, LIMITS, &mut ContactLog::default()).expect("the simulation must not fail");
     assert!(summary.breaks > 3000, "no slip to audit");
     assert!(ledger.work > 0.0 && ledger.damping > 0.0 && ledger.broken > 0.0 && ledger.elastic > 0.0, "{ledger:?}");
     assert!(ledger.left_out.abs() < 1e-4 * ledger.damping, "{ledger:?}");

@@ -22,7 +22,7 @@ fn ramped() -> Parameters {
 fn first_breaks(parameters: &Parameters, solver: Solver, breaks: usize) -> HashMap<(usize, usize, u32), f64> {
     let mut log = ContactLog::default();
     let limits = Limits { end_time: 0.09, events: 1_000_000, interrupt: None };
-    simulate(parameters, solver, limits, &mut log).expect("the simulation must go on");
+    simulate(parameters, solver, limits, &mut log).expect("the simulation must not fail");
     let broken = log.events.iter().filter(|event| event.change == Change::Break);
     broken.take(breaks).map(|event| ((event.block, event.contact, event.generation), event.time)).collect()
 }

@@ -150,7 +150,7 @@ fn ctrl_c_and_sigterm_keep_what_is_done_and_the_next_run_makes_the_same_tables()
         assert!(sent.unwrap().success());
         let (code, stdout, stderr) = wait(child);
         assert_eq!(code, Some(3), "{signal}: {stderr}");
-        assert!(stderr.contains("The same command goes on."), "{stderr}");
+        assert!(stderr.contains("The same command resumes."), "{stderr}");
         assert!(stdout.starts_with("jobs run"), "{stdout}");
 
         let kept = folder.tables(signal);

@@ -71,7 +71,7 @@ fn the_same_shard_is_refused_while_its_process_lives_and_taken_over_when_it_is_d
     let mut heir = folder.start(command);
     let parts = folder.parts("r", "jobs").len();
     folder.wait_for_parts("r", parts + 1, &mut heir);
-    assert!(heir.try_wait().unwrap().is_none(), "it was to go on with the shard");
+    assert!(heir.try_wait().unwrap().is_none(), "it was to continue the shard");
     // Within one host nobody waits for a note that stands still.
     assert!(begin.elapsed() < Duration::from_secs(15));
     heir.kill().unwrap();
@@ -99,7 +99,7 @@ fn a_walltime_is_kept_and_the_same_command_goes_on_until_all_is_done() {
             break;
         }
         assert_eq!(ended.code, Some(3), "{}", ended.stderr);
-        assert!(ended.stderr.contains("The same command goes on."), "{}", ended.stderr);
+        assert!(ended.stderr.contains("The same command resumes."), "{}", ended.stderr);
         assert!(report["jobs_run"].as_u64() > Some(0), "{report}");
         stops += 1;
     }

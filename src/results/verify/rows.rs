@@ -1,7 +1,7 @@
 //! Rows of all tables held against each other: the planned jobs in their order, each with as many slips and precursors
 //! as the jobs table says.
 
-use crate::results::tables;
+use crate::results::tables::{self, RowOfJob};
 use crate::table::columns::columns;
 use crate::table::file::{DatasetError, read_rows};
 use crate::table::storage::Storage;
@@ -59,13 +59,6 @@ columns! {
     struct SlipOfJob {
         job_id: String;
         number as "slip": u64;
-    }
-}
-
-columns! {
-    /// Any row of a job.
-    struct RowOfJob {
-        job_id: String;
     }
 }
 

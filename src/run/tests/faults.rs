@@ -139,7 +139,7 @@ impl Trial {
             Fault::Killed | Fault::PowerCut | Fault::PowerCutTorn => {}
             _ => assert!(ended.is_err() || results(&left) == results(&self.after), "{case}"),
         }
-        // Nothing was damaged, so nobody is to be told to move files away.
+        // Nothing was damaged, so no message may say to move files away.
         assert!(!ended.is_err_and(|error| error.contains("damaged")), "{case}");
         self.is_whole(&left, &case);
         self.resumes(&disk, &left, &case);
@@ -162,7 +162,7 @@ impl Trial {
         assert!(tables.all(|path| left.contains_key(path)), "{case}");
     }
 
-    /// The same command with the real store goes on, runs nothing twice, and ends with the same bytes.
+    /// The same command with the real storage resumes, runs nothing twice, and ends with the same bytes.
     fn resumes(&self, disk: &FaultyDisk, left: &BTreeMap<PathBuf, Vec<u8>>, case: &str) {
         // Where syncs cost nothing, if there is such a place.
         let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();

@@ -98,7 +98,7 @@ impl FaultyDisk {
         state.left = n;
     }
 
-    /// After the fault, whatever it was, a machine with a disk that works again. Tells whether there was a fault.
+    /// After the fault, whatever it was, a machine with a disk that works again. Returns whether there was a fault.
     pub fn reboot(&self) -> bool {
         let fired = self.state().fired.take();
         match fired {

@@ -5,6 +5,7 @@ use super::{faulty, fine};
 use crate::observe::Measurements;
 use crate::results::compact::Compacted;
 use crate::results::layout::Layout;
+use crate::results::tables::Names;
 use crate::results::{Results, ResultsError};
 use crate::run::{Kernel, Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
@@ -106,7 +107,7 @@ fn compact(storage: &dyn Storage, root: &Path) -> Result<Compacted, ResultsError
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
     for batch in Reader::of_folder(&Disk, &Layout::new(root).table("jobs")).unwrap() {
-        ids.extend(batch.unwrap().texts("job_id").unwrap().iter().map(|id| id.unwrap().to_owned()));
+        ids.extend(batch.unwrap().rows_of().unwrap().into_iter().map(|names: Names| names.job_id));
     }
     ids.sort();
     ids

@@ -7,7 +7,7 @@ mod maintenance;
 
 use super::*;
 use crate::model::Parameters;
-use crate::observe::{Drops, Measurements, Modulation, Precursor, Slip};
+use crate::observe::{Measurements, Precursor, Slip};
 use crate::results::ErrorKind;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
@@ -16,6 +16,7 @@ use crate::sweep::{Job, PART_COST};
 use crate::table::columns::Row;
 use crate::table::file::Reader;
 use crate::table::storage::Disk;
+use arrow_array::cast::AsArray;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
@@ -40,33 +41,26 @@ fn measure(parameters: &Parameters) -> Measurements {
         number,
         onset: onset(number),
         interval: (number > 0).then_some(1.0),
-        phase: None,
-        modulation: Modulation::default(),
-        periods: None,
         peak_force: 477.0,
         drop: 100.0,
         nucleation: onset(number),
         nucleation_block: 1,
         duration: 0.005,
         size: 1400,
-        front_speed: None,
         precursors: 1,
-        slow_front_speed: None,
-        drops: Drops::default(),
+        ..Slip::default()
     });
     let precursors = (0..count).map(|slip| Precursor {
         slip,
         precursor: 0,
         onset: onset(slip) - 0.1,
-        interval: None,
-        modulation: Modulation::default(),
         nucleation: onset(slip),
         nucleation_block: 1,
         duration: 0.001,
         size: 30,
         extent: 5,
         reach: 6,
-        front_speed: None,
+        ..Precursor::default()
     });
     let summary = Summary { end_time: onset(count), satisfied: true, ..Summary::default() };
     Measurements {
@@ -113,7 +107,8 @@ fn texts(root: &Path, table: &str, column: &str) -> Vec<String> {
     let mut texts = Vec::new();
     for batch in Reader::of_folder(&Disk, &Layout::new(root).table(table)).unwrap() {
         let batch = batch.unwrap();
-        texts.extend(batch.texts(column).unwrap().iter().map(|text| text.unwrap_or_default().to_owned()));
+        let column = batch.rows.column_by_name(column).unwrap().as_string::<i32>();
+        texts.extend(column.iter().map(|text| text.unwrap_or_default().to_owned()));
     }
     texts
 }
@@ -183,7 +178,7 @@ fn a_second_run_does_nothing() {
     assert_eq!(fs::read_dir(root.path().join("run/log")).unwrap().count(), logs);
 }
 
-/// Fails for one seed and panics for another, as long as told.
+/// Fails for one seed and panics for another, while `faults` is true.
 fn faulty(job: &Job, faults: bool) -> Result<Measurements, SimulationError> {
     match job.parameters.seed {
         7 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
