@@ -59,9 +59,9 @@ mod tests {
             markdown::<Stability>(),
         ];
         let text = format!(
-            "# Tables of `stickslip accuracy`\n\nUnits are SI. Times are CPU times of one thread; the processor is in the \
-             footer of each file, under `processor`. The JSON has the same rows, see \
-             [results.md](results.md#json-output).\n\n{}",
+            "# Tables of `stickslip accuracy`\n\nUnits are SI.\n\
+             Times are CPU times of one thread; the processor is in the footer of each file, under `processor`.\n\
+             The JSON has the same rows, see [results.md](results.md#json-output).\n\n{}",
             tables.join("\n")
         );
         assert_documented("accuracy-tables.md", &text);

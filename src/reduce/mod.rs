@@ -79,7 +79,8 @@ mod tests {
             markdown::<Point>(),
         ];
         let text = format!(
-            "# Reduced tables\n\nUnits are SI. How they follow from the [tables](tables.md) of a sweep is described in \
+            "# Reduced tables\n\nUnits are SI.\n\
+             How they follow from the [tables](tables.md) of a sweep is described in \
              [results.md](results.md#reduced-data).\n\n{}",
             tables.join("\n")
         );
