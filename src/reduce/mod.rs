@@ -13,6 +13,7 @@ mod reduction;
 mod sequence;
 mod set;
 mod set_row;
+mod slip_stats;
 mod startup;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};

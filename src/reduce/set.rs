@@ -5,6 +5,7 @@ use super::circular::unit;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::set_row::{SetJobs, SetRow};
+use super::slip_stats::{SlipStats, non_nan};
 use super::startup::{StartupRow, startup_probability, startup_rows};
 use crate::observe::Slip;
 use crate::table::columns::Selected;
@@ -18,41 +19,6 @@ pub const LOCKED_LENGTH: f64 = 0.5;
 
 /// Quantiles of τ that are reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
-
-/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SlipStats {
-    interval: f64,
-    /// The interval in periods of the modulation at its end.
-    periods: f64,
-    phase: f64,
-    load_phase: f64,
-    /// Stress drop, in N.
-    pub(super) drop: f64,
-}
-
-impl SlipStats {
-    pub(super) fn of(slip: &Slip, limits: &PhaseLimits) -> Self {
-        let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        Self {
-            interval: or_missing(slip.interval),
-            periods: or_missing(slip.interval.zip(slip.modulation.period).map(|(interval, period)| interval / period)),
-            phase: or_missing(slip.phase),
-            load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
-            drop: slip.drop,
-        }
-    }
-
-    /// Interval before it, in s.
-    pub(super) fn interval(&self) -> Option<f64> {
-        non_nan(self.interval)
-    }
-}
-
-/// A value that is not missing.
-fn non_nan(value: f64) -> Option<f64> {
-    (!value.is_nan()).then_some(value)
-}
 
 /// Gathers the slips of a set, job after job.
 #[derive(Clone, Debug, Default)]

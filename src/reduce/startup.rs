@@ -1,7 +1,7 @@
 //! Start-up: whether the first recorded slips differ from the later ones.
 
 use super::rank::{Sample, holm, rank_test};
-use super::set::SlipStats;
+use super::slip_stats::SlipStats;
 use crate::table::columns::{Table, columns};
 
 /// Slip numbers that are looked at one by one; all from this one on are what they are held against.

@@ -1,6 +1,6 @@
 //! Compaction: the files of many parts become few large ones, by putting them one after the other in plan order.
 //!
-//! [`PARTS_PER_FILE`] consecutive parts of an extension go into one file of each table, which is named after them.
+//! `PARTS_PER_FILE` consecutive parts of an extension go into one file of each table, which is named after them.
 //! Parts that are missing, or have failed jobs that may be run again, are left out, so the file ends before them and
 //! the next begins after them. Contract: names and bytes are a function of which parts are done and whole, not of how
 //! it came to that: threads, shards, kills, or earlier compactions. Memory: one row group.

@@ -4,7 +4,7 @@
 //! A lock is one of the operating system on `run/lock/<name>`, and a heartbeat in that file: host, process, and a count
 //! that grows as long as the process lives. Within one host the lock alone decides. Other hosts may not see it, as
 //! network file systems can be mounted without; there a heartbeat that grows is a living process's, and one that stands
-//! still for [`TIMEOUT`] a dead one's. No clocks are compared. Contract: a lock saves double work, and no more. Should
+//! still for `TIMEOUT` a dead one's. No clocks are compared. Contract: a lock saves double work, and no more. Should
 //! two processes run the same shard, as after a suspended one was taken for dead, they write the same bytes, each under
 //! staged names of its own.
 //!

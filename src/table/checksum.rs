@@ -4,7 +4,7 @@
 //! footer under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of
 //! its pages.
 
-use crate::table::file::DatasetError;
+use crate::table::error::DatasetError;
 use crate::table::storage::{Storage, StorageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;

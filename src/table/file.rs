@@ -8,6 +8,7 @@ use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
+pub use crate::table::error::DatasetError;
 use crate::table::storage::{Storage, StorageError, StoredFile};
 use arrow_array::RecordBatch;
 use arrow_schema::{DataType, Field, Schema};
@@ -42,57 +43,6 @@ const BATCH_ROWS: usize = 1 << 14;
 const ZSTD_LEVEL: i32 = 3;
 /// What the text of an error of the operating system holds.
 const OS_ERROR: &str = "(os error ";
-
-/// A table file that cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub enum DatasetError {
-    /// A file operation failed.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// Writing failed.
-    #[error("{}: cannot be written: {source}; all that was committed before is kept", .path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: ParquetError,
-    },
-    /// A file is cut off, changed or no table.
-    #[error(
-        "{}: damaged: {problem}; `stickslip verify` on its results directory reports how to repair it",
-        .path.display()
-    )]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// Something else lies among the files of a table.
-    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", .path.display())]
-    Stray {
-        /// The file.
-        path: PathBuf,
-    },
-}
-
-impl DatasetError {
-    /// The file.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        match self {
-            Self::Storage(StorageError { path, .. })
-            | Self::Write { path, .. }
-            | Self::Damaged { path, .. }
-            | Self::Stray { path } => path,
-        }
-    }
-
-    /// For `map_err`: what was found in a file.
-    pub fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
-        move |problem| Self::Damaged { path: path.to_owned(), problem: problem.to_string() }
-    }
-}
 
 /// What the footer of a file holds beside the columns: sorted texts under keys.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,0 +1,39 @@
+//! What a reduction keeps of a slip.
+
+use super::PhaseLimits;
+use crate::observe::Slip;
+
+/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlipStats {
+    pub(super) interval: f64,
+    /// The interval in periods of the modulation at its end.
+    pub(super) periods: f64,
+    pub(super) phase: f64,
+    pub(super) load_phase: f64,
+    /// Stress drop, in N.
+    pub(super) drop: f64,
+}
+
+impl SlipStats {
+    pub(super) fn of(slip: &Slip, limits: &PhaseLimits) -> Self {
+        let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        Self {
+            interval: or_missing(slip.interval),
+            periods: or_missing(slip.interval.zip(slip.modulation.period).map(|(interval, period)| interval / period)),
+            phase: or_missing(slip.phase),
+            load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
+            drop: slip.drop,
+        }
+    }
+
+    /// Interval before it, in s.
+    pub(super) fn interval(&self) -> Option<f64> {
+        non_nan(self.interval)
+    }
+}
+
+/// A value that is not missing.
+pub(super) fn non_nan(value: f64) -> Option<f64> {
+    (!value.is_nan()).then_some(value)
+}

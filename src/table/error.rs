@@ -1,0 +1,56 @@
+//! Why a table file cannot be written or read.
+
+use crate::table::storage::StorageError;
+use parquet::errors::ParquetError;
+use std::path::{Path, PathBuf};
+
+/// A table file that cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// A file operation failed.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// Writing failed.
+    #[error("{}: cannot be written: {source}; all that was committed before is kept", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: ParquetError,
+    },
+    /// A file is cut off, changed or no table.
+    #[error(
+        "{}: damaged: {problem}; `stickslip verify` on its results directory reports how to repair it",
+        .path.display()
+    )]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Something else lies among the files of a table.
+    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", .path.display())]
+    Stray {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl DatasetError {
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Storage(StorageError { path, .. })
+            | Self::Write { path, .. }
+            | Self::Damaged { path, .. }
+            | Self::Stray { path } => path,
+        }
+    }
+
+    /// For `map_err`: what was found in a file.
+    pub fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
+        move |problem| Self::Damaged { path: path.to_owned(), problem: problem.to_string() }
+    }
+}
