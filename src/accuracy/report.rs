@@ -196,8 +196,8 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::solver::Solver;
-    use crate::table::columns::Selected;
     use crate::table::file::Reader;
+    use crate::table::selected::Selected;
     use crate::table::storage::Disk;
 
     fn findings() -> Findings {

@@ -9,7 +9,8 @@ use super::{AccuracyError, Realisation};
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::{Solver, Summary};
-use crate::table::columns::{Selected, Selection, Table, columns};
+use crate::table::columns::{Table, columns};
+use crate::table::selected::{Selected, Selection};
 
 /// Slips of start-up, whose cost is subtracted.
 const START_UP: u64 = 2;

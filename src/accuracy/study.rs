@@ -13,7 +13,8 @@ use super::{AccuracyError, Realisation, drive_in_words};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Solver, Summary, TOLERANCES};
-use crate::table::columns::{Cell, Field, Kind, Selected, Selection, Table, columns, fields};
+use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
+use crate::table::selected::{Selected, Selection};
 use rayon::prelude::*;
 use std::ops::Range;
 

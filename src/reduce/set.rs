@@ -8,7 +8,7 @@ use super::set_row::{SetJobs, SetRow};
 use super::slip_stats::{SlipStats, non_nan};
 use super::startup::{StartupRow, startup_probability, startup_rows};
 use crate::observe::Slip;
-use crate::table::columns::Selected;
+use crate::table::selected::Selected;
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.

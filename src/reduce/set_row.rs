@@ -3,7 +3,8 @@
 use super::confidence::Interval;
 use super::moments::Moments;
 use crate::model::{Parameters, Symbol};
-use crate::table::columns::{Selected, Selection, Table, columns};
+use crate::table::columns::{Table, columns};
+use crate::table::selected::{Selected, Selection};
 
 /// What the jobs table says about a set.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,8 @@
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, MapRow, Measurements, Precursor, ProfileRow, Slip, TraceRow};
 use crate::sweep::Sweep;
-use crate::table::columns::{Cell, Field, Kind, Selected, Selection, Table, columns, fields, markdown};
+use crate::table::columns::{Cell, Field, Kind, Table, columns, fields, markdown};
+use crate::table::selected::{Selected, Selection};
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

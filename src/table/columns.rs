@@ -19,10 +19,8 @@
 //! knows Arrow, files or JSON. No derive that exists fits: serde_arrow 0.15 has no place for units and meanings beside a
 //! field, typed-arrow 0.8 ends at Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow schema.
 
-use crate::model::{BreakOn, Parameters, Symbol, Value};
+use crate::model::{BreakOn, Symbol};
 use std::borrow::Cow;
-use std::marker::PhantomData;
-use std::ops::Deref;
 
 /// What the cells of a column hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -308,89 +306,10 @@ side_by_side!(A, B);
 side_by_side!(A, B, C);
 side_by_side!(A, B, C, D);
 
-/// Which parameters stand in a row.
-pub trait Selection {
-    /// Their symbols, in order.
-    const SYMBOLS: &'static [Symbol];
-}
-
-/// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have their
-/// defaults.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Selected<S> {
-    /// The parameters.
-    pub parameters: Parameters,
-    selection: PhantomData<S>,
-}
-
-impl<S> Selected<S> {
-    /// The columns of these parameters.
-    #[must_use]
-    pub const fn new(parameters: Parameters) -> Self {
-        Self { parameters, selection: PhantomData }
-    }
-}
-
-impl<S> Deref for Selected<S> {
-    type Target = Parameters;
-
-    fn deref(&self) -> &Parameters {
-        &self.parameters
-    }
-}
-
-impl<S: Selection> Row for Selected<S> {
-    fn columns() -> Vec<Column> {
-        let defaults = Parameters::default();
-        let column = |&symbol: &Symbol| {
-            let described = symbol.description();
-            let (kind, nullable) = match defaults.get(symbol) {
-                Value::Count(_) => (Kind::Count, false),
-                Value::Real(_) => (Kind::Real, false),
-                Value::BreakOn(_) => (Kind::Text, false),
-                Value::Flag(_) => (Kind::Flag, false),
-                Value::Absent => (Kind::Real, true),
-            };
-            Column { name: described.key.into(), unit: described.unit, meaning: described.meaning, kind, nullable }
-        };
-        S::SYMBOLS.iter().map(column).collect()
-    }
-
-    fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
-        for &symbol in S::SYMBOLS {
-            give(match self.parameters.get(symbol) {
-                Value::Count(count) => Cell::Count(count),
-                Value::Real(real) => Cell::Real(real),
-                Value::BreakOn(rule) => Cell::Text(rule.word()),
-                Value::Flag(flag) => Cell::Flag(flag),
-                Value::Absent => Cell::Null,
-            });
-        }
-    }
-}
-
-part!(Selected<S> where S: Selection);
-
-impl<S: Selection> FromRow for Selected<S> {
-    fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
-        let mut parameters = Parameters::default();
-        for &symbol in S::SYMBOLS {
-            let value = match next() {
-                Cell::Count(count) => Value::Count(count),
-                Cell::Real(real) => Value::Real(real),
-                Cell::Text(word) => word.parse().map_or(Value::Absent, Value::BreakOn),
-                Cell::Flag(flag) => Value::Flag(flag),
-                Cell::Null => Value::Absent,
-            };
-            parameters.set(symbol, value).map_err(|error| error.to_string())?;
-        }
-        parameters.validated().map(Self::new).map_err(|error| error.to_string())
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::table::selected::{Selected, Selection};
 
     columns! {
         /// One reading.
@@ -422,6 +341,8 @@ pub(crate) mod tests {
 
     #[cfg(feature = "sweeps")]
     pub(crate) fn readings() -> [Readings; 2] {
+        use crate::model::Parameters;
+
         let modulated =
             Parameters { modulation_amplitude: 1e-6, modulation_period: Some(0.01), ..Parameters::default() };
         let reading = |force, phase, position, rule| Reading {

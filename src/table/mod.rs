@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! columns.rs     name, unit, meaning and value of each column -> row types, documentation
+//! selected.rs    parameters as columns
 //! arrow.rs       rows as record batches and as JSON
 //! file.rs        one table as a file: the same rows, the same bytes
 //! error.rs       why a file cannot be written or read
@@ -18,5 +19,6 @@ pub mod columns;
 pub mod error;
 #[cfg(feature = "sweeps")]
 pub mod file;
+pub mod selected;
 #[cfg(feature = "sweeps")]
 pub mod storage;
