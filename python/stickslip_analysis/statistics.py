@@ -42,7 +42,7 @@ def rayleigh_p(angles: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and the ends of its 95 % interval, equal to it if nothing varies, from so many independent units."""
+    """A value and the ends of its 95 % interval, equal to it if nothing varies, from this many independent units."""
 
     value: float
     low: float

@@ -36,7 +36,7 @@ def table(result: dict) -> str:
 def main() -> int:
     """Replays the log that the command line names."""
     parser = contact_log.parser("oracle", description)
-    parser.add_argument("--breaks", type=int, default=sys.maxsize, help="replay so many breaks (default: all)")
+    parser.add_argument("--breaks", type=int, default=sys.maxsize, help="number of breaks to replay (default: all)")
     parser.add_argument("--follow", action="store_true", help="continue from the logged times of breaks (see above)")
     parser.add_argument("--worst", type=float, default=1e-8, help="limit on the worst time error, in s (%(default)g)")
     parser.add_argument("--median", type=float, default=1e-11, help="limit on their median, in s (%(default)g)")

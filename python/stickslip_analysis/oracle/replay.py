@@ -9,7 +9,7 @@ from .motion import Contacts, Motion
 
 #: Break positions of one block that are closer than this, over f_s/k, are reached at one instant (identical contacts).
 COINCIDENT = 1e-12
-#: A break may come late by so many times the time in which the drive covers the limit on the residual.
+#: A break may come late by this many times the time in which the drive covers the limit on the residual.
 MAX_LATENESS = 10.0
 
 

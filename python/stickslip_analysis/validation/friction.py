@@ -15,7 +15,7 @@ from .intervals import of_same_jobs
 FREQUENCIES = (29, 58, 200)
 #: Breaks from which a precursor is large: ten blocks' worth.
 LARGE = 200
-#: A slow front: so many small precursors within this time before a slip, in s, spread over more than a fifth of it.
+#: A slow front: this many small precursors within this time before a slip, in s, spread over more than a fifth of it.
 FRONT_STEPS, FRONT_TIME = 3, 0.05
 
 
