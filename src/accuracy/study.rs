@@ -109,9 +109,9 @@ fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
 
 /// The drive under which solvers run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Driven;
+pub struct DriveAlone;
 
-impl Selection for Driven {
+impl Selection for DriveAlone {
     const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T];
 }
 
@@ -120,7 +120,7 @@ columns! {
     /// add to them. Errors of break times and the ledger are left out where they would take too long.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MethodRow {
-        parameters: Selected<Driven>;
+        parameters: Selected<DriveAlone>;
         solver: Solver;
         cost: Cost;
         cost_spread as "cpu_spread": f64 = "",
@@ -188,7 +188,7 @@ columns! {
     /// A distribution of one solver under one drive against that of the reference ensemble.
     #[derive(Clone, Debug, PartialEq)]
     pub struct DistanceRow {
-        parameters: Selected<Driven>;
+        parameters: Selected<DriveAlone>;
         solver: Solver;
         quantity: Quantity = "", "interval, phase, drop, peak_force, duration or front_speed";
         slips: u64 = "", "size of the sample";

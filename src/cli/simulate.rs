@@ -22,7 +22,7 @@ use stickslip::observe::{
     AttachedMap, ContactLog, Measurements, Observers, Profile, Recording, RecordingKey, SlipObserver, Trace,
 };
 use stickslip::results::tables;
-use stickslip::results::tables::{Drive, SlipRow};
+use stickslip::results::tables::{DriveAndSeed, SlipRow};
 use stickslip::solver::{self, Observer};
 use stickslip::sweep::{Job, Sweep, SweepError};
 use stickslip::table::file::Footer;
@@ -235,7 +235,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
     let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
     write_records(arguments, &footer, recorded)?;
-    let label = tables::label::<Drive>(&sweep, parameters);
+    let label = tables::label::<DriveAndSeed>(&sweep, parameters);
     if let Some(path) = &arguments.slip_table {
         let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
         write_table(path, &footer, rows)?;

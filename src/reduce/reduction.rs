@@ -289,14 +289,14 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::observe::{Measurements, Modulation};
-    use crate::results::tables::{Drive, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
+    use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
     use crate::table::storage::Disk;
     use std::fs;
 
     const PERIOD: f64 = 0.01;
 
-    fn label(set: u32, seed: u64, amplitude: f64) -> Label<Drive> {
+    fn label(set: u32, seed: u64, amplitude: f64) -> Label<DriveAndSeed> {
         let parameters = Parameters {
             seed,
             modulation_amplitude: amplitude,
@@ -310,7 +310,7 @@ mod tests {
         (names, Selected::new(parameters), Loading { eta })
     }
 
-    fn job_result((_, parameters, _): &Label<Drive>, slips: u32) -> Measurements {
+    fn job_result((_, parameters, _): &Label<DriveAndSeed>, slips: u32) -> Measurements {
         let slip = |number: u32| Slip {
             number: u64::from(number),
             onset: f64::from(number) * 12.0 * PERIOD,
@@ -346,7 +346,7 @@ mod tests {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
             let mut slip_writer = TableWriter::<SlipRow<'_>>::create(&Disk, &path, &Footer::default()).unwrap();
-            let labels: Vec<Label<Drive>> =
+            let labels: Vec<Label<DriveAndSeed>> =
                 (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
             let results: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
             for (job, result) in labels.iter().zip(&results) {

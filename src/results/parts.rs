@@ -9,7 +9,7 @@ use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::{Layout, TableFile};
 use crate::results::tables::{
-    self, Drive, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
+    self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
 };
 use crate::sweep::Part;
 use crate::table::columns::{Table, columns};
@@ -133,7 +133,7 @@ impl Results<'_> {
         commit: &mut Commit<'_>,
         part: &Part,
         jobs: &'j Jobs<'_>,
-        write: impl Fn(&mut TableWriter<R>, &'j Label<Drive>, &'j Outcome) -> Result<(), DatasetError>,
+        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), DatasetError>,
     ) -> Result<(), ResultsError> {
         let target = self.part_file(R::NAME, part);
         create_folder(self.storage(), &self.layout().table(R::NAME))?;
@@ -152,7 +152,7 @@ impl Results<'_> {
 }
 
 /// The jobs of a part, those that were run with their outcomes.
-type Jobs<'a> = Vec<(Label<Drive>, Option<&'a Outcome>)>;
+type Jobs<'a> = Vec<(Label<DriveAndSeed>, Option<&'a Outcome>)>;
 
 columns! {
     /// How a job ended, as a row of the jobs table says.

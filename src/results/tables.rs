@@ -51,9 +51,9 @@ columns! {
 
 /// The parameters that label every slip and precursor; the others stand in the jobs table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drive;
+pub struct DriveAndSeed;
 
-impl Selection for Drive {
+impl Selection for DriveAndSeed {
     const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T, Symbol::Seed];
 }
 
@@ -90,9 +90,9 @@ pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
 }
 
 /// A row of the slips table.
-pub type SlipRow<'a> = (&'a Label<Drive>, &'a Slip);
+pub type SlipRow<'a> = (&'a Label<DriveAndSeed>, &'a Slip);
 /// A row of the precursors table.
-pub type PrecursorRow<'a> = (&'a Label<Drive>, &'a Precursor);
+pub type PrecursorRow<'a> = (&'a Label<DriveAndSeed>, &'a Precursor);
 /// A row of the jobs table.
 pub type JobRow = (Label<All>, JobRecord);
 
