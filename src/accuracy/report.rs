@@ -7,11 +7,11 @@ use super::tables::method;
 use super::{AccuracyError, Stability, cpu};
 use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
-use crate::results::commit::{Commit, create_folder};
+use crate::results::commit::Commit;
 use crate::table::arrow;
 use crate::table::columns::Table;
 use crate::table::file::{DatasetError, Footer, PROGRAM, TableWriter};
-use crate::table::storage::Storage;
+use crate::table::storage::{Disk, Storage, StoredFile};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -56,7 +56,7 @@ pub fn stability_report(cases: &[Stability]) -> Report<'_> {
 }
 
 /// Writes a table into a file.
-type TableFile<'a> = Box<dyn Fn(&dyn Storage, &Path, &Footer) -> Result<(), DatasetError> + 'a>;
+type TableFile<'a> = Box<dyn Fn(StoredFile, &Footer) -> Result<(), DatasetError> + 'a>;
 
 /// Tables, JSON and figures of one command.
 pub struct Report<'a> {
@@ -80,8 +80,8 @@ impl<'a> Report<'a> {
     /// Adds a table, whose rows become a field of the JSON, too.
     fn table<R: Table>(mut self, field: &str, rows: &'a [R]) -> Self {
         self.json[field] = rows.iter().map(arrow::json).collect();
-        let write = move |storage: &dyn Storage, file: &Path, footer: &Footer| {
-            let mut writer = TableWriter::create(storage, file, footer)?;
+        let write = move |file: StoredFile, footer: &Footer| {
+            let mut writer = TableWriter::new(file, footer)?;
             rows.iter().try_for_each(|row| writer.push(row))?;
             writer.finish()
         };
@@ -99,15 +99,15 @@ impl<'a> Report<'a> {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn write(&self, storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
-        create_folder(storage, folder)?;
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
+        Disk.ensure_folder(folder)?;
         let staging = folder.join("staging");
-        let mut commit = Commit::begin(storage, &staging)?;
+        let mut commit = Commit::begin(&Disk, &staging)?;
         let mut files = Vec::new();
         let footer = Footer::default().with("processor", &cpu::processor());
         for (name, write) in &self.tables {
             let file = folder.join(format!("{name}.parquet"));
-            write(storage, &commit.stage(&file), &footer)?;
+            write(commit.stage(&file)?, &footer)?;
             files.push(file);
         }
         let mut documents = vec![(format!("{}.json", self.name), self.json.to_string().into_bytes())];
@@ -196,9 +196,8 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::solver::Solver;
-    use crate::table::file::Reader;
+    use crate::table::file::Dataset;
     use crate::table::selected::Selected;
-    use crate::table::storage::Disk;
 
     fn findings() -> Findings {
         let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });
@@ -259,7 +258,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let study = Study { velocities: vec![1e-4], ..Study::quick() };
         let findings = findings();
-        let files = study_report(&study, &findings).unwrap().write(&Disk, folder.path()).unwrap();
+        let files = study_report(&study, &findings).unwrap().write(folder.path()).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(
             names,
@@ -272,8 +271,8 @@ mod tests {
             ]
         );
         assert!(files.iter().all(|file| file.is_file()));
-        let rows: usize = Reader::new(&Disk, files[..1].to_vec()).map(|batch| batch.unwrap().rows.num_rows()).sum();
-        assert_eq!(rows, 2);
+        let batches = Dataset::new(&Disk, files[..1].to_vec()).batches();
+        assert_eq!(batches.map(|batch| batch.unwrap().rows.num_rows()).sum::<usize>(), 2);
         let json: Value = serde_json::from_slice(&std::fs::read(&files[2]).unwrap()).unwrap();
         assert_eq!(json["methods"][0]["timed_slips"], 0);
         assert_eq!((&json["methods"][0]["median_break_error"], &json["methods"][0]["T"]), (&json!(1e-7), &Value::Null));

@@ -9,7 +9,6 @@ use stickslip::accuracy::{
     self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
     hard_cases, scaling_report, solver_in_words, stability_report, study_report,
 };
-use stickslip::table::storage::Disk;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -89,7 +88,7 @@ fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
 
 /// Writes the report, and prints it as JSON or text.
 fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Result<()> {
-    let files = report.write(&Disk, &arguments.out)?;
+    let files = report.write(&arguments.out)?;
     if arguments.json {
         return output::json(report.json());
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use stickslip::results::Results;
 use stickslip::results::compact::Compacted;
+use stickslip::results::layout::Layout;
 use stickslip::table::storage::Disk;
 
 /// Make few large files of the tables of a results directory, the same bytes whatever its history
@@ -37,7 +38,7 @@ struct Report {
 }
 
 pub fn compact(arguments: &Arguments) -> Result<Exit> {
-    let compacted = Results::read(&Disk, &arguments.directory)?.compact()?;
+    let compacted = Results::read(&Layout::new(&Disk, &arguments.directory))?.compact()?;
     if arguments.json {
         output::json(&Report { format: FORMAT, compacted })?;
     } else {

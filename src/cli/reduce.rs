@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stickslip::figure::draw_all;
-use stickslip::reduce::{self, ReductionSummary};
+use stickslip::reduce::ReductionSummary;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::table::storage::Disk;
@@ -33,8 +33,8 @@ pub struct PlotArguments {
 }
 
 pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
-    let results = Results::read(&Disk, &arguments.directory)?;
-    let summary = reduce_results(&results)?;
+    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let summary = stickslip::reduce::reduce(&results)?;
     if arguments.json {
         output::json(&summary)?;
     } else {
@@ -45,16 +45,11 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
 }
 
 pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
-    let results = Results::read(&Disk, &arguments.directory)?;
-    for path in draw_all(&Disk, results.layout())? {
+    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    for path in draw_all(results.layout())? {
         output::print(&format!("{}\n", path.display()))?;
     }
     Ok(Exit::Done)
-}
-
-/// Reduces a directory, with its current sweep in the footers.
-pub fn reduce_results(results: &Results<'_>) -> Result<ReductionSummary> {
-    Ok(reduce::reduce(results.storage(), results.layout(), &results.footer(results.current()))?)
 }
 
 /// Says which jobs were not there to be reduced.
@@ -71,7 +66,7 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
 }
 
 /// A reduction in brief.
-pub fn summary_lines(summary: &ReductionSummary, layout: &Layout) -> Vec<(&'static str, String)> {
+pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'static str, String)> {
     let shown = |path: &Path| path.display().to_string();
     vec![
         ("jobs", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),

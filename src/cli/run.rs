@@ -7,13 +7,14 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stickslip::figure::draw_all;
 use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
 use stickslip::results::Results;
+use stickslip::results::layout::Layout;
 use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
 use stickslip::table::storage::Disk;
@@ -106,11 +107,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         walltime: arguments.walltime,
     };
     let (recording, solver) = (*sweep.recording(), sweep.solver());
+    let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new();
     let report = stickslip::run::run(
-        &Disk,
+        &layout,
         &sweep,
-        &root,
         options,
         &|job, interrupt| measure(&job.parameters, &recording, solver, interrupt),
         &mut |event| progress.show(event),
@@ -125,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         return Ok(Exit::Stopped);
     }
     if !arguments.no_reduce {
-        reduce_and_draw(&root, arguments)?;
+        reduce_and_draw(&layout, arguments)?;
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
@@ -136,17 +137,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// Reduces and draws what is there: other shards may be at work still.
-fn reduce_and_draw(root: &Path, arguments: &Arguments) -> Result<()> {
-    let results = Results::read(&Disk, root)?;
-    let layout = results.layout();
-    let summary = match reduce::reduce_results(&results) {
-        Err(error) if matches!(error.downcast_ref(), Some(ReduceError::NoJobs { .. })) => {
+fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
+    let results = Results::read(layout)?;
+    let summary = match stickslip::reduce::reduce(&results) {
+        Err(ReduceError::NoJobs { .. }) => {
             output::report("no part is committed yet, so there is nothing to reduce");
             return Ok(());
         }
         summary => summary?,
     };
-    let figures = draw_all(&Disk, layout)?;
+    let figures = draw_all(layout)?;
     if !arguments.json {
         output::pairs(&reduce::summary_lines(&summary, layout))?;
         for path in figures {

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use stickslip::results::Results;
+use stickslip::results::layout::Layout;
 use stickslip::run::Failure;
 use stickslip::table::storage::Disk;
 
@@ -22,7 +23,7 @@ pub struct Arguments {
 }
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let status = stickslip::run::status(&Results::read(&Disk, &arguments.directory)?)?;
+    let status = stickslip::run::status(&Results::read(&Layout::new(&Disk, &arguments.directory))?)?;
     let overview = status.overview;
     if arguments.json {
         output::json(&status)?;

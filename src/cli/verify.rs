@@ -45,10 +45,10 @@ struct Report<'a> {
 }
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
-    let root = &arguments.directory;
-    let verification = if arguments.repair { Results::repair(&Disk, root)? } else { Results::verify(&Disk, root)? };
+    let layout = &Layout::new(&Disk, &arguments.directory);
+    let verification = if arguments.repair { Results::repair(layout)? } else { Results::verify(layout)? };
     let repaired = arguments.repair && verification.wants_repair();
-    let commands = commands(root, &verification, !arguments.repair);
+    let commands = commands(layout, &verification, !arguments.repair);
     if arguments.json {
         output::json(&Report { verification: &verification, repaired, commands })?;
     } else {
@@ -58,12 +58,11 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
 }
 
 /// What repairs a directory.
-fn commands(root: &Path, verification: &Verification, with_repair: bool) -> Vec<String> {
-    let mut commands = Vec::new();
+fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
+    let (root, mut commands) = (layout.root(), Vec::new());
     if with_repair && verification.wants_repair() {
         commands.push(format!("stickslip verify {} --repair", quoted(root)));
     }
-    let layout = Layout::new(root);
     for &extension in &verification.extensions {
         commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(extension)), quoted(root)));
     }

@@ -3,9 +3,8 @@
 use super::{FigureError, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, staircase};
 use crate::reduce::{WRITER, read_reduced, read_sets};
-use crate::results::commit::{Commit, alone, create_folder};
+use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
-use crate::table::storage::Storage;
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
@@ -17,14 +16,14 @@ const MAX_SETS: usize = 100_000;
 ///
 /// # Errors
 /// When the reduced data are not there, are damaged, or a figure cannot be written.
-pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, FigureError> {
-    let _alone = alone(storage, layout, WRITER)?;
-    let points = read_reduced(storage, layout)?;
+pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
+    let _alone = alone(layout, WRITER)?;
+    let points = read_reduced(layout)?;
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(backbone::backbone(&points, &read_reduced(storage, layout)?));
+    pictures.extend(backbone::backbone(&points, &read_reduced(layout)?));
     pictures.extend(intervals::intervals(&points));
     pictures.extend(drag::drag(&points));
-    let sets = read_sets(storage, layout, MAX_SETS)?;
+    let sets = read_sets(layout, MAX_SETS)?;
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
         for figure in [locking_map::locking_map, staircase::staircase, dependence::dependence, friction::friction] {
@@ -32,15 +31,15 @@ pub fn draw_all(storage: &dyn Storage, layout: &Layout) -> Result<Vec<PathBuf>, 
         }
     }
     if sets.len() <= histograms::MAX_SETS {
-        pictures.extend(histograms::histograms(&sets, &read_reduced(storage, layout)?));
+        pictures.extend(histograms::histograms(&sets, &read_reduced(layout)?));
     }
-    write(storage, layout, &pictures)
+    write(layout, &pictures)
 }
 
-fn write(storage: &dyn Storage, layout: &Layout, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
+fn write(layout: &Layout<'_>, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
     let folder = layout.figures();
-    create_folder(storage, &folder)?;
-    let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
+    layout.storage.ensure_folder(&folder)?;
+    let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
     let mut files = Vec::new();
     for picture in pictures {
         for (extension, bytes) in [("svg", picture.svg().into_bytes()), ("png", picture.png()?)] {
@@ -56,25 +55,29 @@ fn write(storage: &dyn Storage, layout: &Layout, pictures: &[Picture]) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow, reduced_file};
+    use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
+    use crate::table::columns::Table;
     use crate::table::file::{Footer, TableWriter};
-    use crate::table::storage::Disk;
+    use crate::table::storage::{Disk, Storage};
     use std::fs;
 
-    fn reduced(points: &[Point]) -> (tempfile::TempDir, Layout) {
-        let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
-        fs::create_dir_all(layout.reduced()).unwrap();
-        let footer = Footer::default();
-        let path = |name: &str| reduced_file(&layout, name);
-        let mut writer = TableWriter::<Point>::create(&Disk, &path("points"), &footer).unwrap();
-        for point in points {
-            writer.push(point).unwrap();
+    fn write_rows<R: Table>(layout: &Layout<'_>, rows: &[R]) {
+        let file = Disk.create(&layout.reduced_file(R::NAME)).unwrap();
+        let mut writer = TableWriter::new(file, &Footer::default()).unwrap();
+        for row in rows {
+            writer.push(row).unwrap();
         }
         writer.finish().unwrap();
-        TableWriter::<BackboneBin>::create(&Disk, &path("backbone"), &footer).unwrap().finish().unwrap();
-        TableWriter::<SetRow>::create(&Disk, &path("sets"), &footer).unwrap().finish().unwrap();
-        TableWriter::<HistogramBin>::create(&Disk, &path("histograms"), &footer).unwrap().finish().unwrap();
+    }
+
+    fn reduced(points: &[Point]) -> (tempfile::TempDir, Layout<'static>) {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(&Disk, root.path());
+        fs::create_dir_all(layout.reduced()).unwrap();
+        write_rows(&layout, points);
+        write_rows::<BackboneBin>(&layout, &[]);
+        write_rows::<SetRow>(&layout, &[]);
+        write_rows::<HistogramBin>(&layout, &[]);
         (root, layout)
     }
 
@@ -97,12 +100,12 @@ mod tests {
     #[test]
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let files = draw_all(&Disk, &layout).unwrap();
+        let files = draw_all(&layout).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
         assert_eq!(names, ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]);
         let bytes = || files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>();
         let before = bytes();
-        assert_eq!(draw_all(&Disk, &layout).unwrap(), files);
+        assert_eq!(draw_all(&layout).unwrap(), files);
         assert!(bytes() == before);
         let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
         assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
@@ -113,6 +116,6 @@ mod tests {
     fn without_modulation_no_phase_is_drawn() {
         let still = Point { period: None, periods: None, phase: None, ..modulated(1) };
         let (_root, layout) = reduced(&[still]);
-        assert!(draw_all(&Disk, &layout).unwrap().is_empty());
+        assert!(draw_all(&layout).unwrap().is_empty());
     }
 }

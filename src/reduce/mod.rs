@@ -23,7 +23,7 @@ pub use moments::{Moments, quantile};
 pub use point::{MAX_POINTS, Point, RampStage};
 pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
-pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce, reduced_file};
+pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
 pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
 pub use set_row::{AllButSeed, SetJobs, SetRow};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};

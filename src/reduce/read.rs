@@ -1,11 +1,10 @@
 //! Reduced tables back as rows, for figures.
 
-use super::{Interval, SetRow, reduced_file};
+use super::{Interval, SetRow};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
-use crate::table::file::{DatasetError, read_rows};
-use crate::table::storage::Storage;
+use crate::table::file::{Dataset, DatasetError};
 
 /// A set as figures need it. Quantities are SI; `None` where there is nothing to average.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,8 +74,8 @@ impl From<SetRow> for SetSummary {
 ///
 /// # Errors
 /// When the file is not there or is damaged.
-pub fn read_reduced<R: FromRow + Table>(storage: &dyn Storage, layout: &Layout) -> Result<Vec<R>, DatasetError> {
-    let batches = read_rows(storage, vec![reduced_file(layout, R::NAME)]);
+pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, DatasetError> {
+    let batches = Dataset::new(layout.storage, vec![layout.reduced_file(R::NAME)]).rows();
     Ok(batches.collect::<Result<Vec<Vec<R>>, _>>()?.into_iter().flatten().collect())
 }
 
@@ -84,9 +83,9 @@ pub fn read_reduced<R: FromRow + Table>(storage: &dyn Storage, layout: &Layout) 
 ///
 /// # Errors
 /// When the file is not there or is damaged.
-pub fn read_sets(storage: &dyn Storage, layout: &Layout, max: usize) -> Result<Vec<SetSummary>, DatasetError> {
+pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetSummary>, DatasetError> {
     let mut sets = Vec::new();
-    for batch in read_rows::<SetRow>(storage, vec![reduced_file(layout, SetRow::NAME)]) {
+    for batch in Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>() {
         sets.extend(batch?.into_iter().filter(|row| row.intervals > 0).map(SetSummary::from));
         if sets.len() > max {
             return Ok(Vec::new());

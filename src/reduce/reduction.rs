@@ -14,14 +14,14 @@ use super::set_row::{SetJobs, SetRow};
 use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
 use crate::observe::Slip;
-use crate::results::commit::{Commit, alone, create_folder};
-use crate::results::layout::Layout;
+use crate::results::Results;
+use crate::results::commit::{Commit, alone};
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
 use crate::table::columns::{Table, columns};
-use crate::table::file::{DatasetError, Footer, TableWriter, files, read_rows};
+use crate::table::file::{Dataset, DatasetError, TableWriter};
 use crate::table::selected::Selected;
-use crate::table::storage::{Storage, StorageError};
+use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
@@ -73,25 +73,24 @@ pub struct ReductionSummary {
 }
 
 /// Reduces the tables of a results directory to `reduced/{sets,histograms,startup,backbone,points}.parquet`, over those
-/// of an earlier reduction.
+/// of an earlier reduction, with the sweep that was asked for last in their footers.
 ///
 /// # Errors
 /// When there is no job, a table is damaged, or the reduced data cannot be written; earlier reduced files stay whole.
-pub fn reduce(storage: &dyn Storage, layout: &Layout, footer: &Footer) -> Result<ReductionSummary, ReduceError> {
-    reduce_by(storage, layout, footer, MAX_SLIPS)
+pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary, ReduceError> {
+    reduce_by(results, MAX_SLIPS)
 }
 
-fn reduce_by(
-    storage: &dyn Storage,
-    layout: &Layout,
-    footer: &Footer,
-    max_slips: u64,
-) -> Result<ReductionSummary, ReduceError> {
-    let _alone = alone(storage, layout, WRITER)?;
+fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, ReduceError> {
+    let layout = results.layout();
+    let _alone = alone(layout, WRITER)?;
     // Listed once: what other runs commit meanwhile is left out as a whole.
-    let job_files = files(storage, &layout.table(JOBS))?;
-    let slip_files = committed_files(storage, layout, SLIPS, &job_files)?;
-    let all_jobs = read_jobs(storage, layout, job_files)?;
+    let job_files = layout.dataset(JOBS)?;
+    let slip_files = committed_files(layout, SLIPS, &job_files)?;
+    let all_jobs = read_jobs(job_files)?;
+    if all_jobs.is_empty() {
+        return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
+    }
     let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
     let mut summary = ReductionSummary {
         format: SUMMARY_FORMAT,
@@ -104,18 +103,19 @@ fn reduce_by(
         backbone: Vec::new(),
     };
 
-    create_folder(storage, &layout.reduced())?;
-    let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
-    let mut stage = |name: &str| commit.stage(&reduced_file(layout, name));
-    let mut set_writer = TableWriter::<SetRow>::create(storage, &stage(SetRow::NAME), footer)?;
-    let mut histogram_writer = TableWriter::create(storage, &stage(HistogramBin::NAME), footer)?;
-    let mut startup_writer = TableWriter::create(storage, &stage(StartupRow::NAME), footer)?;
-    let mut backbone_writer = TableWriter::create(storage, &stage(BackboneBin::NAME), footer)?;
-    let mut point_writer = TableWriter::create(storage, &stage(Point::NAME), footer)?;
+    layout.storage.ensure_folder(&layout.reduced())?;
+    let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
+    let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
+    let footer = &results.footer(results.current());
+    let mut set_writer = TableWriter::<SetRow>::new(stage(SetRow::NAME)?, footer)?;
+    let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
+    let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;
+    let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
+    let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
     for chunk in chunks(all_jobs, max_slips) {
-        let gathered = gather(storage, &slip_files, chunk, spacing(total))?;
+        let gathered = gather(slip_files.clone(), chunk, spacing(total))?;
         for (jobs, slips, set_points) in gathered {
             let set = slips.finish(jobs);
             let row = &set.row;
@@ -152,12 +152,6 @@ fn reduce_by(
     Ok(summary)
 }
 
-/// Path of a reduced table.
-#[must_use]
-pub fn reduced_file(layout: &Layout, table: &str) -> PathBuf {
-    layout.reduced().join(format!("{table}.parquet"))
-}
-
 columns! {
     /// What a reduction takes from the jobs table beside the parameters.
     struct JobOfSet {
@@ -176,9 +170,9 @@ columns! {
 }
 
 /// The sets of all jobs, in the order of their parameters.
-fn read_jobs(storage: &dyn Storage, layout: &Layout, files: Vec<PathBuf>) -> Result<Vec<SetJobs>, ReduceError> {
+fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
-    for batch in read_rows::<(JobOfSet, Selected<All>)>(storage, files) {
+    for batch in jobs.rows::<(JobOfSet, Selected<All>)>() {
         for (job, parameters) in batch? {
             let set = sets.entry(job.set_id).or_insert_with_key(|set_id| SetJobs {
                 set_id: set_id.clone(),
@@ -196,9 +190,6 @@ fn read_jobs(storage: &dyn Storage, layout: &Layout, files: Vec<PathBuf>) -> Res
                 set.friction.extend(job.mean_friction);
             }
         }
-    }
-    if sets.is_empty() {
-        return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
     sets.sort_by(by_parameters);
@@ -238,18 +229,13 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 type Gathered = (SetJobs, SetSlips, Vec<(u64, Point)>);
 
 /// Reads all slips and keeps those of these sets.
-fn gather(
-    storage: &dyn Storage,
-    slip_files: &[PathBuf],
-    sets: Vec<SetJobs>,
-    spacing: u64,
-) -> Result<Vec<Gathered>, ReduceError> {
+fn gather(slips: Dataset<'_>, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, DatasetError> {
     let index: HashMap<String, usize> =
         sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
     let limits: Vec<PhaseLimits> = sets.iter().map(|set| PhaseLimits::at(set.parameters.eta())).collect();
     let mut gathered: Vec<Gathered> = sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
     let mut place = 0;
-    for batch in read_rows::<(SetOfSlip, Slip)>(storage, slip_files.to_vec()) {
+    for batch in slips.rows::<(SetOfSlip, Slip)>() {
         for (SetOfSlip { set_id }, slip) in batch? {
             let here = place;
             place += 1;
@@ -289,10 +275,14 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
     use crate::observe::{Measurements, Modulation};
+    use crate::results::layout::Layout;
     use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
-    use crate::table::storage::Disk;
+    use crate::sweep::Sweep;
+    use crate::table::file::Footer;
+    use crate::table::storage::{Disk, Storage};
     use std::fs;
+    use std::path::Path;
 
     const PERIOD: f64 = 0.01;
 
@@ -336,27 +326,37 @@ mod tests {
         }
     }
 
-    /// Two parts, three sets of two seeds, one failed job; the slips of a third part are without their jobs.
-    fn directory(slips: u32) -> tempfile::TempDir {
+    /// A directory without tables.
+    fn without_jobs() -> (tempfile::TempDir, Results<'static>) {
         let root = tempfile::tempdir().unwrap();
-        let layout = Layout::new(root.path());
+        let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
+        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
+        (root, results)
+    }
+
+    /// Two parts, three sets of two seeds, one failed job; the slips of a third part are without their jobs.
+    fn directory(slips: u32) -> (tempfile::TempDir, Results<'static>) {
+        let (root, results) = without_jobs();
+        let layout = results.layout();
         fs::create_dir_all(layout.table("slips")).unwrap();
         fs::create_dir_all(layout.table("jobs")).unwrap();
         for part in 0..3 {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
-            let mut slip_writer = TableWriter::<SlipRow<'_>>::create(&Disk, &path, &Footer::default()).unwrap();
+            let file = Disk.create(&path).unwrap();
+            let mut slip_writer = TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
             let labels: Vec<Label<DriveAndSeed>> =
                 (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
-            let results: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
-            for (job, result) in labels.iter().zip(&results) {
+            let measured: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
+            for (job, result) in labels.iter().zip(&measured) {
                 result.slips.iter().for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
             }
             slip_writer.finish().unwrap();
             if part < 2 {
                 let path = layout.table("jobs").join(&name);
-                let mut job_writer = TableWriter::<JobRow>::create(&Disk, &path, &Footer::default()).unwrap();
-                for (job, result) in labels.iter().zip(&results) {
+                let file = Disk.create(&path).unwrap();
+                let mut job_writer = TableWriter::<JobRow>::new(file, &Footer::default()).unwrap();
+                for (job, result) in labels.iter().zip(&measured) {
                     job_writer.push(&(relabel(job), JobRecord::new(Ok(result)))).unwrap();
                 }
                 let failed = label(2, 77, 2e-6);
@@ -364,24 +364,23 @@ mod tests {
                 job_writer.finish().unwrap();
             }
         }
-        root
+        (root, results)
     }
 
-    fn reduced_bytes(root: &tempfile::TempDir) -> Vec<Vec<u8>> {
-        let layout = Layout::new(root.path());
+    fn reduced_bytes(layout: &Layout<'_>) -> Vec<Vec<u8>> {
         ["sets", "histograms", "startup", "backbone", "points"]
-            .map(|name| fs::read(reduced_file(&layout, name)).unwrap())
+            .map(|name| fs::read(layout.reduced_file(name)).unwrap())
             .to_vec()
     }
 
     #[test]
     fn every_committed_slip_is_counted_once_and_no_other() {
-        let root = directory(20);
-        let summary = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap();
+        let (_root, results) = directory(20);
+        let summary = reduce(&results).unwrap();
         assert_eq!((summary.jobs, summary.failed_jobs, summary.sets), (6, 2, 3));
         assert_eq!((summary.slips, summary.points, summary.locked_sets), (120, 120, 2));
         assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
-        let sets: Vec<SetRow> = read_reduced(&Disk, &Layout::new(root.path())).unwrap();
+        let sets: Vec<SetRow> = read_reduced(results.layout()).unwrap();
         let counts = |set: &SetRow| (set.parameters.modulation_amplitude, set.intervals, set.failed_jobs);
         assert_eq!(sets.iter().map(counts).collect::<Vec<_>>(), [(0.0, 38, 0), (1e-6, 38, 0), (2e-6, 38, 2)]);
         assert!((sets[1].mean_friction.unwrap() - 430.0).abs() < 1e-9);
@@ -390,27 +389,27 @@ mod tests {
 
     #[test]
     fn reading_in_several_passes_changes_nothing() {
-        let root = directory(50);
-        let layout = Layout::new(root.path());
-        let whole = reduce(&Disk, &layout, &Footer::default()).unwrap();
-        let bytes = reduced_bytes(&root);
-        let passes = reduce_by(&Disk, &layout, &Footer::default(), 1).unwrap();
+        let (_root, results) = directory(50);
+        let layout = results.layout();
+        let whole = reduce(&results).unwrap();
+        let bytes = reduced_bytes(layout);
+        let passes = reduce_by(&results, 1).unwrap();
         assert_eq!(passes, whole);
-        assert!(reduced_bytes(&root) == bytes);
+        assert!(reduced_bytes(layout) == bytes);
         assert!(Disk.list(&layout.staging(WRITER)).unwrap().is_empty());
     }
 
     #[test]
     fn of_many_slips_every_kth_becomes_a_point() {
-        let root = directory(5000);
-        let summary = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap();
+        let (_root, results) = directory(5000);
+        let summary = reduce(&results).unwrap();
         assert_eq!((summary.slips, summary.points), (30_000, 15_000));
     }
 
     #[test]
     fn a_directory_without_jobs_is_refused() {
-        let root = tempfile::tempdir().unwrap();
-        let error = reduce(&Disk, &Layout::new(root.path()), &Footer::default()).unwrap_err();
+        let (_root, results) = without_jobs();
+        let error = reduce(&results).unwrap_err();
         assert!(error.to_string().contains("holds no jobs"), "{error}");
     }
 }

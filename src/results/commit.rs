@@ -5,7 +5,7 @@
 //! which prepare the same files at once never write into each other's.
 
 use crate::results::layout::Layout;
-use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
+use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
@@ -30,17 +30,20 @@ impl<'a> Commit<'a> {
     /// # Errors
     /// When the folder cannot be made.
     pub fn begin(storage: &'a dyn Storage, staging: &Path) -> Result<Self, StorageError> {
-        create_folder(storage, staging)?;
+        storage.ensure_folder(staging)?;
         Ok(Self { storage, staging: staging.to_owned(), token: token(), staged: Vec::new() })
     }
 
-    /// Where the next file is to be written, and synced, before it goes to its target.
-    pub fn stage(&mut self, target: &Path) -> PathBuf {
+    /// Creates the next file, which is to be written, and synced, before it goes to its target.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn stage(&mut self, target: &Path) -> Result<StoredFile, StorageError> {
         let mut name = OsString::from(format!("{}-{}-", self.token, self.staged.len()));
         name.push(target.file_name().unwrap_or_default());
         let staged = self.staging.join(name);
         self.staged.push((staged.clone(), target.to_owned()));
-        staged
+        self.storage.create(&staged)
     }
 
     /// Stages a small file of which all bytes are known.
@@ -48,8 +51,7 @@ impl<'a> Commit<'a> {
     /// # Errors
     /// When it cannot be written.
     pub fn stage_bytes(&mut self, target: &Path, bytes: &[u8]) -> Result<(), StorageError> {
-        let staged = self.stage(target);
-        let mut file = self.storage.create(&staged)?;
+        let mut file = self.stage(target)?;
         file.write(bytes)?;
         file.sync()
     }
@@ -77,26 +79,6 @@ impl Drop for Commit<'_> {
     }
 }
 
-/// Moves a file, if it is there, under a name that is free.
-///
-/// # Errors
-/// When that fails.
-pub(super) fn move_away(storage: &dyn Storage, from: &Path, to: &Path) -> Result<(), StorageError> {
-    if !storage.exists(from)? {
-        return Ok(());
-    }
-    let mut free = to.to_owned();
-    let mut number = 0;
-    while storage.exists(&free)? {
-        number += 1;
-        free = to.with_added_extension(number.to_string());
-    }
-    let folders = || [free.parent(), from.parent()].into_iter().flatten();
-    folders().try_for_each(|folder| create_folder(storage, folder))?;
-    storage.rename(from, &free)?;
-    folders().try_for_each(|folder| storage.sync_folder(folder))
-}
-
 /// A text that no other process or commit has.
 pub(super) fn token() -> String {
     format!("{:016x}", RandomState::new().hash_one(std::process::id()))
@@ -107,40 +89,16 @@ pub(super) fn token() -> String {
 ///
 /// # Errors
 /// When another does not end within minutes, or a file operation fails.
-pub fn alone(storage: &dyn Storage, layout: &Layout, writer: &str) -> Result<Lock, StorageError> {
-    create_folder(storage, &layout.locks())?;
+pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
+    layout.storage.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);
-    let lock = wait_for_lock(storage, &file, MAX_WAIT)?;
+    let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;
     if matches!(lock, Lock::Taken) {
         let held = io::Error::new(io::ErrorKind::WouldBlock, "another process holds it; try again when it has ended");
         return Err(StorageError::at("lock", &file)(held));
     }
-    clear(storage, &layout.staging(writer))?;
+    layout.storage.clear_folder(&layout.staging(writer))?;
     Ok(lock)
-}
-
-/// Creates a folder and its parents, and brings the names of the new ones to the disk.
-///
-/// # Errors
-/// When that fails.
-pub fn create_folder(storage: &dyn Storage, folder: &Path) -> Result<(), StorageError> {
-    if storage.exists(folder)? {
-        return Ok(());
-    }
-    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
-    if let Some(parent) = parent {
-        create_folder(storage, parent)?;
-    }
-    storage.create_folder(folder)?;
-    storage.sync_folder(parent.unwrap_or(Path::new(".")))
-}
-
-/// Removes whatever a killed run left in a staging folder.
-///
-/// # Errors
-/// When something cannot be removed.
-pub fn clear(storage: &dyn Storage, staging: &Path) -> Result<(), StorageError> {
-    storage.list(staging)?.into_iter().try_for_each(|name| storage.remove(&staging.join(name)))
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@
 //! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step
 //! leaves the old tables or the new ones.
 
-use crate::results::commit::create_folder;
 use crate::results::error::ResultsError;
 use crate::results::events::RunEvent;
 use crate::results::handle::Results;
@@ -19,7 +18,7 @@ use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::results::verify::Remedy;
 use crate::sweep::Part;
 use crate::table::columns::Table;
-use crate::table::file::{Reader, TableWriter};
+use crate::table::file::{Dataset, TableWriter};
 use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -94,13 +93,13 @@ impl Results<'_> {
     pub(crate) fn compact_by(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
         self.exclusively(|| {
             // It may have been extended before the lock was ours.
-            let results = Self::read(self.storage(), self.layout().root())?;
-            let problems = Self::verify(self.storage(), self.layout().root())?.problems;
+            let results = Self::read(self.layout())?;
+            let problems = Self::verify(self.layout())?.problems;
             if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
                 return Err(ResultsError::damaged(&problem.path, problem.problem));
             }
             let staging = self.layout().staging(WRITER);
-            self.storage().remove_folder(&staging)?;
+            self.layout().storage.remove_folder(&staging)?;
             let plan = results.plan_compaction(parts_per_file)?;
             let mut there = results.table_files(tables::JOBS)?;
             there.retain(|_, file| file.is_compacted());
@@ -133,17 +132,17 @@ impl Results<'_> {
     }
 
     fn table_files(&self, table: &str) -> Result<TableFiles, StorageError> {
-        let names = self.storage().list(&self.layout().table(table))?;
+        let names = self.layout().storage.list(&self.layout().table(table))?;
         let files = names.iter().filter_map(|name| TableFile::parse(name.to_str()?));
         Ok(files.map(|file| ((file.extension, file.first), file)).collect())
     }
 
     /// Builds the new tables, and puts them in the place of the old ones, which then lie in the staging folder.
     fn build(&self, plan: &CompactionPlan, staging: &Path) -> Result<(), ResultsError> {
-        let storage = self.storage();
-        create_folder(storage, staging)?;
+        let (old, storage) = (self.layout(), self.layout().storage);
+        storage.ensure_folder(staging)?;
         self.probe_exchange(staging)?;
-        let (old, new) = (self.layout(), Layout::new(staging));
+        let new = Layout::new(storage, staging);
         self.concatenate::<SlipRow<'_>>(plan, &new)?;
         if self.sweep().recording().precursors {
             self.concatenate::<PrecursorRow<'_>>(plan, &new)?;
@@ -162,11 +161,11 @@ impl Results<'_> {
 
     /// Tries the exchange on two empty folders before anything is built.
     fn probe_exchange(&self, staging: &Path) -> Result<(), ResultsError> {
-        let [one, other] = ["one", "other"].map(|name| staging.join(name));
+        let ([one, other], storage) = (["one", "other"].map(|name| staging.join(name)), self.layout().storage);
         for folder in [&one, &other] {
-            create_folder(self.storage(), folder)?;
+            storage.ensure_folder(folder)?;
         }
-        match self.storage().exchange(&one, &other) {
+        match storage.exchange(&one, &other) {
             Err(error) if error.kind() == ErrorKind::Unsupported => Err(ResultsError::refused(
                 staging,
                 "this file system cannot exchange two folders in one step, so readers would see an unfinished table; \
@@ -177,11 +176,11 @@ impl Results<'_> {
     }
 
     /// Makes the files of one table; returns the names of those that are compacted.
-    fn concatenate<R: Table>(&self, plan: &CompactionPlan, new: &Layout) -> Result<Vec<String>, ResultsError> {
-        let (storage, name) = (self.storage(), R::NAME);
+    fn concatenate<R: Table>(&self, plan: &CompactionPlan, new: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
+        let (storage, name) = (self.layout().storage, R::NAME);
         let (old_folder, new_folder) = (self.layout().table(name), new.table(name));
         let old = self.table_files(name)?;
-        create_folder(storage, &new_folder)?;
+        storage.ensure_folder(&new_folder)?;
         let keep = |file: &TableFile| {
             let file = file.to_string();
             storage.link(&old_folder.join(&file), &new_folder.join(&file)).map(|()| file)
@@ -201,10 +200,10 @@ impl Results<'_> {
                 continue;
             }
             let staged = new_folder.join("new");
-            let mut writer = TableWriter::<R>::create(storage, &staged, &self.footer(chunk.extension))?;
+            let mut writer = TableWriter::<R>::new(storage.create(&staged)?, &self.footer(chunk.extension))?;
             let mut rows = 0;
             let paths = sources.iter().map(|file| old_folder.join(file.to_string())).collect();
-            for batch in Reader::new(storage, paths) {
+            for batch in Dataset::new(storage, paths).batches() {
                 let batch = batch?;
                 rows += batch.rows.num_rows() as u64;
                 writer.copy(&batch, 0..batch.rows.num_rows())?;
@@ -229,7 +228,8 @@ impl Results<'_> {
         }
         for table in self.tables() {
             for file in self.table_files(table)?.into_values().filter(TableFile::is_compacted) {
-                compacted.bytes += self.storage().length(&self.layout().table(table).join(file.to_string()))?;
+                let path = self.layout().table(table).join(file.to_string());
+                compacted.bytes += self.layout().storage.length(&path)?;
                 compacted.files += 1;
             }
         }

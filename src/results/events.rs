@@ -3,7 +3,6 @@
 //! The log is lines of JSON in `run/log/`, one file for each run, so that runs on several hosts do not write into each
 //! other's. Tables never depend on it.
 
-use crate::results::commit::create_folder;
 use crate::results::handle::Results;
 use crate::results::layout::TableFile;
 use crate::table::file::PROGRAM;
@@ -188,11 +187,11 @@ impl Results<'_> {
     /// When it cannot be created.
     pub fn begin_log(&self) -> Result<Log, StorageError> {
         let folder = self.layout().logs();
-        create_folder(self.storage(), &folder)?;
+        self.layout().storage.ensure_folder(&folder)?;
         let plain: String =
             host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
         let path = folder.join(format!("{:.3}-{plain}-{}.jsonl", now(), std::process::id()));
-        Ok(Log(self.storage().create(&path)?))
+        Ok(Log(self.layout().storage.create(&path)?))
     }
 
     /// Goes through all events that are logged, in order of the beginnings of their runs. What a killed run left
@@ -201,10 +200,10 @@ impl Results<'_> {
     /// # Errors
     /// When a log cannot be read.
     pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
-        let folder = self.layout().logs();
-        for name in self.storage().list(&folder)? {
+        let (folder, storage) = (self.layout().logs(), self.layout().storage);
+        for name in storage.list(&folder)? {
             let path = folder.join(name);
-            for line in BufReader::new(self.storage().open(&path)?).split(b'\n') {
+            for line in BufReader::new(storage.open(&path)?).split(b'\n') {
                 let line = line.map_err(StorageError::at("read", &path))?;
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
@@ -252,6 +251,7 @@ impl Results<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::layout::Layout;
     use crate::sweep::Sweep;
     use crate::table::storage::Disk;
     use std::path::Path;
@@ -260,7 +260,7 @@ mod tests {
     fn a_log_reads_back_without_its_half_written_end() {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
-        let results = Results::open(&Disk, root.path(), &sweep).unwrap();
+        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         let mut log = results.begin_log().unwrap();
         let events = [
             RunEvent::started("1/1".to_owned(), 2, 3, 0, 4.0),

@@ -7,26 +7,18 @@ use crate::results::manifest::{self, Manifest};
 use crate::results::tables;
 use crate::sweep::{Job, Part, Plan, Sweep};
 use crate::table::file::Footer;
-use crate::table::storage::{Storage, StorageError};
-use std::fmt;
+use crate::table::storage::StorageError;
 use std::io::ErrorKind;
 use std::path::Path;
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Results<'a> {
-    storage: &'a dyn Storage,
-    layout: Layout,
+    layout: Layout<'a>,
     /// At least one.
     sweeps: Vec<Sweep>,
     current: usize,
-}
-
-impl fmt::Debug for Results<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Results").field("root", &self.layout.root()).finish_non_exhaustive()
-    }
 }
 
 impl<'a> Results<'a> {
@@ -34,16 +26,15 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
-    pub fn open(storage: &'a dyn Storage, root: &Path, sweep: &Sweep) -> Result<Self, ResultsError> {
-        let layout = Layout::new(root);
-        if let (results, None) = Self::compare(storage, &layout, sweep)? {
+    pub fn open(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        if let (results, None) = Self::compare(layout, sweep)? {
             return Ok(results);
         }
-        let _alone = alone(storage, &layout, manifest::WRITER)?;
+        let _alone = alone(layout, manifest::WRITER)?;
         // Another run may have written the manifest before the lock was ours.
-        let (results, unwritten) = Self::compare(storage, &layout, sweep)?;
+        let (results, unwritten) = Self::compare(layout, sweep)?;
         if let Some(manifest) = unwritten {
-            manifest.write(storage, &layout)?;
+            manifest.write(layout)?;
         }
         Ok(results)
     }
@@ -52,28 +43,22 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When it is no results directory, belongs to other versions, or is damaged.
-    pub fn read(storage: &'a dyn Storage, root: &Path) -> Result<Self, ResultsError> {
-        let layout = Layout::new(root);
-        let (manifest, sweeps) = manifest::read_with_sweeps(storage, &layout)?.ok_or_else(|| no_results(root))?;
-        Ok(Self::new(storage, layout, sweeps, manifest.current))
+    pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
+        let (manifest, sweeps) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout.root()))?;
+        Ok(Self::new(layout, sweeps, manifest.current))
     }
 
-    pub(super) const fn new(storage: &'a dyn Storage, layout: Layout, sweeps: Vec<Sweep>, current: usize) -> Self {
-        Self { storage, layout, sweeps, current }
+    pub(super) fn new(layout: &Layout<'a>, sweeps: Vec<Sweep>, current: usize) -> Self {
+        Self { layout: layout.clone(), sweeps, current }
     }
 
     /// The directory as it will be once it is opened with a sweep, and the manifest that is to be written for that.
-    fn compare(
-        storage: &'a dyn Storage,
-        layout: &Layout,
-        sweep: &Sweep,
-    ) -> Result<(Self, Option<Manifest>), ResultsError> {
-        let results = |sweeps, current| Self::new(storage, layout.clone(), sweeps, current);
+    fn compare(layout: &Layout<'a>, sweep: &Sweep) -> Result<(Self, Option<Manifest>), ResultsError> {
         // In this order: another run may write the manifest in between, and none removes it.
-        let is_fresh = is_fresh(storage, layout)?;
-        let Some((mut manifest, mut sweeps)) = manifest::read_with_sweeps(storage, layout)? else {
+        let is_fresh = is_fresh(layout)?;
+        let Some((mut manifest, mut sweeps)) = manifest::read_with_sweeps(layout)? else {
             if is_fresh {
-                return Ok((results(vec![sweep.clone()], 0), Some(Manifest::new(sweep))));
+                return Ok((Self::new(layout, vec![sweep.clone()], 0), Some(Manifest::new(sweep))));
             }
             let problem =
                 "is not empty and no results directory (there is no run/manifest.json); choose another with --out";
@@ -85,25 +70,19 @@ impl<'a> Results<'a> {
         manifest::refuse(layout, &differences)?;
         let known = sweeps.iter().position(|known| known.text() == sweep.text());
         if known == Some(manifest.current) {
-            return Ok((results(sweeps, manifest.current), None));
+            return Ok((Self::new(layout, sweeps, manifest.current), None));
         }
         manifest.current = known.unwrap_or_else(|| {
             sweeps.push(sweep.clone());
             manifest.sweeps.push(sweep.text().to_owned());
             sweeps.len() - 1
         });
-        Ok((results(sweeps, manifest.current), Some(manifest)))
+        Ok((Self::new(layout, sweeps, manifest.current), Some(manifest)))
     }
 
-    /// Where it lies.
+    /// Where it and everything in it lie.
     #[must_use]
-    pub const fn storage(&self) -> &'a dyn Storage {
-        self.storage
-    }
-
-    /// Where everything in it lies.
-    #[must_use]
-    pub const fn layout(&self) -> &Layout {
+    pub const fn layout(&self) -> &Layout<'a> {
         &self.layout
     }
 
@@ -170,10 +149,10 @@ impl<'a> Results<'a> {
     pub fn sync_names(&self) -> Result<(), StorageError> {
         for above in self.layout.root().ancestors().skip(1) {
             // Most are not ours, and who made the folders in them synced them if that is possible at all.
-            let _ = self.storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
+            let _ = self.layout.storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
         }
         for folder in self.layout.result_folders() {
-            match self.storage.sync_folder(&folder) {
+            match self.layout.storage.sync_folder(&folder) {
                 Err(error) if error.kind() == ErrorKind::NotFound => {}
                 synced => synced?,
             }
@@ -190,7 +169,8 @@ pub(super) fn no_results(root: &Path) -> ResultsError {
 }
 
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.
-fn is_fresh(storage: &dyn Storage, layout: &Layout) -> Result<bool, StorageError> {
+fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
+    let storage = layout.storage;
     let first_sweep = layout.sweep(0);
     let ours = |name: &std::ffi::OsString| {
         RUN_FOLDERS.iter().any(|folder| name == folder) || Some(name.as_os_str()) == first_sweep.file_name()

@@ -15,7 +15,8 @@
 
 use crate::results::tables;
 use crate::sweep::Part;
-use crate::table::file::FILE_EXTENSION;
+use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
+use crate::table::storage::Storage;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -29,17 +30,25 @@ const MANIFEST: &str = "manifest.json";
 /// Names of its folders.
 pub const RUN_FOLDERS: [&str; 3] = ["staging", "lock", "log"];
 
-/// Paths within a results directory.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layout {
+/// Paths within a results directory, and the storage on which it lies.
+#[derive(Clone)]
+pub struct Layout<'a> {
+    /// The storage.
+    pub storage: &'a dyn Storage,
     root: PathBuf,
 }
 
-impl Layout {
+impl fmt::Debug for Layout<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Layout").field("root", &self.root).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Layout<'a> {
     /// The layout under a directory.
     #[must_use]
-    pub fn new(root: &Path) -> Self {
-        Self { root: root.to_owned() }
+    pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
+        Self { storage, root: root.to_owned() }
     }
 
     /// The directory.
@@ -60,10 +69,24 @@ impl Layout {
         self.tables().join(name)
     }
 
+    /// The files of a table as they are now.
+    ///
+    /// # Errors
+    /// As [`Dataset::of_folder`].
+    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, DatasetError> {
+        Dataset::of_folder(self.storage, &self.table(name))
+    }
+
     /// Folder of reduced data.
     #[must_use]
     pub fn reduced(&self) -> PathBuf {
         self.root.join("reduced")
+    }
+
+    /// File of a reduced table.
+    #[must_use]
+    pub fn reduced_file(&self, table: &str) -> PathBuf {
+        self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
 
     /// Folder of figures.

@@ -12,11 +12,12 @@
 //! and then looks that nobody has the directory alone. So at least one of two that begin at once sees the other, and
 //! leaves.
 
-use crate::results::commit::{create_folder, token};
+use crate::results::commit::token;
 use crate::results::error::ResultsError;
 use crate::results::events::{UNKNOWN_HOST, host};
 use crate::results::handle::Results;
-use crate::table::storage::{Lock, Storage, StorageError, wait_for_lock};
+use crate::results::layout::Layout;
+use crate::table::storage::{Lock, StorageError};
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime};
@@ -36,19 +37,12 @@ const EXCLUSIVE: &str = "exclusive";
 /// What the names of the locks of shards begin with.
 const SHARD: &str = "shard-";
 
-/// The locks of a directory.
-#[derive(Clone)]
-struct Locks<'a> {
-    storage: &'a dyn Storage,
-    folder: PathBuf,
-}
-
-impl<'a> Locks<'a> {
+impl<'a> Layout<'a> {
     /// Takes the lock of this name; `None` if another process has it.
-    fn take(&self, name: &str, timeout: Duration) -> Result<Option<HeldLock<'a>>, StorageError> {
-        create_folder(self.storage, &self.folder)?;
-        let file = self.folder.join(name);
-        let lock = wait_for_lock(self.storage, &file, MAX_WAIT)?;
+    fn take_lock(&self, name: &str, timeout: Duration) -> Result<Option<HeldLock<'a>>, StorageError> {
+        self.storage.ensure_folder(&self.locks())?;
+        let file = self.locks().join(name);
+        let lock = self.storage.wait_for_lock(&file, MAX_WAIT)?;
         if matches!(lock, Lock::Taken) {
             return Ok(None);
         }
@@ -58,15 +52,18 @@ impl<'a> Locks<'a> {
             return Ok(None);
         }
         let owner = format!("{}{SEPARATOR}{}{SEPARATOR}{}", host(), std::process::id(), token());
-        let held = HeldLock { storage: self.storage, file, owner, _lock: lock };
+        let held = HeldLock { layout: self.clone(), file, owner, _lock: lock };
         held.beat(0)?;
         Ok(Some(held))
     }
 
-    /// Whether a process has a lock: by the operating system, or by a heartbeat of another host that is recent, as far as
-    /// the hosts' clocks agree.
-    fn is_locked(&self, name: &str) -> Result<bool, StorageError> {
-        let (storage, file) = (self.storage, self.folder.join(name));
+    /// Whether a process has the lock of this name: by the operating system, or by a heartbeat of another host that is
+    /// recent, as far as the hosts' clocks agree. Does not wait.
+    ///
+    /// # Errors
+    /// When the lock cannot be looked at.
+    pub fn is_locked(&self, name: &str) -> Result<bool, StorageError> {
+        let (storage, file) = (self.storage, self.locks().join(name));
         if !storage.exists(&file)? {
             return Ok(false);
         }
@@ -101,7 +98,7 @@ impl<'a> Locks<'a> {
         let begin = Instant::now();
         while begin.elapsed() < timeout {
             std::thread::sleep(timeout / 20);
-            if self.storage.read(&self.folder.join(name))? != before {
+            if self.storage.read(&self.locks().join(name))? != before {
                 return Ok(true);
             }
         }
@@ -111,7 +108,7 @@ impl<'a> Locks<'a> {
 
 /// A lock, until it is dropped.
 pub struct HeldLock<'a> {
-    storage: &'a dyn Storage,
+    layout: Layout<'a>,
     file: PathBuf,
     /// The heartbeat without its count.
     owner: String,
@@ -138,37 +135,25 @@ impl HeldLock<'_> {
     }
 
     fn beat(&self, count: u64) -> Result<(), StorageError> {
-        self.storage.create(&self.file)?.write(format!("{}{SEPARATOR}{count}", self.owner).as_bytes())
+        self.layout.storage.create(&self.file)?.write(format!("{}{SEPARATOR}{count}", self.owner).as_bytes())
     }
 }
 
 impl Drop for HeldLock<'_> {
     /// Leaves an empty file: to remove it would let two processes lock two files of one name.
     fn drop(&mut self) {
-        let _ = self.storage.create(&self.file);
+        let _ = self.layout.storage.create(&self.file);
     }
 }
 
 impl<'a> Results<'a> {
-    fn locks(&self) -> Locks<'a> {
-        Locks { storage: self.storage(), folder: self.layout().locks() }
-    }
-
     /// Locks the shard of this name, which begins with `shard-`; `None` if another process has it.
     ///
     /// # Errors
     /// When another process has the whole directory to itself.
     pub fn lock_shard(&self, name: &str) -> Result<Option<HeldLock<'a>>, ResultsError> {
-        let lock = self.locks().take(name, TIMEOUT)?;
-        if lock.is_some() && self.locks().stays_locked(EXCLUSIVE)? { Err(self.is_repaired()) } else { Ok(lock) }
-    }
-
-    /// Whether a process has the lock of this name, without waiting.
-    ///
-    /// # Errors
-    /// When the lock cannot be looked at.
-    pub fn is_locked(&self, name: &str) -> Result<bool, StorageError> {
-        self.locks().is_locked(name)
+        let lock = self.layout().take_lock(name, TIMEOUT)?;
+        if lock.is_some() && self.layout().stays_locked(EXCLUSIVE)? { Err(self.is_repaired()) } else { Ok(lock) }
     }
 
     /// Runs `body` while nobody else changes the directory.
@@ -176,13 +161,13 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When a shard is being run, or another process has the directory to itself; and what `body` says.
     pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
-        let locks = self.locks();
-        let lock = locks.take(EXCLUSIVE, TIMEOUT)?.ok_or_else(|| self.is_repaired())?;
-        for name in self.storage().list(&locks.folder)? {
+        let layout = self.layout();
+        let lock = layout.take_lock(EXCLUSIVE, TIMEOUT)?.ok_or_else(|| self.is_repaired())?;
+        for name in layout.storage.list(&layout.locks())? {
             let shard = name.to_string_lossy();
-            if shard.starts_with(SHARD) && locks.stays_locked(&shard)? {
+            if shard.starts_with(SHARD) && layout.stays_locked(&shard)? {
                 let problem = format!("is being run ({shard}); wait for it or stop it, then try again");
-                return Err(ResultsError::busy(self.layout().root(), problem));
+                return Err(ResultsError::busy(layout.root(), problem));
             }
         }
         lock.while_held(body)
@@ -198,13 +183,14 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When something cannot be looked at or removed.
     pub fn clear_abandoned_staging(&self) -> Result<(), StorageError> {
-        let (storage, layout) = (self.storage(), self.layout());
+        let layout = self.layout();
+        let storage = layout.storage;
         for shard in storage.list(&layout.staging(""))? {
             let shard = shard.to_string_lossy();
             let staging = layout.staging(&shard);
             // Listed before the look at the lock: whoever takes it afterwards stages under other names.
             let left = if shard.starts_with(SHARD) { storage.list(&staging)? } else { Vec::new() };
-            if !left.is_empty() && !self.is_locked(&shard)? {
+            if !left.is_empty() && !layout.is_locked(&shard)? {
                 left.into_iter().try_for_each(|name| storage.remove(&staging.join(name)))?;
             }
         }
@@ -245,52 +231,49 @@ mod tests {
 
     const NAME: &str = "shard-1-of-1";
 
-    fn locks<'a>(storage: &'a dyn Storage, root: &tempfile::TempDir) -> Locks<'a> {
-        Locks { storage, folder: root.path().to_owned() }
+    fn take<'a>(layout: &Layout<'a>) -> Option<HeldLock<'a>> {
+        layout.take_lock(NAME, SHORT).unwrap()
     }
 
-    fn take<'a>(locks: &Locks<'a>) -> Option<HeldLock<'a>> {
-        locks.take(NAME, SHORT).unwrap()
-    }
-
-    /// Leaves the heartbeat of a process that was killed.
-    fn die(locks: &Locks<'_>, host: &str) {
-        fs::write(locks.folder.join(NAME), format!("{host}\t77\tabc\t5")).unwrap();
+    /// Leaves what is in the lock of a process that was killed.
+    fn die(layout: &Layout<'_>, heartbeat: &str) {
+        fs::create_dir_all(layout.locks()).unwrap();
+        fs::write(layout.locks().join(NAME), heartbeat).unwrap();
     }
 
     #[test]
     fn a_lock_is_refused_while_held_and_free_afterwards() {
         let root = tempfile::tempdir().unwrap();
-        let locks = locks(&Disk, &root);
-        let held = take(&locks).unwrap();
-        assert!(take(&locks).is_none() && locks.is_locked(NAME).unwrap());
-        assert!(locks.take("shard-1-of-2", SHORT).unwrap().is_some());
+        let layout = Layout::new(&Disk, root.path());
+        let held = take(&layout).unwrap();
+        assert!(take(&layout).is_none() && layout.is_locked(NAME).unwrap());
+        assert!(layout.take_lock("shard-1-of-2", SHORT).unwrap().is_some());
         drop(held);
-        assert!(!locks.is_locked(NAME).unwrap());
-        assert!(take(&locks).is_some());
+        assert!(!layout.is_locked(NAME).unwrap());
+        assert!(take(&layout).is_some());
     }
 
     #[test]
     fn the_lock_of_a_dead_process_is_taken_over_at_once_on_its_host_and_after_a_while_from_another() {
         let root = tempfile::tempdir().unwrap();
-        let locks = locks(&Disk, &root);
+        let layout = Layout::new(&Disk, root.path());
         for (dead_host, waits) in [(host(), false), ("elsewhere".to_owned(), true)] {
-            die(&locks, &dead_host);
+            die(&layout, &format!("{dead_host}\t77\tabc\t5"));
             let begin = Instant::now();
-            assert!(take(&locks).is_some());
+            assert!(take(&layout).is_some());
             assert_eq!(begin.elapsed() >= SHORT, waits, "{dead_host}");
         }
         // What a power cut leaves of a heartbeat.
-        fs::write(locks.folder.join(NAME), "elsewh").unwrap();
+        die(&layout, "elsewh");
         let begin = Instant::now();
-        assert!(take(&locks).is_some() && begin.elapsed() < SHORT);
+        assert!(take(&layout).is_some() && begin.elapsed() < SHORT);
     }
 
     #[test]
     fn where_locks_are_not_seen_a_heartbeat_that_grows_keeps_others_out() {
         let root = tempfile::tempdir().unwrap();
-        let locks = locks(&WithoutLocks, &root);
-        let held = take(&locks).unwrap();
+        let layout = Layout::new(&WithoutLocks, root.path());
+        let held = take(&layout).unwrap();
         let refused = std::thread::scope(|scope| {
             scope.spawn(|| {
                 for count in 1..8 {
@@ -298,20 +281,20 @@ mod tests {
                     held.beat(count).unwrap();
                 }
             });
-            take(&locks).is_none()
+            take(&layout).is_none()
         });
-        assert!(refused && locks.is_locked(NAME).unwrap());
+        assert!(refused && layout.is_locked(NAME).unwrap());
         drop(held);
-        assert!(!locks.is_locked(NAME).unwrap());
-        assert!(take(&locks).is_some());
+        assert!(!layout.is_locked(NAME).unwrap());
+        assert!(take(&layout).is_some());
     }
 
     #[test]
     fn a_lock_that_is_held_grows() {
         let root = tempfile::tempdir().unwrap();
-        let locks = locks(&Disk, &root);
-        let held = take(&locks).unwrap();
-        let first = fs::read(locks.folder.join(NAME)).unwrap();
-        held.while_held(|| assert!(locks.grows(NAME, &first, 2 * BEAT).unwrap()));
+        let layout = Layout::new(&Disk, root.path());
+        let held = take(&layout).unwrap();
+        let first = fs::read(layout.locks().join(NAME)).unwrap();
+        held.while_held(|| assert!(layout.grows(NAME, &first, 2 * BEAT).unwrap()));
     }
 }

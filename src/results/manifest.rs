@@ -16,7 +16,6 @@ use crate::sweep::{PLAN_VERSION, Sweep};
 use crate::table::checksum;
 use crate::table::columns::Table;
 use crate::table::file::PROGRAM;
-use crate::table::storage::Storage;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -114,8 +113,8 @@ impl Manifest {
     }
 
     /// Writes the manifest, and copies of the sweep files beside it.
-    pub(super) fn write(&self, storage: &dyn Storage, layout: &Layout) -> Result<(), ResultsError> {
-        let mut commit = Commit::begin(storage, &layout.staging(WRITER))?;
+    pub(super) fn write(&self, layout: &Layout<'_>) -> Result<(), ResultsError> {
+        let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
         for (extension, text) in self.sweeps.iter().enumerate() {
             commit.stage_bytes(&layout.sweep(extension), text.as_bytes())?;
         }
@@ -127,12 +126,12 @@ impl Manifest {
     }
 
     /// Reads the manifest alone; `None` if there is none.
-    pub(super) fn read(storage: &dyn Storage, layout: &Layout) -> Result<Option<Self>, ResultsError> {
+    pub(super) fn read(layout: &Layout<'_>) -> Result<Option<Self>, ResultsError> {
         let path = layout.manifest();
-        if !storage.exists(&path)? {
+        if !layout.storage.exists(&path)? {
             return Ok(None);
         }
-        let text = read_text(storage, &path)?;
+        let text = read_text(layout, &path)?;
         let damaged = |problem: String| ResultsError::damaged(&path, problem);
         let Format { format } = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
         if format != FORMAT {
@@ -151,14 +150,11 @@ impl Manifest {
 }
 
 /// The manifest and its sweeps, verified; `None` if there is no manifest.
-pub(super) fn read_with_sweeps(
-    storage: &dyn Storage,
-    layout: &Layout,
-) -> Result<Option<(Manifest, Vec<Sweep>)>, ResultsError> {
-    let Some(manifest) = Manifest::read(storage, layout)? else { return Ok(None) };
+pub(super) fn read_with_sweeps(layout: &Layout<'_>) -> Result<Option<(Manifest, Vec<Sweep>)>, ResultsError> {
+    let Some(manifest) = Manifest::read(layout)? else { return Ok(None) };
     for (extension, expected) in manifest.sweeps.iter().enumerate() {
         let path = layout.sweep(extension);
-        if read_text(storage, &path)? != *expected {
+        if read_text(layout, &path)? != *expected {
             return Err(ResultsError::damaged(&path, "it was changed; edit the original sweep file instead"));
         }
     }
@@ -167,7 +163,7 @@ pub(super) fn read_with_sweeps(
 }
 
 /// Parses the texts of sweep files.
-pub(super) fn parse(layout: &Layout, texts: &[String]) -> Result<Vec<Sweep>, ResultsError> {
+pub(super) fn parse(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Sweep>, ResultsError> {
     let parsed = texts.iter().enumerate().map(|(extension, text)| {
         let path = layout.sweep(extension);
         Sweep::parse(text, &path).map_err(|error| ResultsError::damaged(&path, error.to_string()))
@@ -176,7 +172,7 @@ pub(super) fn parse(layout: &Layout, texts: &[String]) -> Result<Vec<Sweep>, Res
 }
 
 /// Refuses a directory that differs in something.
-pub(super) fn refuse(layout: &Layout, differences: &[String]) -> Result<(), ResultsError> {
+pub(super) fn refuse(layout: &Layout<'_>, differences: &[String]) -> Result<(), ResultsError> {
     if differences.is_empty() {
         return Ok(());
     }
@@ -188,8 +184,8 @@ pub(super) fn refuse(layout: &Layout, differences: &[String]) -> Result<(), Resu
 }
 
 /// The text of a file that must be there.
-pub(super) fn read_text(storage: &dyn Storage, path: &Path) -> Result<String, ResultsError> {
-    match storage.read(path) {
+pub(super) fn read_text(layout: &Layout<'_>, path: &Path) -> Result<String, ResultsError> {
+    match layout.storage.read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Err(ResultsError::damaged(path, "it is missing")),
         bytes => String::from_utf8(bytes?).map_err(|error| ResultsError::damaged(path, error.to_string())),
     }

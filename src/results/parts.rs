@@ -4,7 +4,7 @@
 //! compacted file of `jobs` holds it.
 
 use crate::observe::Measurements;
-use crate::results::commit::{Commit, create_folder};
+use crate::results::commit::Commit;
 use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::{Layout, TableFile};
@@ -13,8 +13,8 @@ use crate::results::tables::{
 };
 use crate::sweep::Part;
 use crate::table::columns::{Table, columns};
-use crate::table::file::{Batch, DatasetError, Reader, TableWriter, files, read_rows};
-use crate::table::storage::{Storage, StorageError};
+use crate::table::file::{Batch, Dataset, DatasetError, TableWriter};
+use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ impl Results<'_> {
     /// When the folder of the jobs table cannot be listed.
     pub fn done_parts(&self) -> Result<DoneParts, StorageError> {
         let mut done = DoneParts::default();
-        for name in self.storage().list(&self.layout().table(tables::JOBS))? {
+        for name in self.layout().storage.list(&self.layout().table(tables::JOBS))? {
             match name.to_str().and_then(TableFile::parse) {
                 Some(file) if file.is_compacted() => {
                     done.compacted.insert((file.extension, file.first), file.last);
@@ -87,7 +87,7 @@ impl Results<'_> {
             return Ok(Some(failed));
         }
         let path = self.part_file(tables::JOBS, part);
-        for batch in read_rows::<OutcomeRow>(self.storage(), vec![path.clone()]) {
+        for batch in Dataset::new(self.layout().storage, vec![path.clone()]).rows::<OutcomeRow>() {
             for row in batch? {
                 if row.outcome == JobOutcome::Failed {
                     failed.insert(rows, row.reason.unwrap_or_default());
@@ -111,7 +111,7 @@ impl Results<'_> {
         let sweep = &self.sweeps()[part.extension];
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let jobs: Jobs<'_> = (0..part.jobs.len()).map(|position| (label(position), outcomes.get(&position))).collect();
-        let mut commit = Commit::begin(self.storage(), staging)?;
+        let mut commit = Commit::begin(self.layout().storage, staging)?;
         self.stage::<SlipRow<'_>>(&mut commit, part, &jobs, |writer, job, outcome| {
             outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
         })?;
@@ -135,12 +135,12 @@ impl Results<'_> {
         jobs: &'j Jobs<'_>,
         write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), DatasetError>,
     ) -> Result<(), ResultsError> {
-        let target = self.part_file(R::NAME, part);
-        create_folder(self.storage(), &self.layout().table(R::NAME))?;
+        let (target, storage) = (self.part_file(R::NAME, part), self.layout().storage);
+        storage.ensure_folder(&self.layout().table(R::NAME))?;
         let keeps = jobs.iter().any(|(_, outcome)| outcome.is_none());
-        let kept = if keeps { KeptRows::read(self.storage(), &target)? } else { KeptRows::default() };
-        let footer = self.footer(part.extension);
-        let mut writer = TableWriter::create(self.storage(), &commit.stage(&target), &footer)?;
+        let before = if keeps { vec![target.clone()] } else { Vec::new() };
+        let kept = KeptRows::read(Dataset::new(storage, before))?;
+        let mut writer = TableWriter::new(commit.stage(&target)?, &self.footer(part.extension))?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,
@@ -166,18 +166,13 @@ columns! {
 /// leaves the slips of a part without its jobs.
 ///
 /// # Errors
-/// As [`files`].
-pub fn committed_files(
-    storage: &dyn Storage,
-    layout: &Layout,
-    table: &str,
-    jobs: &[PathBuf],
-) -> Result<Vec<PathBuf>, DatasetError> {
+/// As [`Layout::dataset`].
+pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, DatasetError> {
     let parsed = |path: &PathBuf| path.file_name()?.to_str().and_then(TableFile::parse);
     let parts = |file: TableFile| (file.extension, file.first, file.last, file.is_compacted());
-    let done: HashSet<_> = jobs.iter().filter_map(parsed).map(parts).collect();
+    let done: HashSet<_> = jobs.files().iter().filter_map(parsed).map(parts).collect();
     let counts = |path: &PathBuf| parsed(path).is_some_and(|file| done.contains(&parts(file)));
-    Ok(files(storage, &layout.table(table))?.into_iter().filter(counts).collect())
+    Ok(layout.dataset(table)?.filter(counts))
 }
 
 /// The rows of a file by job.
@@ -188,9 +183,9 @@ struct KeptRows {
 }
 
 impl KeptRows {
-    fn read(storage: &dyn Storage, path: &Path) -> Result<Self, DatasetError> {
+    fn read(before: Dataset<'_>) -> Result<Self, DatasetError> {
         let mut kept = Self::default();
-        for batch in Reader::new(storage, vec![path.to_owned()]) {
+        for batch in before.batches() {
             let batch = batch?;
             let mut begin = 0;
             for rows in batch.rows_of::<RowOfJob>()?.chunk_by(|row, next| row.job_id == next.job_id) {

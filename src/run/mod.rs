@@ -25,17 +25,16 @@ pub use share::Overview;
 pub use status::{Failure, MAX_FAILURES, Status, status};
 
 use crate::observe::Measurements;
-use crate::results::commit::clear;
 use crate::results::events::Log;
+use crate::results::layout::Layout;
 use crate::results::{Results, ResultsError};
 use crate::run::collect::Collector;
 use crate::run::share::Share;
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Sweep};
-use crate::table::storage::{Storage, StorageError};
+use crate::table::storage::StorageError;
 use std::num::NonZeroUsize;
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -78,20 +77,19 @@ impl Events<'_> {
 /// When the directory belongs to something else or another process has it, or the disk fails. What was committed is
 /// kept, and the same command resumes from there.
 pub fn run(
-    storage: &dyn Storage,
+    layout: &Layout<'_>,
     sweep: &Sweep,
-    root: &Path,
     options: Options<'_>,
     kernel: &Kernel<'_>,
     display: &mut dyn FnMut(&RunEvent),
 ) -> Result<RunReport, ResultsError> {
     let begin = Instant::now();
-    let results = Results::open(storage, root, sweep)?;
+    let results = Results::open(layout, sweep)?;
     let lock = results.lock_shard(&options.shard.writer())?.ok_or_else(|| {
         let shard = options.shard;
         let problem =
             format!("shard {shard} is being run by another process; wait for it, stop it, or take another --shard");
-        ResultsError::busy(root, problem)
+        ResultsError::busy(layout.root(), problem)
     })?;
     lock.while_held(|| run_locked(&results, begin, options, kernel, display))
 }
@@ -106,7 +104,7 @@ fn run_locked(
 ) -> Result<RunReport, ResultsError> {
     results.sync_names()?;
     let staging = results.layout().staging(&options.shard.writer());
-    clear(results.storage(), &staging)?;
+    results.layout().storage.clear_folder(&staging)?;
     results.clear_abandoned_staging()?;
     let share = Share::look_up(results, options.shard, options.retry_failed)?;
     let overview = share.overview(|_, _| ())?;

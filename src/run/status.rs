@@ -67,7 +67,7 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let mut running = Vec::new();
     for name in threads.keys() {
         let Ok(shard) = name.parse::<Shard>() else { continue };
-        if results.is_locked(&shard.writer())? {
+        if results.layout().is_locked(&shard.writer())? {
             running.push(name.clone());
         }
     }

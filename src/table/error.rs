@@ -49,6 +49,11 @@ impl DatasetError {
         }
     }
 
+    /// For `map_err`: why a file cannot be written.
+    pub(super) fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> Self {
+        move |source| Self::Write { path: path.to_owned(), source }
+    }
+
     /// For `map_err`: what was found in a file.
     pub fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
         move |problem| Self::Damaged { path: path.to_owned(), problem: problem.to_string() }

@@ -108,7 +108,6 @@ pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
 
 /// Writes one file of a table. A file that was not finished is unreadable.
 pub struct TableWriter<R> {
-    path: PathBuf,
     row: PhantomData<fn(&R)>,
     buffer: RowBuffer,
     /// Encodes into memory, one row group at a time.
@@ -118,18 +117,17 @@ pub struct TableWriter<R> {
 }
 
 impl<R: Row> TableWriter<R> {
-    /// Creates the file, over another if there is one.
+    /// Writes into this file, which is empty.
     ///
     /// # Errors
-    /// When that fails.
-    pub fn create(storage: &dyn Storage, path: &Path, footer: &Footer) -> Result<Self, DatasetError> {
+    /// When the footer cannot be.
+    pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
         let buffer = RowBuffer::new::<R>();
-        let file = storage.create(path)?;
         let writer = footer
             .properties(buffer.schema())
             .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))
-            .map_err(|source| DatasetError::Write { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
+            .map_err(DatasetError::unwritten(file.path()))?;
+        Ok(Self { row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
     }
 
     /// Appends a row.
@@ -161,7 +159,7 @@ impl<R: Row> TableWriter<R> {
     fn flush(&mut self) -> Result<(), DatasetError> {
         let written = self.buffer.take().map_err(ParquetError::from).and_then(|batch| self.writer.write(&batch));
         let written = written.and_then(|()| self.writer.flush()).and_then(|()| Ok(self.writer.sync()?));
-        written.map_err(|source| DatasetError::Write { path: self.path.clone(), source })?;
+        written.map_err(DatasetError::unwritten(self.file.path()))?;
         let bytes = std::mem::take(self.writer.inner_mut());
         self.hasher.update(&bytes);
         Ok(self.file.write(&bytes)?)
@@ -183,13 +181,13 @@ impl<R: Row> TableWriter<R> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }
-        let (path, mut file) = (self.path, self.file);
+        let mut file = self.file;
         let footer = self.writer.into_inner().and_then(|mut footer| {
             let checksum = checksum::close(self.hasher, &mut footer);
             let missing = || ParquetError::General("the footer has no place for a checksum".to_owned());
             Ok((checksum.ok_or_else(missing)?, footer))
         });
-        let (checksum, footer) = footer.map_err(|source| DatasetError::Write { path: path.clone(), source })?;
+        let (checksum, footer) = footer.map_err(DatasetError::unwritten(file.path()))?;
         file.write(&footer)?;
         file.sync()?;
         Ok(checksum)
@@ -213,23 +211,6 @@ impl Batch {
     pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
         arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
     }
-}
-
-/// The files of a table folder, in order of their names; none if there is no such folder.
-///
-/// # Errors
-/// When the folder cannot be read or holds anything else.
-pub fn files(storage: &dyn Storage, folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
-    let names = storage.list(folder)?;
-    let paths = names.into_iter().map(|name| folder.join(name));
-    let checked = |path: PathBuf| {
-        if path.extension().is_some_and(|extension| extension == FILE_EXTENSION) {
-            Ok(path)
-        } else {
-            Err(DatasetError::Stray { path })
-        }
-    };
-    paths.map(checked).collect()
 }
 
 /// The texts under keys in the footer of a file.
@@ -258,9 +239,67 @@ fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result
     Err(DatasetError::damaged(path)(problem))
 }
 
-/// Reads the rows of files, one batch after the other, holding one of them; an error ends it. Each file is held against its
-/// checksum first.
-pub struct Reader<'a> {
+/// Files of a table, in this order.
+#[derive(Clone)]
+pub struct Dataset<'a> {
+    storage: &'a dyn Storage,
+    files: Vec<PathBuf>,
+}
+
+impl<'a> Dataset<'a> {
+    /// These files.
+    #[must_use]
+    pub const fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
+        Self { storage, files }
+    }
+
+    /// All files of a table folder, in order of their names; none if there is no such folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be read or holds anything else.
+    pub fn of_folder(storage: &'a dyn Storage, folder: &Path) -> Result<Self, DatasetError> {
+        let paths = storage.list(folder)?.into_iter().map(|name| folder.join(name));
+        let checked = |path: PathBuf| {
+            if path.extension().is_some_and(|extension| extension == FILE_EXTENSION) {
+                Ok(path)
+            } else {
+                Err(DatasetError::Stray { path })
+            }
+        };
+        Ok(Self::new(storage, paths.map(checked).collect::<Result<_, _>>()?))
+    }
+
+    /// The files.
+    #[must_use]
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// Those of the files for which this is true.
+    #[must_use]
+    pub fn filter(mut self, is_kept: impl FnMut(&PathBuf) -> bool) -> Self {
+        self.files.retain(is_kept);
+        self
+    }
+
+    /// Reads all rows, one batch after the other, holding one of them; an error ends it. Each file is held against its
+    /// checksum first.
+    pub fn batches(self) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
+        self.read(Vec::new())
+    }
+
+    /// The same, as rows of one type.
+    pub fn rows<R: FromRow>(self) -> impl Iterator<Item = Result<Vec<R>, DatasetError>> + use<'a, R> {
+        self.read(R::columns().into_iter().map(|column| column.name).collect()).map(|batch| batch?.rows_of())
+    }
+
+    fn read(self, columns: Vec<Cow<'static, str>>) -> Reader<'a> {
+        Reader { storage: self.storage, files: self.files.into_iter(), columns, current: None }
+    }
+}
+
+/// Reads files one after the other.
+struct Reader<'a> {
     storage: &'a dyn Storage,
     files: std::vec::IntoIter<PathBuf>,
     /// Names of the columns to read; all if there are none.
@@ -268,21 +307,7 @@ pub struct Reader<'a> {
     current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
 }
 
-impl<'a> Reader<'a> {
-    /// Reads these files.
-    #[must_use]
-    pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
-        Self { storage, files: files.into_iter(), columns: Vec::new(), current: None }
-    }
-
-    /// Reads all files of a table folder.
-    ///
-    /// # Errors
-    /// As [`files`].
-    pub fn of_folder(storage: &'a dyn Storage, folder: &Path) -> Result<Self, DatasetError> {
-        Ok(Self::new(storage, files(storage, folder)?))
-    }
-
+impl Reader<'_> {
     /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
     fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
         checksum::check(self.storage, path)?;
@@ -312,15 +337,6 @@ impl<'a> Reader<'a> {
             self.current = Some((path.into(), reader));
         }
     }
-}
-
-/// Reads the rows of files as rows of one type, batch by batch; an error ends it.
-pub fn read_rows<R: FromRow>(
-    storage: &dyn Storage,
-    files: Vec<PathBuf>,
-) -> impl Iterator<Item = Result<Vec<R>, DatasetError>> + use<'_, R> {
-    let columns = R::columns().into_iter().map(|column| column.name).collect();
-    Reader { columns, ..Reader::new(storage, files) }.map(|batch| batch?.rows_of())
 }
 
 impl Iterator for Reader<'_> {
@@ -367,14 +383,15 @@ mod tests {
     }
 
     fn write(path: &Path, numbers: Range<u64>) {
-        let mut writer = TableWriter::create(&Disk, path, &Footer::default().with("note", "test")).unwrap();
+        let footer = Footer::default().with("note", "test");
+        let mut writer = TableWriter::new(Disk.create(path).unwrap(), &footer).unwrap();
         numbers.for_each(|number| writer.push(&Number::of(number)).unwrap());
         writer.finish().unwrap();
     }
 
-    fn numbers(reader: Reader<'_>) -> Result<Vec<u64>, DatasetError> {
+    fn numbers(folder: &Path) -> Result<Vec<u64>, DatasetError> {
         let mut numbers = Vec::new();
-        for batch in reader {
+        for batch in Dataset::of_folder(&Disk, folder)?.batches() {
             numbers.extend(batch?.rows_of()?.into_iter().map(|number: Number| number.value));
         }
         Ok(numbers)
@@ -386,9 +403,8 @@ mod tests {
         write(&folder.path().join("b.parquet"), 5..9);
         write(&folder.path().join("a.parquet"), 0..5);
         write(&folder.path().join("c.parquet"), 0..0);
-        let reader = Reader::of_folder(&Disk, folder.path()).unwrap();
-        assert_eq!(numbers(reader).unwrap(), (0..9).collect::<Vec<_>>());
-        let rows = read_rows(&Disk, files(&Disk, folder.path()).unwrap()).collect::<Result<Vec<Vec<Number>>, _>>();
+        assert_eq!(numbers(folder.path()).unwrap(), (0..9).collect::<Vec<_>>());
+        let rows = Dataset::of_folder(&Disk, folder.path()).unwrap().rows().collect::<Result<Vec<Vec<Number>>, _>>();
         assert_eq!(rows.unwrap().concat(), (0..9).map(Number::of).collect::<Vec<_>>());
     }
 
@@ -398,9 +414,9 @@ mod tests {
         let (whole, copied) = (folder.path().join("whole.parquet"), folder.path().join("copied.parquet"));
         let rows = GROUP_ROWS as u64 + 1000;
         write(&whole, 0..rows);
-        let mut writer =
-            TableWriter::<Number>::create(&Disk, &copied, &Footer::default().with("note", "test")).unwrap();
-        for batch in Reader::new(&Disk, vec![whole.clone()]) {
+        let footer = Footer::default().with("note", "test");
+        let mut writer = TableWriter::<Number>::new(Disk.create(&copied).unwrap(), &footer).unwrap();
+        for batch in Dataset::new(&Disk, vec![whole.clone()]).batches() {
             let batch = batch.unwrap();
             let middle = batch.rows.num_rows() / 3;
             writer.copy(&batch, 0..middle).unwrap();
@@ -436,14 +452,14 @@ mod tests {
         let step = bytes.len() / 97;
         for cut in (0..bytes.len()).step_by(step) {
             fs::write(&path, &bytes[..cut]).unwrap();
-            let error = numbers(Reader::of_folder(&Disk, folder.path()).unwrap()).unwrap_err();
+            let error = numbers(folder.path()).unwrap_err();
             assert!(error.to_string().contains("a.parquet: damaged"), "cut at {cut}: {error}");
         }
         for changed in (0..bytes.len()).step_by(7) {
             let mut changed_bytes = bytes.clone();
             changed_bytes[changed] ^= 0x55;
             fs::write(&path, &changed_bytes).unwrap();
-            let error = numbers(Reader::of_folder(&Disk, folder.path()).unwrap()).unwrap_err();
+            let error = numbers(folder.path()).unwrap_err();
             assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
         }
     }
@@ -452,7 +468,7 @@ mod tests {
     fn a_stray_file_is_named() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("notes.txt"), "").unwrap();
-        let error = files(&Disk, folder.path()).unwrap_err();
+        let error = numbers(folder.path()).unwrap_err();
         assert!(error.to_string().contains("notes.txt"), "{error}");
     }
 }

@@ -34,6 +34,12 @@ impl StoredFile {
         Self { path: path.to_owned(), sink: Box::new(sink) }
     }
 
+    /// Where it lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Appends bytes, all of them.
     ///
     /// # Errors
@@ -90,6 +96,53 @@ pub trait Storage: Sync {
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
         Ok(self.open(file)?.metadata().map_err(StorageError::at("read", file))?.len())
     }
+
+    /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
+    fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        if self.exists(folder)? {
+            return Ok(());
+        }
+        let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
+        if let Some(parent) = parent {
+            self.ensure_folder(parent)?;
+        }
+        self.create_folder(folder)?;
+        self.sync_folder(parent.unwrap_or(Path::new(".")))
+    }
+
+    /// Removes the files in a folder.
+    fn clear_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.list(folder)?.into_iter().try_for_each(|name| self.remove(&folder.join(name)))
+    }
+
+    /// Moves a file, if it is there, under a name that is free.
+    fn move_away(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
+        if !self.exists(from)? {
+            return Ok(());
+        }
+        let mut free = to.to_owned();
+        let mut number = 0;
+        while self.exists(&free)? {
+            number += 1;
+            free = to.with_added_extension(number.to_string());
+        }
+        let folders = || [free.parent(), from.parent()].into_iter().flatten();
+        folders().try_for_each(|folder| self.ensure_folder(folder))?;
+        self.rename(from, &free)?;
+        folders().try_for_each(|folder| self.sync_folder(folder))
+    }
+
+    /// Tries for a lock until it is free or the time is over.
+    fn wait_for_lock(&self, file: &Path, max_wait: Duration) -> Result<Lock, StorageError> {
+        let begin = Instant::now();
+        loop {
+            let lock = self.lock(file)?;
+            if !matches!(lock, Lock::Taken) || begin.elapsed() >= max_wait {
+                return Ok(lock);
+            }
+            std::thread::sleep(LOCK_POLL);
+        }
+    }
 }
 
 /// What trying for a lock says.
@@ -124,21 +177,6 @@ impl StorageError {
     #[must_use]
     pub fn kind(&self) -> io::ErrorKind {
         self.source.kind()
-    }
-}
-
-/// Tries for a lock until it is free or the time is over.
-///
-/// # Errors
-/// When the file cannot be opened or locked.
-pub fn wait_for_lock(storage: &dyn Storage, file: &Path, max_wait: Duration) -> Result<Lock, StorageError> {
-    let begin = Instant::now();
-    loop {
-        let lock = storage.lock(file)?;
-        if !matches!(lock, Lock::Taken) || begin.elapsed() >= max_wait {
-            return Ok(lock);
-        }
-        std::thread::sleep(LOCK_POLL);
     }
 }
 

@@ -12,9 +12,10 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use stickslip::observe::measure;
 use stickslip::results::Results;
+use stickslip::results::layout::Layout;
 use stickslip::run::{Options, Shard, run};
 use stickslip::sweep::Sweep;
-use stickslip::table::file::Reader;
+use stickslip::table::file::Dataset;
 use stickslip::table::storage::Disk;
 
 /// No case takes longer; it takes milliseconds.
@@ -158,9 +159,9 @@ static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
         let (recording, solver) = (*sweep.recording(), sweep.solver());
         let kernel =
             |job: &stickslip::sweep::Job, stop: &AtomicBool| measure(&job.parameters, &recording, solver, stop);
-        run(&Disk, &sweep, &folder.path().join(name), options, &kernel, &mut |_| ()).unwrap();
+        run(&Layout::new(&Disk, &folder.path().join(name)), &sweep, options, &kernel, &mut |_| ()).unwrap();
     }
-    Results::read(&Disk, &folder.path().join("compacted")).unwrap().compact().unwrap();
+    Results::read(&Layout::new(&Disk, &folder.path().join("compacted"))).unwrap().compact().unwrap();
     Examples { folder }
 });
 
@@ -238,9 +239,9 @@ proptest! {
         let mut run_files = files(&root.join("run"));
         run_files.retain(|path| path.extension().is_some_and(|extension| extension == "json" || extension == "toml"));
         let (copy, is_changed) = copy(&root, &run_files[which.index(run_files.len())], &changes);
-        let read = Results::read(&Disk, copy.path());
+        let read = Results::read(&Layout::new(&Disk, copy.path()));
         prop_assert_eq!(read.is_err(), is_changed);
-        match Results::verify(&Disk, copy.path()) {
+        match Results::verify(&Layout::new(&Disk, copy.path())) {
             Ok(verification) => prop_assert_eq!(verification.whole, !is_changed),
             Err(error) => prop_assert!(is_changed, "{}", error),
         }
@@ -259,8 +260,8 @@ proptest! {
         let file = &tables[which.index(tables.len())];
         let (copy, is_changed) = copy(&root, file, &changes);
         let file = copy.path().join(file.strip_prefix(&root).unwrap());
-        prop_assert_eq!(Reader::new(&Disk, vec![file.clone()]).any(|batch| batch.is_err()), is_changed);
-        let verification = Results::verify(&Disk, copy.path()).unwrap();
+        prop_assert_eq!(Dataset::new(&Disk, vec![file.clone()]).batches().any(|batch| batch.is_err()), is_changed);
+        let verification = Results::verify(&Layout::new(&Disk, copy.path())).unwrap();
         prop_assert_eq!(verification.whole, !is_changed);
         prop_assert!(!is_changed || verification.problems.iter().any(|problem| problem.path == file));
         // What is read of the footer alone, before any checksum is looked at, may be refused but must not break.

@@ -10,7 +10,7 @@ use stickslip::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
 use stickslip::sweep::{Sweep, predicted_interval};
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
-use stickslip::table::storage::Disk;
+use stickslip::table::storage::{Disk, Storage};
 
 /// More samples than this, of 24 bytes each, are a mistake.
 const MAX_SAMPLES: f64 = 1e8;
@@ -102,7 +102,7 @@ pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: Re
 /// Writes a table beside its place and moves it there, so that no half of a file looks whole.
 pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Iterator<Item = R>) -> Result<()> {
     replace(path, |draft| {
-        let mut writer = TableWriter::create(&Disk, draft, footer)?;
+        let mut writer = TableWriter::new(Disk.create(draft)?, footer)?;
         for row in rows {
             writer.push(&row)?;
         }

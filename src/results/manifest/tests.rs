@@ -3,7 +3,7 @@
 use super::*;
 use crate::results::Results;
 use crate::table::storage::over_disk::{Access, OverDisk};
-use crate::table::storage::{Disk, Lock, StorageError};
+use crate::table::storage::{Disk, Lock, Storage, StorageError};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
@@ -58,24 +58,24 @@ const THREE_SEEDS: &str = "[axes]\nseed = [0, 1, 2]\n";
 #[test]
 fn a_directory_is_begun_resumed_extended_and_narrowed() {
     let root = tempfile::tempdir().unwrap();
-    let open = |text| Results::open(&Disk, root.path(), &sweep(text)).unwrap();
+    let open = |text| Results::open(&Layout::new(&Disk, root.path()), &sweep(text)).unwrap();
     assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (1, 0));
     let before = contents(root.path());
     open(TWO_SEEDS);
     assert_eq!(contents(root.path()), before);
     assert_eq!((open(THREE_SEEDS).sweeps().len(), open(THREE_SEEDS).current()), (2, 1));
     assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (2, 0));
-    let read = Results::read(&Disk, root.path()).unwrap();
+    let read = Results::read(&Layout::new(&Disk, root.path())).unwrap();
     assert_eq!((read.sweeps()[1].text(), read.current()), (sweep(THREE_SEEDS).text(), 0));
 }
 
 #[test]
 fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing_is_written() {
     let root = tempfile::tempdir().unwrap();
-    Results::open(&Disk, root.path(), &sweep("[model]\nK = 1e8\n[record]\nslips = 3")).unwrap();
+    Results::open(&Layout::new(&Disk, root.path()), &sweep("[model]\nK = 1e8\n[record]\nslips = 3")).unwrap();
     let refused = |text: &str, differences: &[&str]| {
         let before = contents(root.path());
-        let error = Results::open(&Disk, root.path(), &sweep(text)).unwrap_err().to_string();
+        let error = Results::open(&Layout::new(&Disk, root.path()), &sweep(text)).unwrap_err().to_string();
         assert!(differences.iter().all(|difference| error.contains(difference)), "{error}");
         assert!(error.contains("--out"), "{error}");
         assert_eq!(contents(root.path()), before);
@@ -95,7 +95,7 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
     fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
     refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
     fs::write(&path, text.replace("\"format\": 4", "\"format\": 5, \"new\": 0")).unwrap();
-    let error = Results::read(&Disk, root.path()).unwrap_err().to_string();
+    let error = Results::read(&Layout::new(&Disk, root.path())).unwrap_err().to_string();
     assert!(error.contains("has format 5"), "{error}");
 }
 
@@ -106,11 +106,11 @@ fn a_directory_of_something_else_is_refused_and_an_unfinished_beginning_is_not()
     fs::write(root.path().join("run/sweep-000.toml"), "half a sw").unwrap();
     fs::write(root.path().join("thesis.tex"), "").unwrap();
     let before = contents(root.path());
-    let error = Results::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap_err();
+    let error = Results::open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap_err();
     assert!(error.to_string().contains("is not empty and no results directory"), "{error}");
     assert_eq!(contents(root.path()), before);
     fs::remove_file(root.path().join("thesis.tex")).unwrap();
-    Results::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap();
+    Results::open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap();
 }
 
 #[test]
@@ -118,10 +118,10 @@ fn two_runs_may_begin_a_directory_at_once_whichever_is_first() {
     let mut n = 0;
     loop {
         let root = tempfile::tempdir().unwrap();
-        let open = |storage: &dyn Storage| Results::open(storage, root.path(), &sweep(TWO_SEEDS)).map(drop);
-        let other = Mutex::new(Some(|| open(&Disk).unwrap()));
+        let open = |layout: Layout<'_>| Results::open(&layout, &sweep(TWO_SEEDS)).map(drop);
+        let other = Mutex::new(Some(|| open(Layout::new(&Disk, root.path())).unwrap()));
         let shared = Shared { other, operations_left: AtomicUsize::new(n) };
-        open(&shared).unwrap_or_else(|error| panic!("before operation {n}: {error}"));
+        open(Layout::new(&shared, root.path())).unwrap_or_else(|error| panic!("before operation {n}: {error}"));
         if shared.other.lock().unwrap().is_some() {
             break;
         }
@@ -133,12 +133,12 @@ fn two_runs_may_begin_a_directory_at_once_whichever_is_first() {
 #[test]
 fn a_changed_or_cut_file_of_the_directory_is_named() {
     let root = tempfile::tempdir().unwrap();
-    Results::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap();
+    Results::open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap();
     for name in ["run/sweep-000.toml", "run/manifest.json"] {
         let path = root.path().join(name);
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        let error = Results::open(&Disk, root.path(), &sweep(TWO_SEEDS)).unwrap_err();
+        let error = Results::open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap_err();
         assert!(error.to_string().contains(&format!("{name}: damaged")), "{error}");
         fs::write(&path, bytes).unwrap();
     }
@@ -147,6 +147,6 @@ fn a_changed_or_cut_file_of_the_directory_is_named() {
 #[test]
 fn a_missing_directory_is_no_results() {
     let root = tempfile::tempdir().unwrap();
-    let error = Results::read(&Disk, &root.path().join("missing")).unwrap_err();
+    let error = Results::read(&Layout::new(&Disk, &root.path().join("missing"))).unwrap_err();
     assert!(error.to_string().contains("is no results directory"), "{error}");
 }

@@ -85,7 +85,7 @@ impl FilesCheck<'_> {
         let files: Files = results.tables().map(|table| (table, results.part_file(table, part))).collect();
         let jobs_file = results.part_file(tables::JOBS, part);
         let state = || -> Result<State, StorageError> {
-            let is_done = results.storage().exists(&jobs_file)?;
+            let is_done = results.layout().storage.exists(&jobs_file)?;
             state(results, part.extension, &files, is_done, ids(results, part))
         };
         let mut found = state()?;
@@ -133,7 +133,7 @@ impl FilesCheck<'_> {
                 self.whole(&files, parts().map(|part| part.jobs.len()))?;
                 for part in parts() {
                     for path in results.tables().map(|table| results.part_file(table, &part)) {
-                        if results.storage().exists(&path)? {
+                        if results.layout().storage.exists(&path)? {
                             let problem = "its rows are in a compacted file as well";
                             self.verification.problems.push(Problem::of_file(path, problem, Remedy::File));
                         }
@@ -144,7 +144,7 @@ impl FilesCheck<'_> {
         };
         let (mut lost, mut jobs) = (Vec::new(), Vec::new());
         for part in parts() {
-            if results.storage().exists(&results.part_file(tables::JOBS, &part))? {
+            if results.layout().storage.exists(&results.part_file(tables::JOBS, &part))? {
                 self.part(&part)?;
             } else {
                 lost.push(part_name(&part));
@@ -163,7 +163,7 @@ impl FilesCheck<'_> {
             self.verification.jobs += jobs as u64;
         }
         for (_, path) in files {
-            self.verification.bytes += self.results.storage().length(path)?;
+            self.verification.bytes += self.results.layout().storage.length(path)?;
             self.verification.files += 1;
         }
         Ok(())
@@ -197,7 +197,7 @@ fn state(
     let mut errors = Vec::new();
     for (table, path) in files {
         // What a killed run left is whole, too, and is read by those who read the folder.
-        if is_done || results.storage().exists(path)? {
+        if is_done || results.layout().storage.exists(path)? {
             errors.extend(check_file(results, extension, table, path).err());
         }
     }
@@ -205,7 +205,7 @@ fn state(
         return Ok(State::Missing);
     }
     if errors.is_empty() {
-        errors.extend(check_rows(results.storage(), files, planned).err());
+        errors.extend(check_rows(results, files, planned).err());
     }
     Ok(if errors.is_empty() { State::Whole } else { State::Damaged(errors) })
 }
@@ -213,12 +213,12 @@ fn state(
 /// Whether a file is as it was written, and has the checksum, the sweep and the columns of its place.
 fn check_file(results: &Results<'_>, extension: usize, table: &str, path: &Path) -> Result<(), DatasetError> {
     let damaged = |problem| Err(DatasetError::damaged(path)(problem));
-    let checksum = checksum::check(results.storage(), path)?;
+    let checksum = checksum::check(results.layout().storage, path)?;
     let named = path.file_name().and_then(|name| TableFile::parse(name.to_str()?)).and_then(|file| file.checksum);
     if named.is_some_and(|named| !checksum.starts_with(&named)) {
         return damaged("it is another file than its name says");
     }
-    let footer = footer(results.storage(), path)?;
+    let footer = footer(results.layout().storage, path)?;
     let sweep = results.sweeps().get(extension);
     if sweep.is_none_or(|sweep| footer.get("sweep").is_none_or(|text| text != sweep.text())) {
         return damaged("it is of another sweep");
@@ -239,7 +239,7 @@ fn compacted_files(results: &Results<'_>) -> Result<(Compacted, Unexpected), Res
     let mut all = Vec::new();
     for table in results.tables() {
         let folder = results.layout().table(table);
-        for name in results.storage().list(&folder)? {
+        for name in results.layout().storage.list(&folder)? {
             if let Some(file) = name.to_str().and_then(TableFile::parse).filter(TableFile::is_compacted) {
                 all.push((file, table, folder.join(name)));
             }
@@ -275,17 +275,17 @@ fn compacted_files(results: &Results<'_>) -> Result<(Compacted, Unexpected), Res
 
 /// What lies in the folders of the tables and is no table, no part of the plan and no compacted file.
 fn unexpected_files(results: &Results<'_>, planned: &[u64]) -> Result<Unexpected, StorageError> {
-    let (storage, layout) = (results.storage(), results.layout());
+    let layout = results.layout();
     let tables: BTreeSet<&str> = results.tables().collect();
     let mut unexpected = Unexpected::new();
-    for name in storage.list(&layout.tables())? {
+    for name in layout.storage.list(&layout.tables())? {
         if !tables.iter().any(|table| name == *table) {
             unexpected.push((layout.tables().join(name), "it is no table of this sweep"));
         }
     }
     for table in results.tables() {
         let folder = layout.table(table);
-        for name in storage.list(&folder)? {
+        for name in layout.storage.list(&folder)? {
             let path = folder.join(&name);
             let is_table_file = path.extension().is_some_and(|extension| extension == FILE_EXTENSION);
             let problem = match name.to_str().and_then(TableFile::parse) {

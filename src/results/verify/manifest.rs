@@ -8,28 +8,22 @@ use crate::results::layout::{Layout, TableFile};
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
 use crate::results::tables;
 use crate::table::checksum;
-use crate::table::file::{files, footer};
-use crate::table::storage::Storage;
+use crate::table::file::footer;
 use std::path::Path;
 
 /// Opens a directory whose manifest or sweep files may be damaged, from what is whole; what is not is a problem.
 ///
 /// # Errors
 /// When it is no results directory, belongs to another version of the program, or cannot be restored.
-pub(super) fn salvage<'a>(
-    storage: &'a dyn Storage,
-    root: &Path,
-    problems: &mut Vec<Problem>,
-) -> Result<Results<'a>, ResultsError> {
-    let layout = Layout::new(root);
-    let (manifest, texts) = Remains { storage, layout: &layout }.texts(problems)?;
-    let sweeps = parse(&layout, &texts)?;
-    let first = sweeps.first().ok_or_else(|| no_results(root))?;
+pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Results<'a>, ResultsError> {
+    let (manifest, texts) = texts(layout, problems)?;
+    let sweeps = parse(layout, &texts)?;
+    let first = sweeps.first().ok_or_else(|| no_results(layout.root()))?;
     if let Some(manifest) = &manifest {
-        refuse(&layout, &manifest.difference(&Manifest::new(first)))?;
+        refuse(layout, &manifest.difference(&Manifest::new(first)))?;
     }
     let current = manifest.map_or(sweeps.len() - 1, |manifest| manifest.current);
-    Ok(Results::new(storage, layout, sweeps, current))
+    Ok(Results::new(layout, sweeps, current))
 }
 
 /// Writes the manifest and the copies of the sweep files again.
@@ -41,92 +35,82 @@ pub(super) fn restore_manifest(results: &Results<'_>) -> Result<(), ResultsError
     let mut manifest = Manifest::new(&sweeps[0]);
     manifest.sweeps = sweeps.iter().map(|sweep| sweep.text().to_owned()).collect();
     manifest.current = results.current();
-    let _alone = alone(results.storage(), results.layout(), WRITER)?;
-    manifest.write(results.storage(), results.layout())
+    let _alone = alone(results.layout(), WRITER)?;
+    manifest.write(results.layout())
 }
 
-/// What is left of a directory.
-struct Remains<'a> {
-    storage: &'a dyn Storage,
-    layout: &'a Layout,
-}
-
-impl Remains<'_> {
-    /// The manifest, if it is to be believed, and the texts of all sweeps.
-    fn texts(&self, problems: &mut Vec<Problem>) -> Result<(Option<Manifest>, Vec<String>), ResultsError> {
-        let Self { storage, layout } = *self;
-        let copies = self.copies()?;
-        let damaged = match Manifest::read(storage, layout) {
-            Ok(Some(manifest)) => match self.foreign(&manifest, &copies) {
-                None => {
-                    for (extension, text) in manifest.sweeps.iter().enumerate() {
-                        if copies.get(extension) != Some(text) {
-                            let path = layout.sweep(extension);
-                            let is_there = storage.exists(&path)?;
-                            let problem =
-                                if is_there { "it is not the text that the manifest has" } else { "it is missing" };
-                            problems.push(Problem::of_file(path, problem, Remedy::Manifest));
-                        }
+/// The manifest, if it is to be believed, and the texts of all sweeps.
+fn texts(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<(Option<Manifest>, Vec<String>), ResultsError> {
+    let copies = copies(layout)?;
+    let damaged = match Manifest::read(layout) {
+        Ok(Some(manifest)) => match foreign(layout, &manifest, &copies) {
+            None => {
+                for (extension, text) in manifest.sweeps.iter().enumerate() {
+                    if copies.get(extension) != Some(text) {
+                        let path = layout.sweep(extension);
+                        let is_there = layout.storage.exists(&path)?;
+                        let problem =
+                            if is_there { "it is not the text that the manifest has" } else { "it is missing" };
+                        problems.push(Problem::of_file(path, problem, Remedy::Manifest));
                     }
-                    let texts = manifest.sweeps.clone();
-                    return Ok((Some(manifest), texts));
                 }
-                Some(problem) => problem,
-            },
-            Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
-            Ok(None) => "it is missing".to_owned(),
-            Err(error) if error.kind == ErrorKind::Damaged => error.problem,
-            Err(error) => return Err(error),
-        };
-        // Nothing else says what a damaged copy was, and nothing may be guessed.
-        for (extension, text) in copies.iter().enumerate() {
-            if self.text_in_tables(extension).is_some_and(|found| found != *text) {
-                let problem = "it and the manifest are both damaged; restore one of them from a backup";
-                return Err(ResultsError::damaged(&layout.sweep(extension), problem));
+                let texts = manifest.sweeps.clone();
+                return Ok((Some(manifest), texts));
             }
-        }
-        if copies.is_empty() {
-            let problem =
-                format!("{damaged}, and so are the copies of the sweep files; restore one of them from a backup");
-            return Err(ResultsError::damaged(&layout.manifest(), problem));
-        }
-        problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
-        Ok((None, copies))
-    }
-
-    /// The copies of sweep files, as far as they can be read.
-    fn copies(&self) -> Result<Vec<String>, ResultsError> {
-        let mut copies = Vec::new();
-        loop {
-            let path = self.layout.sweep(copies.len());
-            if !self.storage.exists(&path)? {
-                return Ok(copies);
-            }
-            match read_text(self.storage, &path) {
-                Err(error) if error.kind == ErrorKind::Damaged => copies.push(String::new()),
-                text => copies.push(text?),
-            }
+            Some(problem) => problem,
+        },
+        Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
+        Ok(None) => "it is missing".to_owned(),
+        Err(error) if error.kind == ErrorKind::Damaged => error.problem,
+        Err(error) => return Err(error),
+    };
+    // Nothing else says what a damaged copy was, and nothing may be guessed.
+    for (extension, text) in copies.iter().enumerate() {
+        if text_in_tables(layout, extension).is_some_and(|found| found != *text) {
+            let problem = "it and the manifest are both damaged; restore one of them from a backup";
+            return Err(ResultsError::damaged(&layout.sweep(extension), problem));
         }
     }
-
-    /// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
-    fn foreign(&self, manifest: &Manifest, copies: &[String]) -> Option<String> {
-        let is_in_tables = |extension: usize, text: &String| {
-            manifest.sweeps.get(extension) != Some(text) && self.text_in_tables(extension).as_ref() == Some(text)
-        };
-        let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
-        Some(format!("it does not belong to these tables: their sweep {extension} is another"))
+    if copies.is_empty() {
+        let problem = format!("{damaged}, and so are the copies of the sweep files; restore one of them from a backup");
+        return Err(ResultsError::damaged(&layout.manifest(), problem));
     }
+    problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
+    Ok((None, copies))
+}
 
-    /// The sweep in the first whole file with parts of an extension.
-    fn text_in_tables(&self, extension: usize) -> Option<String> {
-        let is_of_extension = |path: &Path| {
-            let file = path.file_name().and_then(|name| TableFile::parse(name.to_str()?));
-            file.is_some_and(|file| file.extension == extension)
-        };
-        let files = files(self.storage, &self.layout.table(tables::JOBS)).ok()?;
-        let is_whole = |path: &Path| checksum::check(self.storage, path).is_ok();
-        let whole = files.iter().find(|path| is_of_extension(path) && is_whole(path))?;
-        footer(self.storage, whole).ok()?.remove("sweep")
+/// The copies of sweep files, as far as they can be read.
+fn copies(layout: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
+    let mut copies = Vec::new();
+    loop {
+        let path = layout.sweep(copies.len());
+        if !layout.storage.exists(&path)? {
+            return Ok(copies);
+        }
+        match read_text(layout, &path) {
+            Err(error) if error.kind == ErrorKind::Damaged => copies.push(String::new()),
+            text => copies.push(text?),
+        }
     }
+}
+
+/// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
+fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Option<String> {
+    let is_in_tables = |extension: usize, text: &String| {
+        manifest.sweeps.get(extension) != Some(text) && text_in_tables(layout, extension).as_ref() == Some(text)
+    };
+    let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
+    Some(format!("it does not belong to these tables: their sweep {extension} is another"))
+}
+
+/// The sweep in the first whole file with parts of an extension.
+fn text_in_tables(layout: &Layout<'_>, extension: usize) -> Option<String> {
+    let is_of_extension = |path: &Path| {
+        let file = path.file_name().and_then(|name| TableFile::parse(name.to_str()?));
+        file.is_some_and(|file| file.extension == extension)
+    };
+    let jobs = layout.dataset(tables::JOBS).ok()?;
+    let is_whole = |path: &Path| checksum::check(layout.storage, path).is_ok();
+    let whole = jobs.files().iter().find(|path| is_of_extension(path) && is_whole(path))?;
+    footer(layout.storage, whole).ok()?.remove("sweep")
 }

@@ -14,17 +14,16 @@ mod files;
 mod manifest;
 mod rows;
 
-use crate::results::commit::move_away;
 use crate::results::error::ResultsError;
 use crate::results::events::RunEvent;
 use crate::results::handle::Results;
-use crate::results::layout::part_name;
+use crate::results::layout::{Layout, part_name};
 use crate::table::checksum;
 use crate::table::file::DatasetError;
-use crate::table::storage::{Storage, StorageError};
+use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Version of [`Verification`] as JSON.
 const FORMAT: u32 = 2;
@@ -128,8 +127,8 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
-    pub fn verify(storage: &'a dyn Storage, root: &Path) -> Result<Verification, ResultsError> {
-        Ok(Self::examine(storage, root)?.1)
+    pub fn verify(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
+        Ok(Self::examine(layout)?.1)
     }
 
     /// Takes away what is damaged, so that the next run makes it again; returns what was found.
@@ -137,17 +136,17 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the
     /// same can be tried again.
-    pub fn repair(storage: &'a dyn Storage, root: &Path) -> Result<Verification, ResultsError> {
+    pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
-        let (results, _) = Self::examine(storage, root)?;
+        let (results, _) = Self::examine(layout)?;
         results.exclusively(|| {
-            let (results, verification) = Self::examine(storage, root)?;
+            let (results, verification) = Self::examine(layout)?;
             if verification.problems.iter().any(|problem| problem.remedy == Remedy::Manifest) {
                 manifest::restore_manifest(&results)?;
             }
-            let (tables, quarantine) = (results.layout().tables(), results.layout().quarantine());
+            let (tables, quarantine) = (layout.tables(), layout.quarantine());
             for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
-                move_away(storage, path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
+                layout.storage.move_away(path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
             }
             let lost = verification.lost_parts();
             if !lost.is_empty() {
@@ -160,16 +159,16 @@ impl<'a> Results<'a> {
     }
 
     /// Verifies a directory; gives it as it is restored.
-    fn examine(storage: &'a dyn Storage, root: &Path) -> Result<(Self, Verification), ResultsError> {
+    fn examine(layout: &Layout<'a>) -> Result<(Self, Verification), ResultsError> {
         let mut verification = Verification { format: FORMAT, ..Verification::default() };
-        let results = manifest::salvage(storage, root, &mut verification.problems)?;
+        let results = manifest::salvage(layout, &mut verification.problems)?;
         // First, so that what the logs say is there was there when the files were listed.
         let committed = results.committed_parts()?;
         files::verify(&results, &committed, &mut verification)?;
-        let reduced = results.layout().reduced();
-        for name in storage.list(&reduced)? {
+        let reduced = layout.reduced();
+        for name in layout.storage.list(&reduced)? {
             let path = reduced.join(name);
-            if let Err(error) = checksum::check(storage, &path) {
+            if let Err(error) = checksum::check(layout.storage, &path) {
                 verification.problems.push(Problem::of_file(path, problem_of(&error), Remedy::Reduce));
             }
         }

@@ -1,10 +1,10 @@
 //! Rows of all tables held against each other: the planned jobs in their order, each with as many slips and precursors
 //! as the jobs table says.
 
+use crate::results::Results;
 use crate::results::tables::{self, RowOfJob};
 use crate::table::columns::columns;
-use crate::table::file::{DatasetError, read_rows};
-use crate::table::storage::Storage;
+use crate::table::file::{Dataset, DatasetError};
 use std::path::{Path, PathBuf};
 
 /// The file of each table, that of the jobs last.
@@ -15,13 +15,14 @@ pub(super) type Files = Vec<(&'static str, PathBuf)>;
 /// # Errors
 /// When rows are missing, in excess, or in another order than the jobs.
 pub(super) fn check_rows(
-    storage: &dyn Storage,
+    results: &Results<'_>,
     files: &Files,
     mut planned: impl Iterator<Item = String>,
 ) -> Result<(), DatasetError> {
     let Some(((_, jobs_file), others)) = files.split_last() else { return Ok(()) };
-    let mut others: Vec<_> = others.iter().map(|(table, path)| (*table, path, rows(storage, path, table))).collect();
-    for batch in read_rows::<JobCounts>(storage, vec![jobs_file.clone()]) {
+    let dataset = |path: &PathBuf| Dataset::new(results.layout().storage, vec![path.clone()]);
+    let mut others: Vec<_> = others.iter().map(|(table, path)| (*table, path, rows(dataset(path), table))).collect();
+    for batch in dataset(jobs_file).rows::<JobCounts>() {
         for job in batch? {
             let expected = planned.next();
             if expected.as_deref() != Some(&job.job_id) {
@@ -65,17 +66,12 @@ columns! {
 /// A row: the id of its job, and its number within it if the table has one.
 type Row = (String, Option<u64>);
 
-/// The rows of a file of a table.
-fn rows<'a>(
-    storage: &'a dyn Storage,
-    path: &Path,
-    table: &str,
-) -> Box<dyn Iterator<Item = Result<Row, DatasetError>> + 'a> {
-    let files = vec![path.to_owned()];
+/// The rows of a table.
+fn rows<'a>(dataset: Dataset<'a>, table: &str) -> Box<dyn Iterator<Item = Result<Row, DatasetError>> + 'a> {
     if table == tables::SLIPS {
-        Box::new(flat(read_rows(storage, files), |row: SlipOfJob| (row.job_id, Some(row.number))))
+        Box::new(flat(dataset.rows(), |row: SlipOfJob| (row.job_id, Some(row.number))))
     } else {
-        Box::new(flat(read_rows(storage, files), |row: RowOfJob| (row.job_id, None)))
+        Box::new(flat(dataset.rows(), |row: RowOfJob| (row.job_id, None)))
     }
 }
 

@@ -4,7 +4,6 @@ use super::fault::{Fault, Operation};
 use super::faulty_disk::{FaultyDisk, MOUNT};
 use super::*;
 use crate::reduce::reduce;
-use crate::table::file::Footer;
 
 /// Few jobs a part, by the predicted cost: 8 jobs in two parts with the first two seeds.
 fn small_sweep(seeds: u64) -> Sweep {
@@ -50,7 +49,7 @@ const SCENARIOS: [Scenario; 4] = [
 ];
 
 /// Runs with one thread, and reduces.
-fn attempt(storage: &dyn Storage, root: &Path, scenario: &Scenario, faults: bool) -> Result<RunReport, String> {
+fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<RunReport, String> {
     let stop = AtomicBool::new(false);
     let options = Options { retry_failed: scenario.retry_failed, ..options(&stop, 1) };
     let kernel = |job: &Job, _: &AtomicBool| match job.parameters.seed {
@@ -58,10 +57,10 @@ fn attempt(storage: &dyn Storage, root: &Path, scenario: &Scenario, faults: bool
         _ => Ok(measure(&job.parameters)),
     };
     let sweep = small_sweep(scenario.seeds);
-    let report = run(storage, &sweep, root, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
+    let report = run(layout, &sweep, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
     if scenario.reduces {
-        let footer = Footer::default().with_sweep(sweep.name(), sweep.text());
-        reduce(storage, &Layout::new(root), &footer).map_err(|error| error.to_string())?;
+        let results = Results::read(layout).map_err(|error| error.to_string())?;
+        reduce(&results).map_err(|error| error.to_string())?;
     }
     Ok(report)
 }
@@ -113,11 +112,11 @@ impl Trial {
         }
         let ended_before = match scenario.before {
             Before::Nothing => None,
-            before => Some(attempt(&prepared, &root, &FIRST_RUN, matches!(before, Before::FailingRun))),
+            before => Some(attempt(&Layout::new(&prepared, &root), &FIRST_RUN, matches!(before, Before::FailingRun))),
         };
         assert_eq!(prepared.reboot(), ended_before.is_some_and(|ended| ended.is_err()));
         let good = prepared.copy();
-        attempt(&good, &root, &scenario, false).unwrap();
+        attempt(&Layout::new(&good, &root), &scenario, false).unwrap();
         let (before, after) = (prepared.files(&root), good.files(&root));
         assert!(after.keys().filter(|path| path.starts_with("tables/jobs")).count() >= 2, "{:?}", after.keys());
         Self { scenario, root, prepared, before, after }
@@ -127,7 +126,7 @@ impl Trial {
     fn befalls(&self, operation: Operation, n: usize, fault: Fault) -> bool {
         let disk = self.prepared.copy();
         disk.arm(operation, n, fault);
-        let ended = attempt(&disk, &self.root, &self.scenario, false);
+        let ended = attempt(&Layout::new(&disk, &self.root), &self.scenario, false);
         if !disk.reboot() {
             assert!(ended.is_ok(), "{ended:?}");
             return false;
@@ -145,7 +144,7 @@ impl Trial {
         self.resumes(&disk, &left, &case);
 
         // What a run reported as done survives a power cut, whatever happened before it.
-        attempt(&disk, &self.root, &self.scenario, false).expect(&case);
+        attempt(&Layout::new(&disk, &self.root), &self.scenario, false).expect(&case);
         disk.cut_power();
         assert!(results(&disk.files(&self.root)) == results(&self.after), "{case}: resumed, then a power cut");
         true
@@ -174,7 +173,7 @@ impl Trial {
             fs::write(real.join(path), bytes).unwrap();
         }
         let done = committed_jobs(&real);
-        let report = attempt(&Disk, &real, &self.scenario, false).expect(case);
+        let report = attempt(&Layout::new(&Disk, &real), &self.scenario, false).expect(case);
         let jobs_run = committed_jobs(&real) - done;
         assert_eq!((report.jobs_run, report.jobs_failed, report.jobs_left), (jobs_run, 0, 0), "{case}");
         assert!(results(&files_below(&real)) == results(&self.after), "{case}: resumed with the real store");

@@ -10,7 +10,6 @@ use crate::results::{Results, ResultsError};
 use crate::run::{Kernel, Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, Sweep};
-use crate::table::file::Reader;
 use crate::table::storage::over_disk::{Access, OverDisk};
 use crate::table::storage::{Disk, Sink, Storage, StorageError};
 use std::collections::BTreeMap;
@@ -96,18 +95,18 @@ fn options(stop: &AtomicBool) -> Options<'_> {
 
 fn run_all(root: &Path, seeds: u64) -> u64 {
     let stop = AtomicBool::new(false);
-    run(&Disk, &sweep(seeds), root, options(&stop), &kernel, &mut |_| ()).unwrap().jobs_run
+    run(&Layout::new(&Disk, root), &sweep(seeds), options(&stop), &kernel, &mut |_| ()).unwrap().jobs_run
 }
 
-fn compact(storage: &dyn Storage, root: &Path) -> Result<Compacted, ResultsError> {
-    Results::read(storage, root)?.compact()
+fn compact(layout: &Layout<'_>) -> Result<Compacted, ResultsError> {
+    Results::read(layout)?.compact()
 }
 
 /// The ids of all jobs in the tables, as a reader finds them.
 fn ids(root: &Path) -> Vec<String> {
     let mut ids = Vec::new();
-    for batch in Reader::of_folder(&Disk, &Layout::new(root).table("jobs")).unwrap() {
-        ids.extend(batch.unwrap().rows_of().unwrap().into_iter().map(|names: Names| names.job_id));
+    for batch in Layout::new(&Disk, root).dataset("jobs").unwrap().rows() {
+        ids.extend(batch.unwrap().into_iter().map(|names: Names| names.job_id));
     }
     ids.sort();
     ids
@@ -116,7 +115,7 @@ fn ids(root: &Path) -> Vec<String> {
 fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     for table in ["slips", "jobs"] {
-        for entry in fs::read_dir(Layout::new(root).table(table)).unwrap() {
+        for entry in fs::read_dir(root.join("tables").join(table)).unwrap() {
             let path = entry.unwrap().path();
             files.insert(path.strip_prefix(root).unwrap().to_owned(), fs::read(&path).unwrap());
         }
@@ -128,7 +127,7 @@ fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn extended() -> tempfile::TempDir {
     let root = tempfile::tempdir().unwrap();
     run_all(root.path(), FEWER);
-    compact(&Disk, root.path()).unwrap();
+    compact(&Layout::new(&Disk, root.path())).unwrap();
     run_all(root.path(), SEEDS);
     root
 }
@@ -138,7 +137,7 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
     let whole = extended();
     let expected_ids = ids(whole.path());
     assert_eq!(expected_ids.len() as u64, 2 * SEEDS);
-    compact(&Disk, whole.path()).unwrap();
+    compact(&Layout::new(&Disk, whole.path())).unwrap();
     let expected = tables_of(whole.path());
     // One file of each table for the beginning, one for the extension.
     assert_eq!(expected.len(), 4);
@@ -146,15 +145,15 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
     for changes in 0.. {
         let root = extended();
         let before = tables_of(root.path());
-        let ended = compact(&Dying::after(changes), root.path());
+        let ended = compact(&Layout::new(&Dying::after(changes), root.path()));
         assert!(ids(root.path()) == expected_ids, "after {changes} changes");
         let after = tables_of(root.path());
         assert!(after == before || after == expected, "after {changes} changes");
-        let verification = Results::verify(&Disk, root.path()).unwrap();
+        let verification = Results::verify(&Layout::new(&Disk, root.path())).unwrap();
         assert!(verification.whole, "after {changes} changes: {:?}", verification.problems);
         assert_eq!(run_all(root.path(), SEEDS), 0, "after {changes} changes");
         exchanged += u64::from(ended.is_err() && after == expected);
-        compact(&Disk, root.path()).unwrap();
+        compact(&Layout::new(&Disk, root.path())).unwrap();
         assert!(tables_of(root.path()) == expected, "after {changes} changes");
         if ended.is_ok() {
             println!("{changes} operations");
@@ -169,7 +168,7 @@ fn a_compaction_that_ends_at_any_operation_leaves_every_row_once_and_can_be_done
 fn what_was_run_after_a_directory_was_opened_is_compacted_too() {
     let root = tempfile::tempdir().unwrap();
     run_all(root.path(), FEWER);
-    let opened = Results::read(&Disk, root.path()).unwrap();
+    let opened = Results::read(&Layout::new(&Disk, root.path())).unwrap();
     run_all(root.path(), SEEDS);
     assert_eq!(opened.compact().unwrap().jobs, 2 * SEEDS);
     assert_eq!(ids(root.path()).len() as u64, 2 * SEEDS);
@@ -188,14 +187,14 @@ fn a_repair_that_ends_at_any_operation_can_be_done_again() {
                 fs::write(damaged, &bytes[..bytes.len() / 2]).unwrap();
             }
         }
-        let ended = Results::repair(&Dying::after(changes), root.path());
-        Results::repair(&Disk, root.path()).unwrap();
-        let verification = Results::verify(&Disk, root.path()).unwrap();
+        let ended = Results::repair(&Layout::new(&Dying::after(changes), root.path()));
+        Results::repair(&Layout::new(&Disk, root.path())).unwrap();
+        let verification = Results::verify(&Layout::new(&Disk, root.path())).unwrap();
         assert!(verification.whole, "after {changes} changes: {:?}", verification.problems);
         run_all(root.path(), SEEDS);
-        compact(&Disk, root.path()).unwrap();
+        compact(&Layout::new(&Disk, root.path())).unwrap();
         assert_eq!(ids(root.path()).len() as u64, 2 * SEEDS, "after {changes} changes");
-        assert!(Results::verify(&Disk, root.path()).unwrap().whole, "after {changes} changes");
+        assert!(Results::verify(&Layout::new(&Disk, root.path())).unwrap().whole, "after {changes} changes");
         if ended.is_ok() {
             println!("{changes} operations");
             assert!(changes > 20, "{changes} operations");
@@ -208,26 +207,30 @@ fn a_repair_that_ends_at_any_operation_can_be_done_again() {
 fn a_file_system_without_exchange_is_refused_and_nothing_is_changed() {
     let root = extended();
     let before = tables_of(root.path());
-    let error = compact(&Dying { exchanges: false, ..Dying::after(1000) }, root.path()).unwrap_err();
+    let disk = Dying { exchanges: false, ..Dying::after(1000) };
+    let error = compact(&Layout::new(&disk, root.path())).unwrap_err();
     assert!(error.to_string().contains("cannot exchange two folders"), "{error}");
     assert!(tables_of(root.path()) == before);
-    assert!(Results::verify(&Disk, root.path()).unwrap().whole);
+    assert!(Results::verify(&Layout::new(&Disk, root.path())).unwrap().whole);
 }
 
 #[test]
 fn who_changes_what_is_committed_and_runs_keep_each_other_out() {
     let root = extended();
     let stop = AtomicBool::new(false);
-    let begin = |seeds| run(&Disk, &sweep(seeds), root.path(), options(&stop), &kernel, &mut |_| ());
-    let results = Results::read(&Disk, root.path()).unwrap();
+    let begin = |seeds| run(&Layout::new(&Disk, root.path()), &sweep(seeds), options(&stop), &kernel, &mut |_| ());
+    let results = Results::read(&Layout::new(&Disk, root.path())).unwrap();
     let error = results.exclusively(|| Ok(begin(SEEDS + 1).unwrap_err())).unwrap();
     assert!(error.to_string().contains("being repaired or compacted"), "{error}");
     let shard = results.lock_shard(&Shard::default().writer()).unwrap().unwrap();
-    for ended in [compact(&Disk, root.path()).map(|_| ()), Results::repair(&Disk, root.path()).map(|_| ())] {
+    for ended in [
+        compact(&Layout::new(&Disk, root.path())).map(|_| ()),
+        Results::repair(&Layout::new(&Disk, root.path())).map(|_| ()),
+    ] {
         let error = ended.unwrap_err();
         assert!(error.to_string().contains("is being run (shard-1-of-1)"), "{error}");
     }
-    assert!(Results::verify(&Disk, root.path()).unwrap().whole, "looking needs no lock");
+    assert!(Results::verify(&Layout::new(&Disk, root.path())).unwrap().whole, "looking needs no lock");
     drop(shard);
     assert_eq!(begin(SEEDS + 1).unwrap().jobs_run, 2);
 }
@@ -238,12 +241,12 @@ fn compacted_files_depend_on_the_parts_that_are_done_alone_and_hold_them_in_plan
     const PARTS_PER_FILE: u64 = 2;
     let stop = AtomicBool::new(false);
     let run_with = |root: &Path, options, kernel: &Kernel<'_>| {
-        run(&Disk, &super::sweep(SEEDS, ""), root, options, kernel, &mut |_| ()).unwrap()
+        run(&Layout::new(&Disk, root), &super::sweep(SEEDS, ""), options, kernel, &mut |_| ()).unwrap()
     };
     let compacted = |root: &Path| {
-        let compacted = Results::read(&Disk, root).unwrap().compact_by(PARTS_PER_FILE).unwrap();
-        assert!(Results::verify(&Disk, root).unwrap().whole);
-        assert!(!Results::read(&Disk, root).unwrap().compact_by(PARTS_PER_FILE).unwrap().changed);
+        let compacted = Results::read(&Layout::new(&Disk, root)).unwrap().compact_by(PARTS_PER_FILE).unwrap();
+        assert!(Results::verify(&Layout::new(&Disk, root)).unwrap().whole);
+        assert!(!Results::read(&Layout::new(&Disk, root)).unwrap().compact_by(PARTS_PER_FILE).unwrap().changed);
         (compacted, super::tables_of(root))
     };
     let [once, retried, sharded] = [(); 3].map(|()| tempfile::tempdir().unwrap());

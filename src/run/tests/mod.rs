@@ -9,17 +9,15 @@ use super::*;
 use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::results::ErrorKind;
-use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, PART_COST};
 use crate::table::columns::Row;
-use crate::table::file::Reader;
-use crate::table::storage::Disk;
+use crate::table::storage::{Disk, Storage};
 use arrow_array::cast::AsArray;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -82,13 +80,13 @@ fn options(stop: &AtomicBool, threads: usize) -> Options<'_> {
 }
 
 fn run_all(root: &Path, sweep: &Sweep, kernel: &Kernel<'_>) -> RunReport {
-    run(&Disk, sweep, root, options(&AtomicBool::new(false), 2), kernel, &mut |_| ()).unwrap()
+    run(&Layout::new(&Disk, root), sweep, options(&AtomicBool::new(false), 2), kernel, &mut |_| ()).unwrap()
 }
 
 fn retry(root: &Path, sweep: &Sweep, kernel: &Kernel<'_>) -> RunReport {
     let stop = AtomicBool::new(false);
     let options = Options { retry_failed: true, ..options(&stop, 2) };
-    run(&Disk, sweep, root, options, kernel, &mut |_| ()).unwrap()
+    run(&Layout::new(&Disk, root), sweep, options, kernel, &mut |_| ()).unwrap()
 }
 
 /// All files of the tables with their bytes.
@@ -105,7 +103,7 @@ fn tables_of(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 fn texts(root: &Path, table: &str, column: &str) -> Vec<String> {
     let mut texts = Vec::new();
-    for batch in Reader::of_folder(&Disk, &Layout::new(root).table(table)).unwrap() {
+    for batch in Layout::new(&Disk, root).dataset(table).unwrap().batches() {
         let batch = batch.unwrap();
         let column = batch.rows.column_by_name(column).unwrap().as_string::<i32>();
         texts.extend(column.iter().map(|text| text.unwrap_or_default().to_owned()));
@@ -125,11 +123,11 @@ fn bytes_do_not_depend_on_threads_or_shards() {
     assert!(expected.len() >= 9, "several parts are needed to see anything, not {}", expected.len() / 3);
     let (one, sharded) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let stop = AtomicBool::new(false);
-    run(&Disk, &sweep(SEEDS, ""), one.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap();
+    run(&Layout::new(&Disk, one.path()), &sweep(SEEDS, ""), options(&stop, 1), &fine, &mut |_| ()).unwrap();
     assert!(tables_of(one.path()) == expected);
     for shard in ["2/2", "1/2"] {
         let options = Options { shard: shard.parse().unwrap(), ..options(&stop, 2) };
-        run(&Disk, &sweep(SEEDS, ""), sharded.path(), options, &fine, &mut |_| ()).unwrap();
+        run(&Layout::new(&Disk, sharded.path()), &sweep(SEEDS, ""), options, &fine, &mut |_| ()).unwrap();
     }
     assert!(tables_of(sharded.path()) == expected);
 }
@@ -149,7 +147,7 @@ fn a_stopped_run_resumes_byte_identical_and_runs_no_committed_job_again() {
         Ok(measure(&job.parameters))
     };
     let mut stopping = 0;
-    let report = run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &kernel, &mut |event| {
+    let report = run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 2), &kernel, &mut |event| {
         stopping += u32::from(*event == RunEvent::Stopping);
     })
     .unwrap();
@@ -235,7 +233,7 @@ fn an_extension_runs_the_new_jobs_alone_and_every_job_is_there_once() {
 fn missing_parts_that_are_no_longer_asked_for_are_not_run() {
     let root = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(true);
-    run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap();
+    run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &fine, &mut |_| ()).unwrap();
     let narrowed = run_all(root.path(), &sweep(1, ""), &fine);
     assert!(narrowed.jobs_run >= 2 && narrowed.jobs_run < SEEDS, "{narrowed:?}");
     let whole = run_all(root.path(), &sweep(SEEDS, ""), &fine);
@@ -262,7 +260,7 @@ fn a_changed_model_is_refused_and_nothing_is_written() {
     };
     let before = all(root.path());
     let stop = AtomicBool::new(false);
-    let changed = run(&Disk, &sweep(2, "K = 2e8"), root.path(), options(&stop, 1), &fine, &mut |_| ());
+    let changed = run(&Layout::new(&Disk, root.path()), &sweep(2, "K = 2e8"), options(&stop, 1), &fine, &mut |_| ());
     assert!(changed.unwrap_err().to_string().contains("model.K"));
     assert_eq!(all(root.path()), before);
 }
@@ -276,7 +274,8 @@ fn a_damaged_part_is_named_with_the_way_out_which_works() {
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
     let stop = AtomicBool::new(false);
-    let error = run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).unwrap_err();
+    let error =
+        run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &fine, &mut |_| ()).unwrap_err();
     assert!(error.to_string().contains("jobs/part-000-000001.parquet: damaged"), "{error}");
     for table in ["slips", "precursors", "jobs"] {
         fs::remove_file(root.path().join("tables").join(table).join(name)).unwrap();
@@ -293,7 +292,7 @@ fn the_same_shard_twice_is_refused_while_it_runs() {
         let stop = AtomicBool::new(false);
         let mut second = second.lock().unwrap();
         if second.is_none() {
-            *second = run(&Disk, &sweep(1, ""), root.path(), options(&stop, 1), &fine, &mut |_| ()).err();
+            *second = run(&Layout::new(&Disk, root.path()), &sweep(1, ""), options(&stop, 1), &fine, &mut |_| ()).err();
         }
         fine(job, interrupt)
     });
@@ -307,8 +306,8 @@ fn the_status_reports_what_is_there_and_what_is_missing() {
     let root = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(false);
     let half = Options { shard: "1/2".parse().unwrap(), ..options(&stop, 2) };
-    run(&Disk, &sweep(SEEDS, ""), root.path(), half, &|job, _| faulty(job, true), &mut |_| ()).unwrap();
-    let status = status(&Results::read(&Disk, root.path()).unwrap()).unwrap();
+    run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), half, &|job, _| faulty(job, true), &mut |_| ()).unwrap();
+    let status = status(&Results::read(&Layout::new(&Disk, root.path())).unwrap()).unwrap();
     let overview = status.overview;
     let rows = texts(root.path(), "jobs", "outcome");
     let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;
@@ -326,7 +325,7 @@ fn events_account_for_every_job() {
     let stop = AtomicBool::new(false);
     let (mut started, mut done, mut failed, mut committed, mut finished) = (0, 0, 0, 0, 0);
     let kernel = |job: &Job, _: &AtomicBool| faulty(job, true);
-    run(&Disk, &sweep(SEEDS, ""), root.path(), options(&stop, 2), &kernel, &mut |event| match event {
+    run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 2), &kernel, &mut |event| match event {
         RunEvent::Started { jobs, .. } => started += jobs,
         RunEvent::JobDone { .. } => done += 1,
         RunEvent::JobFailed { job_id, .. } => {
@@ -351,8 +350,8 @@ fn all_tables_have_the_described_columns() {
     run_all(root.path(), &sweep(3, ""), &fine);
     let expected = [columns::<SlipRow<'_>>(), columns::<PrecursorRow<'_>>(), columns::<JobRow>()];
     for (table, expected) in ["slips", "precursors", "jobs"].into_iter().zip(expected) {
-        let folder = Layout::new(root.path()).table(table);
-        let batch = Reader::of_folder(&Disk, &folder).unwrap().next().unwrap().unwrap();
+        let dataset = Layout::new(&Disk, root.path()).dataset(table).unwrap();
+        let batch = dataset.batches().next().unwrap().unwrap();
         let names: Vec<_> = batch.rows.schema().fields().iter().map(|field| field.name().clone()).collect();
         assert_eq!(names, expected);
     }
@@ -372,13 +371,14 @@ fn a_walltime_ends_a_run_in_time_with_all_that_it_started_committed_and_the_pace
     for round in 0.. {
         let options = Options { walltime: Some(WALLTIME), ..options(&stop, 2) };
         let (mut jobs_ended, mut out_of_time, mut interrupted) = (0, 0, false);
-        let report = run(&Disk, &sweep(SEEDS, ""), root.path(), options, &slow, &mut |event| match event {
-            RunEvent::JobDone { .. } => jobs_ended += 1,
-            RunEvent::OutOfTime => out_of_time += 1,
-            RunEvent::Stopping => interrupted = true,
-            _ => {}
-        })
-        .unwrap();
+        let report =
+            run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options, &slow, &mut |event| match event {
+                RunEvent::JobDone { .. } => jobs_ended += 1,
+                RunEvent::OutOfTime => out_of_time += 1,
+                RunEvent::Stopping => interrupted = true,
+                _ => {}
+            })
+            .unwrap();
         assert!(report.wall < WALLTIME.as_secs_f64(), "{report:?}");
         // A machine that stalls may interrupt a part.
         assert!(interrupted || (report.jobs_run > 0 && report.jobs_run == jobs_ended), "{report:?}");
