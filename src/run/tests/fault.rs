@@ -54,7 +54,7 @@ impl Operation {
 }
 
 /// What goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
     /// EIO, once; nothing is done.
     Refused,
@@ -82,18 +82,6 @@ impl Fault {
         Self::PowerCut,
         Self::PowerCutTorn,
     ];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Refused => "EIO",
-            Self::DoneButRefused => "EIO, yet done",
-            Self::Full => "ENOSPC",
-            Self::ShortWrite => "short write",
-            Self::Killed => "killed",
-            Self::PowerCut => "power cut",
-            Self::PowerCutTorn => "power cut, names kept",
-        }
-    }
 
     /// Whether it can befall an operation. What only looks leaves the disk as it was, so that a kill there is one at
     /// the next operation that changes something.
