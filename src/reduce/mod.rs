@@ -12,7 +12,6 @@ mod read;
 mod reduction;
 mod sequence;
 mod set;
-mod set_row;
 mod slip_stats;
 mod startup;
 
@@ -24,8 +23,7 @@ pub use point::{MAX_POINTS, Point, RampStage};
 pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
-pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
-pub use set_row::{AllButSeed, SetJobs, SetRow};
+pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
