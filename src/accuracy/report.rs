@@ -83,7 +83,7 @@ impl<'a> Report<'a> {
         let write = move |file: StoredFile, footer: &Footer| {
             let mut writer = TableWriter::new(file, footer)?;
             rows.iter().try_for_each(|row| writer.push(row))?;
-            writer.finish()
+            writer.finish().map(drop)
         };
         self.tables.push((R::NAME, Box::new(write)));
         self

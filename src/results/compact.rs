@@ -101,7 +101,7 @@ impl Results<'_> {
             let staging = self.layout().staging(WRITER);
             self.layout().storage.remove_folder(&staging)?;
             let plan = results.plan_compaction(parts_per_file)?;
-            let mut there = results.table_files(tables::JOBS)?;
+            let mut there = results.files_by_part(tables::JOBS)?;
             there.retain(|_, file| file.is_compacted());
             let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
             let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
@@ -131,10 +131,8 @@ impl Results<'_> {
         Ok(plan)
     }
 
-    fn table_files(&self, table: &str) -> Result<TableFiles, StorageError> {
-        let names = self.layout().storage.list(&self.layout().table(table))?;
-        let files = names.iter().filter_map(|name| TableFile::parse(name.to_str()?));
-        Ok(files.map(|file| ((file.extension, file.first), file)).collect())
+    fn files_by_part(&self, table: &str) -> Result<TableFiles, StorageError> {
+        Ok(self.layout().table_files(table)?.map(|file| ((file.extension, file.first), file)).collect())
     }
 
     /// Builds the new tables, and puts them in the place of the old ones, which then lie in the staging folder.
@@ -179,7 +177,7 @@ impl Results<'_> {
     fn concatenate<R: Table>(&self, plan: &CompactionPlan, new: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
         let (storage, name) = (self.layout().storage, R::NAME);
         let (old_folder, new_folder) = (self.layout().table(name), new.table(name));
-        let old = self.table_files(name)?;
+        let old = self.files_by_part(name)?;
         storage.ensure_folder(&new_folder)?;
         let keep = |file: &TableFile| {
             let file = file.to_string();
@@ -212,7 +210,7 @@ impl Results<'_> {
                 let problem = format!("{rows} jobs were read where the plan has {}", chunk.jobs);
                 return Err(ResultsError::damaged(&old_folder, problem));
             }
-            let file = TableFile::compacted(chunk.extension, &chunk.parts, &writer.finish_with_checksum()?).to_string();
+            let file = TableFile::compacted(chunk.extension, &chunk.parts, &writer.finish()?).to_string();
             storage.rename(&staged, &new_folder.join(&file))?;
             names.push(file);
         }
@@ -227,7 +225,7 @@ impl Results<'_> {
             compacted.jobs += chunk.jobs;
         }
         for table in self.tables() {
-            for file in self.table_files(table)?.into_values().filter(TableFile::is_compacted) {
+            for file in self.layout().table_files(table)?.filter(TableFile::is_compacted) {
                 let path = self.layout().table(table).join(file.to_string());
                 compacted.bytes += self.layout().storage.length(&path)?;
                 compacted.files += 1;

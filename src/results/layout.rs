@@ -16,7 +16,7 @@
 use crate::results::tables;
 use crate::sweep::Part;
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
-use crate::table::storage::Storage;
+use crate::table::storage::{Storage, StorageError};
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -69,7 +69,16 @@ impl<'a> Layout<'a> {
         self.tables().join(name)
     }
 
-    /// The files of a table as they are now.
+    /// The files of a table whose names are those of parts, as they are now.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub(super) fn table_files(&self, name: &str) -> Result<impl Iterator<Item = TableFile> + use<>, StorageError> {
+        let names = self.storage.list(&self.table(name))?;
+        Ok(names.into_iter().filter_map(|name| TableFile::of_path(name.as_ref())))
+    }
+
+    /// All files of a table as they are now.
     ///
     /// # Errors
     /// As [`Dataset::of_folder`].
@@ -155,9 +164,7 @@ pub fn part_name(part: &Part) -> String {
     part_name_of(part.extension, part.index)
 }
 
-/// Name of a part by its extension and its number.
-#[must_use]
-pub fn part_name_of(extension: usize, index: u64) -> String {
+fn part_name_of(extension: usize, index: u64) -> String {
     format!("part-{extension:03}-{index:06}")
 }
 
@@ -186,6 +193,12 @@ impl TableFile {
     pub fn compacted(extension: usize, parts: &RangeInclusive<u64>, checksum: &str) -> Self {
         let checksum = Some(checksum.chars().take(CHECKSUM_CHARACTERS).collect());
         Self { extension, first: *parts.start(), last: *parts.end(), checksum }
+    }
+
+    /// What the name of a file says; `None` if it is not that of a table file.
+    #[must_use]
+    pub fn of_path(path: &Path) -> Option<Self> {
+        Self::parse(path.file_name()?.to_str()?)
     }
 
     /// What a name says; `None` if it is not that of a table file.

@@ -53,15 +53,11 @@ impl Results<'_> {
     /// When the folder of the jobs table cannot be listed.
     pub fn done_parts(&self) -> Result<DoneParts, StorageError> {
         let mut done = DoneParts::default();
-        for name in self.layout().storage.list(&self.layout().table(tables::JOBS))? {
-            match name.to_str().and_then(TableFile::parse) {
-                Some(file) if file.is_compacted() => {
-                    done.compacted.insert((file.extension, file.first), file.last);
-                }
-                Some(file) => {
-                    done.own.insert((file.extension, file.first));
-                }
-                None => (),
+        for file in self.layout().table_files(tables::JOBS)? {
+            if file.is_compacted() {
+                done.compacted.insert((file.extension, file.first), file.last);
+            } else {
+                done.own.insert((file.extension, file.first));
             }
         }
         Ok(done)
@@ -147,7 +143,8 @@ impl Results<'_> {
                 None => kept.copy(&mut writer, &job.0.job_id)?,
             }
         }
-        Ok(writer.finish()?)
+        writer.finish()?;
+        Ok(())
     }
 }
 
@@ -168,11 +165,11 @@ columns! {
 /// # Errors
 /// As [`Layout::dataset`].
 pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, DatasetError> {
-    let parsed = |path: &PathBuf| path.file_name()?.to_str().and_then(TableFile::parse);
-    let parts = |file: TableFile| (file.extension, file.first, file.last, file.is_compacted());
-    let done: HashSet<_> = jobs.files().iter().filter_map(parsed).map(parts).collect();
-    let counts = |path: &PathBuf| parsed(path).is_some_and(|file| done.contains(&parts(file)));
-    Ok(layout.dataset(table)?.filter(counts))
+    let parts = |path: &PathBuf| {
+        TableFile::of_path(path).map(|file| (file.extension, file.first, file.last, file.is_compacted()))
+    };
+    let done: HashSet<_> = jobs.files().iter().filter_map(parts).collect();
+    Ok(layout.dataset(table)?.filter(|path| parts(path).is_some_and(|parts| done.contains(&parts))))
 }
 
 /// The rows of a file by job.

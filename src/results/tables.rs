@@ -3,9 +3,9 @@
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
 use crate::model::{Parameters, Symbol};
-use crate::observe::{ContactRow, MapRow, Measurements, Precursor, ProfileRow, Slip, TraceRow};
+use crate::observe::{Measurements, Precursor, Slip};
 use crate::sweep::Sweep;
-use crate::table::columns::{Cell, Field, Kind, Table, columns, fields, markdown};
+use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 use crate::table::selected::{Selected, Selection};
 
 /// How a job ended.
@@ -162,19 +162,12 @@ columns! {
     }
 }
 
-/// All tables of a sweep, and those that one simulation writes on request, in Markdown, one section each.
-#[must_use]
-pub fn documentation() -> String {
-    let sweep = [markdown::<SlipRow<'_>>(), markdown::<PrecursorRow<'_>>(), markdown::<JobRow>()];
-    let simulation = [markdown::<TraceRow>(), markdown::<MapRow>(), markdown::<ProfileRow>(), markdown::<ContactRow>()];
-    sweep.into_iter().chain(simulation).collect::<Vec<_>>().join("\n")
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
     use crate::documented::assert_documented;
-    use crate::table::columns::Row;
+    use crate::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
+    use crate::table::columns::{Row, markdown};
     use std::collections::HashSet;
 
     pub(crate) fn slip(number: u64) -> Slip {
@@ -204,10 +197,19 @@ pub(crate) mod tests {
 
     #[test]
     fn documented_tables_are_those_written() {
+        let tables = [
+            markdown::<SlipRow<'_>>(),
+            markdown::<PrecursorRow<'_>>(),
+            markdown::<JobRow>(),
+            markdown::<TraceRow>(),
+            markdown::<MapRow>(),
+            markdown::<ProfileRow>(),
+            markdown::<ContactRow>(),
+        ];
         let text = format!(
             "# Tables\n\nUnits are SI. Every file of a table has these columns in this order; units and meanings are \
              also in its metadata.\n\n{}",
-            documentation()
+            tables.join("\n")
         );
         assert_documented("tables.md", &text);
     }

@@ -148,7 +148,7 @@ mod tests {
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }
-        let checksum = writer.finish_with_checksum().unwrap();
+        let checksum = writer.finish().unwrap();
         assert_eq!(check(&Disk, &path).unwrap(), checksum);
         let bytes = fs::read(&path).unwrap();
         for bit in 0..8 * bytes.len() {

@@ -165,19 +165,11 @@ impl<R: Row> TableWriter<R> {
         Ok(self.file.write(&bytes)?)
     }
 
-    /// Writes what is left and the footer, and brings the file to the disk.
+    /// Writes what is left and the footer, brings the file to the disk, and gives its [checksum].
     ///
     /// # Errors
     /// When that fails; the file is then unreadable.
-    pub fn finish(self) -> Result<(), DatasetError> {
-        self.finish_with_checksum().map(|_| ())
-    }
-
-    /// Finishes the file and gives its [checksum].
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
-    pub fn finish_with_checksum(mut self) -> Result<String, DatasetError> {
+    pub fn finish(mut self) -> Result<String, DatasetError> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }

@@ -106,7 +106,8 @@ pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Ite
         for row in rows {
             writer.push(&row)?;
         }
-        Ok(writer.finish()?)
+        writer.finish()?;
+        Ok(())
     })
 }
 

@@ -214,7 +214,7 @@ fn state(
 fn check_file(results: &Results<'_>, extension: usize, table: &str, path: &Path) -> Result<(), DatasetError> {
     let damaged = |problem| Err(DatasetError::damaged(path)(problem));
     let checksum = checksum::check(results.layout().storage, path)?;
-    let named = path.file_name().and_then(|name| TableFile::parse(name.to_str()?)).and_then(|file| file.checksum);
+    let named = TableFile::of_path(path).and_then(|file| file.checksum);
     if named.is_some_and(|named| !checksum.starts_with(&named)) {
         return damaged("it is another file than its name says");
     }
@@ -238,11 +238,9 @@ fn check_file(results: &Results<'_>, extension: usize, table: &str, path: &Path)
 fn compacted_files(results: &Results<'_>) -> Result<(Compacted, Unexpected), ResultsError> {
     let mut all = Vec::new();
     for table in results.tables() {
-        let folder = results.layout().table(table);
-        for name in results.layout().storage.list(&folder)? {
-            if let Some(file) = name.to_str().and_then(TableFile::parse).filter(TableFile::is_compacted) {
-                all.push((file, table, folder.join(name)));
-            }
+        for file in results.layout().table_files(table)?.filter(TableFile::is_compacted) {
+            let path = results.layout().table(table).join(file.to_string());
+            all.push((file, table, path));
         }
     }
     let goes_with =
@@ -286,9 +284,9 @@ fn unexpected_files(results: &Results<'_>, planned: &[u64]) -> Result<Unexpected
     for table in results.tables() {
         let folder = layout.table(table);
         for name in layout.storage.list(&folder)? {
-            let path = folder.join(&name);
+            let path = folder.join(name);
             let is_table_file = path.extension().is_some_and(|extension| extension == FILE_EXTENSION);
-            let problem = match name.to_str().and_then(TableFile::parse) {
+            let problem = match TableFile::of_path(&path) {
                 Some(file) if file.is_compacted() => continue,
                 Some(file) if planned.get(file.extension).is_some_and(|&parts| file.first < parts) => continue,
                 Some(_) => "the plan has no such part",

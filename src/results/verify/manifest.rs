@@ -105,10 +105,7 @@ fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Optio
 
 /// The sweep in the first whole file with parts of an extension.
 fn text_in_tables(layout: &Layout<'_>, extension: usize) -> Option<String> {
-    let is_of_extension = |path: &Path| {
-        let file = path.file_name().and_then(|name| TableFile::parse(name.to_str()?));
-        file.is_some_and(|file| file.extension == extension)
-    };
+    let is_of_extension = |path: &Path| TableFile::of_path(path).is_some_and(|file| file.extension == extension);
     let jobs = layout.dataset(tables::JOBS).ok()?;
     let is_whole = |path: &Path| checksum::check(layout.storage, path).is_ok();
     let whole = jobs.files().iter().find(|path| is_of_extension(path) && is_whole(path))?;
