@@ -40,7 +40,7 @@ fn fixed_step(bencher: Bencher<'_, '_>, blocks: usize) {
 #[divan::bench(args = [1e-3, 1e-4, 1e-6, 1e-8, 1e-10])]
 fn event_driven(bencher: Bencher<'_, '_>, tolerance: f64) {
     let parameters = Parameters::default();
-    bencher.bench(|| run(&parameters, Solver::EventDriven { tolerance }, STRETCH));
+    bencher.bench(|| run(&parameters, Solver::event_driven(tolerance), STRETCH));
 }
 
 #[divan::bench(args = [1e-6])]

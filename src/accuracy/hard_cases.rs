@@ -169,7 +169,7 @@ impl HardCase {
     /// Largest residual of the ledger that passes.
     fn max_residual(&self) -> f64 {
         match self.solver {
-            Solver::EventDriven { tolerance } => BALANCED_TOLERANCES * tolerance,
+            Solver::EventDriven { tolerance, .. } => BALANCED_TOLERANCES * tolerance,
             Solver::FixedStep { .. } => BALANCED_FIXED_STEP,
         }
     }
@@ -277,7 +277,7 @@ pub fn hard_cases() -> Vec<HardCase> {
         cases.push(step(time_step).refused("dt"));
     }
     for tolerance in [0.0, -1e-6, f64::NAN, 1.0] {
-        cases.push(case(stability, &[], 0.15).solver(Solver::EventDriven { tolerance }).refused("tolerance"));
+        cases.push(case(stability, &[], 0.15).solver(Solver::event_driven(tolerance)).refused("tolerance"));
     }
 
     let extreme = "values beyond what doubles resolve";

@@ -29,7 +29,7 @@ pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 use crate::figure::FigureError;
 use crate::model::Parameters;
 use crate::observe::{Measurements, Recording, measure};
-use crate::solver::{Ledger, Limits, Observer, SimulationError, Solver, simulate, simulate_audited};
+use crate::solver::{Ledger, Limits, Observer, Resolve, SimulationError, Solver, simulate, simulate_audited};
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
 use std::sync::atomic::AtomicBool;
@@ -64,7 +64,8 @@ pub enum AccuracyError {
 #[must_use]
 pub fn solver_in_words(solver: Solver) -> String {
     match solver {
-        Solver::EventDriven { tolerance } => format!("event-driven, tolerance {tolerance:e}"),
+        Solver::EventDriven { tolerance, resolve: Resolve::Auto } => format!("event-driven, tolerance {tolerance:e}"),
+        Solver::EventDriven { tolerance, resolve } => format!("{}, tolerance {tolerance:e}", resolve.word()),
         Solver::FixedStep { time_step } => format!("fixed step, dt {time_step:e} s"),
     }
 }

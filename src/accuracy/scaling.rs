@@ -146,7 +146,7 @@ impl Scaling {
 
 /// Times slips past start-up.
 fn timed(parameters: &Parameters, tolerance: f64, slips: u64) -> Result<SizeRow, AccuracyError> {
-    let solver = Solver::EventDriven { tolerance };
+    let solver = Solver::event_driven(tolerance);
     let realisation = Realisation { parameters, solver, in_words: size_in_words };
     let run = |slips| realisation.measure(&Recording { slips, discard: 0, ..Recording::default() });
     let (start_up_seconds, start_up) = run(START_UP)?;

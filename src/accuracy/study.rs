@@ -104,7 +104,7 @@ impl Study {
 
 fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
     let fixed = time_steps.iter().map(|&time_step| Solver::FixedStep { time_step });
-    fixed.chain(tolerances.iter().map(|&tolerance| Solver::EventDriven { tolerance })).collect()
+    fixed.chain(tolerances.iter().map(|&tolerance| Solver::event_driven(tolerance))).collect()
 }
 
 /// The drive under which solvers run.
@@ -270,7 +270,7 @@ impl Study {
         for (drive, parameters) in self.drives().iter().enumerate() {
             report(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
-            let tightest = Solver::EventDriven { tolerance: *TOLERANCES.start() };
+            let tightest = Solver::event_driven(*TOLERANCES.start());
             realisation(parameters, tightest).simulate(&mut first_breaks)?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
@@ -281,7 +281,7 @@ impl Study {
             let mut ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if drive == 0 { self.first_drive_multiple } else { 1 };
             report("reference ensemble, and the realisations of the others that are not timed");
-            let reference = Solver::EventDriven { tolerance: ENSEMBLE_TOLERANCE };
+            let reference = Solver::event_driven(ENSEMBLE_TOLERANCE);
             let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
@@ -407,7 +407,7 @@ mod tests {
 
     #[test]
     fn a_small_study_distinguishes_a_coarse_step_from_a_tight_tolerance() {
-        let (coarse, tight) = (Solver::FixedStep { time_step: 4e-6 }, Solver::EventDriven { tolerance: 1e-8 });
+        let (coarse, tight) = (Solver::FixedStep { time_step: 4e-6 }, Solver::event_driven(1e-8));
         let study = Study {
             velocities: vec![1e-4],
             solvers: vec![coarse, tight],

@@ -2,16 +2,17 @@
 //!
 //! Unlike the tables of a sweep these hold times, of the machine that they were measured on. Their JSON has the same fields.
 
-use crate::solver::Solver;
+use crate::solver::{Resolve, Solver};
 use crate::table::columns::{Cell, Column, Kind, Part};
 
-const METHODS: [&str; 2] = ["event-driven", "fixed-step"];
+const FIXED_STEP: &str = "fixed-step";
 
-/// Method of a solver, as sweep files name it.
+/// Method of a solver; the event-driven one by how it resolves motion.
 pub(super) const fn method(solver: Solver) -> &'static str {
     match solver {
-        Solver::EventDriven { .. } => METHODS[0],
-        Solver::FixedStep { .. } => METHODS[1],
+        Solver::EventDriven { resolve: Resolve::Auto, .. } => "event-driven",
+        Solver::EventDriven { resolve, .. } => resolve.word(),
+        Solver::FixedStep { .. } => FIXED_STEP,
     }
 }
 
@@ -21,7 +22,7 @@ impl Part for Solver {
         let column =
             |name: &'static str, kind, meaning| Column { name: name.into(), unit: "", meaning, kind, nullable: false };
         vec![
-            column("method", Kind::Text, "event-driven or fixed-step"),
+            column("method", Kind::Text, "event-driven, or how it resolves motion: grid or taylor; or fixed-step"),
             column("setting", Kind::Real, "tolerance, or dt in s"),
         ]
     }
@@ -29,15 +30,18 @@ impl Part for Solver {
     fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
         give(Cell::Text(method(*self)));
         give(Cell::Real(match *self {
-            Self::EventDriven { tolerance } => tolerance,
+            Self::EventDriven { tolerance, .. } => tolerance,
             Self::FixedStep { time_step } => time_step,
         }));
     }
 
     fn take<'a>(_: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
         match (next(), next()) {
-            (Cell::Text(word), Cell::Real(tolerance)) if word == METHODS[0] => Ok(Self::EventDriven { tolerance }),
-            (Cell::Text(word), Cell::Real(time_step)) if word == METHODS[1] => Ok(Self::FixedStep { time_step }),
+            (Cell::Text(FIXED_STEP), Cell::Real(time_step)) => Ok(Self::FixedStep { time_step }),
+            (Cell::Text("event-driven"), Cell::Real(tolerance)) => Ok(Self::event_driven(tolerance)),
+            (Cell::Text(word), Cell::Real(tolerance)) if let Some(resolve) = Resolve::from_word(word) => {
+                Ok(Self::EventDriven { tolerance, resolve })
+            }
             (method, setting) => Err(format!("columns method and setting cannot hold {method:?} and {setting:?}")),
         }
     }

@@ -45,6 +45,9 @@ pub struct Arguments {
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
+    /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or as it is best
+    #[arg(long, group = JOB, value_name = "auto|grid|taylor")]
+    resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
     #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
@@ -297,18 +300,23 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
         };
         writeln!(record, "{} = {text}", key.key())?;
     }
-    let tolerance = arguments.tolerance.iter().map(|tolerance| format!("tolerance = {tolerance}\n"));
-    let solver = match (arguments.solver, &arguments.tolerance, &arguments.dt) {
-        (Method::EventDriven, _, None) => {
-            format!("method = \"event-driven\"\n{}", tolerance.collect::<String>())
+    let solver = match (arguments.solver, &arguments.dt) {
+        (Method::EventDriven, None) => {
+            let tolerance = arguments.tolerance.iter().map(|tolerance| format!("tolerance = {tolerance}\n"));
+            let resolve = arguments.resolve.iter().map(|word| format!("resolve = {word:?}\n"));
+            format!("method = \"event-driven\"\n{}", tolerance.chain(resolve).collect::<String>())
         }
-        (Method::FixedStep, None, Some(dt)) => format!("method = \"fixed-step\"\ndt = {dt}\n"),
-        (Method::FixedStep, None, None) => "method = \"fixed-step\"\ndt = 1e-6\n".to_owned(),
-        (Method::EventDriven, _, Some(_)) => {
+        (Method::EventDriven, Some(_)) => {
             return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()).into());
         }
-        (Method::FixedStep, Some(_), _) => {
+        (Method::FixedStep, _) if arguments.tolerance.is_some() => {
             return Err(UsageError("--tolerance: goes with --solver event-driven; use --dt".to_owned()).into());
+        }
+        (Method::FixedStep, _) if arguments.resolve.is_some() => {
+            return Err(UsageError("--resolve: goes with --solver event-driven".to_owned()).into());
+        }
+        (Method::FixedStep, dt) => {
+            format!("method = \"fixed-step\"\ndt = {}\n", dt.as_deref().unwrap_or("1e-6"))
         }
     };
     Ok(format!("name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\n{record}[solver]\n{solver}"))

@@ -6,10 +6,9 @@
 
 use super::disorder::Contact;
 use super::lanes::{LANES, Row};
+use super::reattachments::{Due, Reattachments};
 use super::{BreakOn, Disorder, Parameters};
 use std::array;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// What happened to a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,30 +42,6 @@ pub struct ContactEvent {
     pub stiffness: f64,
 }
 
-/// A reattachment that is due, in order of time, then block, then contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Due {
-    /// Bits of the time in s, which order as it does, since it is not negative.
-    time: u64,
-    block: u32,
-    contact: u32,
-}
-
-impl Due {
-    #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
-    fn new(time: f64, block: usize, contact: usize) -> Self {
-        Self { time: time.to_bits(), block: block as u32, contact: contact as u32 }
-    }
-
-    fn time(self) -> f64 {
-        f64::from_bits(self.time)
-    }
-
-    fn block(self) -> usize {
-        self.block as usize
-    }
-}
-
 /// Eight bytes that are 0 or 1 each, times this, hold their bits in the highest byte, in order.
 const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
 
@@ -95,7 +70,7 @@ pub struct Interface {
     disorder: Disorder,
     /// The rows of the first block, then of the second, and so on.
     rows: Vec<ContactRow>,
-    reattachments: BinaryHeap<Reverse<Due>>,
+    reattachments: Reattachments,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
     /// Per block: Σ k_i a_i of the attached contacts, in N.
@@ -126,7 +101,7 @@ impl Interface {
             break_on: parameters.break_on,
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
-            reattachments: BinaryHeap::new(),
+            reattachments: Reattachments::new(blocks, parameters.contacts_per_block, parameters.reattachment_time),
             block_stiffness: vec![0.0; blocks],
             block_pull: vec![0.0; blocks],
             block_upper: vec![0.0; blocks],
@@ -152,24 +127,34 @@ impl Interface {
     }
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.
+    #[inline(always)]
     #[must_use]
     pub fn next_reattachment(&self) -> f64 {
-        self.reattachments.peek().map_or(f64::INFINITY, |due| due.0.time())
+        self.reattachments.next().map_or(f64::INFINITY, Due::time)
     }
 
     /// Block of the next reattachment, if any contact is detached.
+    #[inline(always)]
     #[must_use]
     pub fn next_reattachment_block(&self) -> Option<usize> {
-        self.reattachments.peek().map(|due| due.0.block())
+        self.reattachments.next().map(Due::block)
+    }
+
+    /// Time in s and block of the next reattachment, if it is due by a time in s.
+    #[inline(always)]
+    #[must_use]
+    pub fn next_reattachment_by(&self, time: f64) -> Option<(f64, usize)> {
+        self.reattachments.next().map(|due| (due.time(), due.block())).filter(|(due, _)| *due <= time)
     }
 
     /// Attaches the contact that is due next, unstressed where its block is at that moment.
     ///
     /// # Panics
     /// When nothing is due: a bug in the solver.
+    #[inline(always)]
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
-        let Reverse(due) = self.reattachments.pop().expect("a reattachment is due");
-        let (block, contact) = (due.block(), due.contact as usize);
+        let due = self.reattachments.pop().expect("a reattachment is due");
+        let (block, contact) = (due.block(), due.contact());
         let [upper, lower] = self.attach(block, contact, displacement);
         self.sum(block);
         self.block_upper[block] = self.block_upper[block].min(upper);
@@ -179,6 +164,7 @@ impl Interface {
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// passes each to `log`.
+    #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
         // As many rows at a time as have a bit for each contact.
@@ -217,12 +203,7 @@ impl Interface {
 
     /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
     pub fn shift_time(&mut self, shift: f64) {
-        let due = std::mem::take(&mut self.reattachments);
-        self.reattachments = due
-            .into_iter()
-            // Not negative, whatever rounding does; see `Due`.
-            .map(|Reverse(due)| Reverse(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due }))
-            .collect();
+        self.reattachments.shift(shift);
     }
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.
@@ -239,14 +220,17 @@ impl Interface {
     }
 
     /// Row and lane of a contact.
+    #[inline(always)]
     fn place(&self, block: usize, contact: usize) -> (usize, usize) {
         (block * self.rows_per_block + contact / LANES, contact % LANES)
     }
 
+    #[inline(always)]
     fn rows_of(&self, block: usize) -> &[ContactRow] {
         &self.rows[block * self.rows_per_block..][..self.rows_per_block]
     }
 
+    #[inline(always)]
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
         let (row, lane) = self.place(block, contact);
         let ContactRow { life, generation, anchor, .. } = &self.rows[row];
@@ -265,33 +249,37 @@ impl Interface {
     }
 
     /// Begins a life of a contact. Returns the positions above and below at which it breaks.
+    #[inline(always)]
     fn attach(&mut self, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
         let row = &mut self.rows[row];
         let Contact { stiffness, reach, .. } = row.life[lane];
-        row.attached_stiffness[lane] = stiffness;
-        row.anchor[lane] = displacement;
-        row.upper[lane] = displacement + reach;
-        row.lower[lane] = match self.break_on {
-            BreakOn::Magnitude => displacement - reach,
-            BreakOn::Tension => f64::NEG_INFINITY,
+        let levels = match self.break_on {
+            BreakOn::Magnitude => [displacement + reach, displacement - reach],
+            BreakOn::Tension => [displacement + reach, f64::NEG_INFINITY],
         };
-        [row.upper[lane], row.lower[lane]]
+        row.attached_stiffness.set(lane, stiffness);
+        row.anchor.set(lane, displacement);
+        row.upper.set(lane, levels[0]);
+        row.lower.set(lane, levels[1]);
+        levels
     }
 
     /// Ends the life of a contact and draws the next.
+    #[inline(always)]
     fn detach(&mut self, block: usize, contact: usize, time: f64) {
         let (row, lane) = self.place(block, contact);
         let row = &mut self.rows[row];
-        row.attached_stiffness[lane] = 0.0;
-        row.upper[lane] = f64::INFINITY;
-        row.lower[lane] = f64::NEG_INFINITY;
+        row.attached_stiffness.set(lane, 0.0);
+        row.upper.set(lane, f64::INFINITY);
+        row.lower.set(lane, f64::NEG_INFINITY);
         row.generation[lane] += 1;
         row.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, row.generation[lane]);
-        self.reattachments.push(Reverse(Due::new(time + row.life[lane].delay, block, contact)));
+        self.reattachments.push(Due::new(time + row.life[lane].delay, block, contact));
     }
 
     /// Computes the sums and nearest break positions of a block again.
+    #[inline(always)]
     fn gather(&mut self, block: usize) {
         self.sum(block);
         let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
@@ -306,6 +294,7 @@ impl Interface {
     }
 
     /// Computes the sums of a block again, in fixed lanes.
+    #[inline(always)]
     fn sum(&mut self, block: usize) {
         let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
         for row in self.rows_of(block) {

@@ -7,6 +7,7 @@ pub(crate) mod fields;
 mod interface;
 mod lanes;
 mod parameters;
+mod reattachments;
 pub mod theory;
 pub(crate) mod value;
 
@@ -21,4 +22,4 @@ pub(crate) use value::Shortest;
 pub use value::{BreakOn, Value};
 
 /// Version of the equations and definitions; part of every job id. Raised when the same parameters give other results.
-pub const MODEL_VERSION: u32 = 2;
+pub const MODEL_VERSION: u32 = 3;

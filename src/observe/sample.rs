@@ -23,6 +23,10 @@ impl Observer for Observers<'_> {
         self.others.iter_mut().for_each(|other| other.contact(event));
     }
 
+    fn follows_attachments(&self) -> bool {
+        self.lead.follows_attachments() || self.others.iter().any(|other| other.follows_attachments())
+    }
+
     fn is_satisfied(&self) -> bool {
         self.lead.is_satisfied()
     }

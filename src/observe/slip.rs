@@ -365,6 +365,10 @@ impl Observer for SlipObserver {
         }
     }
 
+    fn follows_attachments(&self) -> bool {
+        false
+    }
+
     fn is_satisfied(&self) -> bool {
         self.slips.len() as u64 >= self.recording.slips
     }

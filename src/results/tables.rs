@@ -126,6 +126,7 @@ columns! {
         simulated_time: Option<f64> = "s", "model time reached";
         steps: Option<u64> = "", "steps of the solver";
         leaps: Option<u64> = "", "of these, leaps over quiet time";
+        grid_steps: Option<u64> = "", "of these, steps of the grid; 0 if motion was resolved in Taylor steps";
     }
 }
 
@@ -151,6 +152,7 @@ impl JobRecord {
             simulated_time: summary.map(|summary| summary.end_time),
             steps: summary.map(|summary| summary.steps),
             leaps: summary.map(|summary| summary.leaps),
+            grid_steps: summary.map(|summary| summary.grid_steps),
         }
     }
 }

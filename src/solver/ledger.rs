@@ -145,6 +145,7 @@ pub(super) fn work(drive: &Drive, quadrature: &Quadrature, segment: &Segment<'_>
             let drift = 0.5 * angular_frequency * segment.duration * libm::sin(drive_phase - phase);
             drive.velocity * segment.impulse() + drive.amplitude * (ramp + amplitude * (beat - drift))
         }
+        ForcePath::Grid { .. } => unreachable!("a ledger is kept along Taylor steps"),
     }
 }
 

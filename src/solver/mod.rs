@@ -28,6 +28,8 @@ pub enum Solver {
     EventDriven {
         /// Target for the error of displacement, relative to the contact reach f_s/k. 1e-12 to 1e-2.
         tolerance: f64,
+        /// How the motion between leaps is resolved.
+        resolve: Resolve,
     },
     /// Explicit velocity-Verlet with damping, contacts tested after each step.
     FixedStep {
@@ -36,20 +38,59 @@ pub enum Solver {
     },
 }
 
+/// How the event-driven solver resolves motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resolve {
+    /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept; else
+    /// in Taylor steps.
+    #[default]
+    Auto,
+    /// On a constant grid of time, corrected for events to fourth order.
+    Grid,
+    /// In Taylor series, each up to the next event.
+    Taylor,
+}
+
+impl Resolve {
+    /// All of them, with their words in sweep files.
+    pub const ALL: [(Self, &str); 3] = [(Self::Auto, "auto"), (Self::Grid, "grid"), (Self::Taylor, "taylor")];
+
+    /// Its word in sweep files.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        Self::ALL[self as usize].1
+    }
+
+    /// The one with this word.
+    #[must_use]
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|(_, known)| *known == word).map(|(resolve, _)| resolve)
+    }
+}
+
+/// Least tolerance at which [`Resolve::Auto`] takes the grid: it is cheaper down to some 1e-8.
+pub const GRID_TOLERANCE: f64 = 1e-7;
+
 impl Default for Solver {
     fn default() -> Self {
-        Self::EventDriven { tolerance: 1e-3 }
+        Self::event_driven(1e-3)
     }
 }
 
 impl Solver {
+    /// From contact event to contact event with this tolerance, resolved as it is best.
+    #[must_use]
+    pub const fn event_driven(tolerance: f64) -> Self {
+        Self::EventDriven { tolerance, resolve: Resolve::Auto }
+    }
+
     /// Checks that the setting fits the parameters.
     ///
     /// # Errors
     /// When the time step is not stable, or the tolerance out of range.
     pub fn check(self, parameters: &Parameters) -> Result<(), SimulationError> {
         match self {
-            Self::EventDriven { tolerance } if !TOLERANCES.contains(&tolerance) => {
+            Self::EventDriven { tolerance, .. } if !TOLERANCES.contains(&tolerance) => {
                 Err(SimulationError::BadTolerance { tolerance })
             }
             Self::EventDriven { .. } => Ok(()),
@@ -72,6 +113,11 @@ pub trait Observer {
 
     /// A contact breaks or attaches, at the end of the segment before.
     fn contact(&mut self, event: &ContactEvent);
+
+    /// Whether it wants to be told of attachments. Those that do not need none of the segments that end there.
+    fn follows_attachments(&self) -> bool {
+        true
+    }
 
     /// Whether the simulation may end. Asked after each segment and its events.
     fn is_satisfied(&self) -> bool;
@@ -105,6 +151,8 @@ pub struct Summary {
     pub steps: u64,
     /// Of these, leaps over quiet time.
     pub leaps: u64,
+    /// Of these, steps of the grid; none if motion was resolved in Taylor steps.
+    pub grid_steps: u64,
     /// Contacts broken.
     pub breaks: u64,
     /// Contacts reattached.
@@ -132,6 +180,11 @@ pub enum SimulationError {
         /// The refused tolerance.
         tolerance: f64,
     },
+    /// A ledger is asked for along the grid.
+    #[error(
+        "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""
+    )]
+    LedgerOnGrid,
     /// The state is no longer finite.
     #[error("at t = {time} s: the state is not finite; a smaller dt or tolerance may help")]
     NotFinite {
@@ -182,7 +235,7 @@ pub fn simulate(
 }
 
 /// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last
-/// bit.
+/// bit, but that the event-driven solver takes Taylor steps at any tolerance.
 ///
 /// # Errors
 /// As [`simulate`].
@@ -204,7 +257,9 @@ fn run(
 ) -> Result<Summary, SimulationError> {
     solver.check(parameters)?;
     match solver {
-        Solver::EventDriven { tolerance } => event_driven::run(parameters, tolerance, limits, observer, audit),
+        Solver::EventDriven { tolerance, resolve } => {
+            event_driven::run(parameters, tolerance, resolve, limits, observer, audit)
+        }
         Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer, audit),
     }
 }

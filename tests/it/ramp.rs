@@ -32,7 +32,7 @@ fn difference(of: &HashMap<(usize, usize, u32), f64>, from: &HashMap<(usize, usi
     of.iter().map(|(key, time)| from.get(key).map_or(f64::INFINITY, |other| (time - other).abs())).fold(0.0, f64::max)
 }
 
-const EXACT: Solver = Solver::EventDriven { tolerance: 1e-10 };
+const EXACT: Solver = Solver::event_driven(1e-10);
 
 #[test]
 fn both_solvers_break_the_same_contacts_at_the_same_times() {
@@ -42,7 +42,7 @@ fn both_solvers_break_the_same_contacts_at_the_same_times() {
     let stepped = first_breaks(&ramped(), Solver::FixedStep { time_step: 1e-7 }, 80);
     assert!(difference(&exact, &stepped) < 2e-6, "{:e}", difference(&exact, &stepped));
     // At 1e-6 of the contact reach, the drive covers the tolerance in 3e-9 s: some ten times that.
-    let coarser = first_breaks(&ramped(), Solver::EventDriven { tolerance: 1e-6 }, 80);
+    let coarser = first_breaks(&ramped(), Solver::event_driven(1e-6), 80);
     assert!(difference(&exact, &coarser) < 5e-8, "{:e}", difference(&exact, &coarser));
     // A ramp that were not followed would show.
     let steady = Parameters { turning_period: None, turning_amplitude: None, ramp_time: 0.0, ..ramped() };
@@ -92,8 +92,8 @@ fn steep_ramps_balance_their_energy() {
         let limits = Limits { end_time: 0.25, events: 1_000_000, interrupt: None };
         for (solver, allowed) in [
             // As without a ramp.
-            (Solver::EventDriven { tolerance: 1e-4 }, 1e-6),
-            (Solver::EventDriven { tolerance: 1e-8 }, 1e-11),
+            (Solver::event_driven(1e-4), 1e-6),
+            (Solver::event_driven(1e-8), 1e-11),
             (Solver::FixedStep { time_step: 1e-6 }, 2.5e-3),
         ] {
             let parameters = parameters.clone().validated().unwrap();

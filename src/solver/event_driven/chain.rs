@@ -32,7 +32,7 @@ pub(super) struct Chain {
     /// Block mass m, in kg.
     pub mass: f64,
     /// Diagonal of S without contacts, in N/m.
-    bare: Vec<Row>,
+    pub bare: Vec<Row>,
     /// K_int/m, in 1/s²; 0 in padding.
     pub coupling: Vec<Row>,
     /// Diagonal of S/m, in 1/s².

@@ -1,12 +1,15 @@
 //! The moving frame: time, displacement and drive, counted from an origin that follows the slider, so that neither time
 //! nor displacement loses digits in long runs.
 
+use super::grid::GridDrive;
 use super::series::DriveDerivatives;
 use crate::model::{ContactEvent, Drive};
 use crate::solver::harmonic::Harmonic;
 
-/// Local time at which the frame moves, in s.
-pub(super) const FRAME_SPAN: f64 = 0.0625;
+/// Time in the frame at which it moves where Taylor steps locate events to rounding, in s.
+pub(super) const SPAN: f64 = 0.0625;
+/// A step must span this many units in the last place of the time, so that events are located to a millionth of it.
+pub(super) const MIN_RESOLUTION: f64 = 1_048_576.0;
 /// The frame moves by multiples of these, so that its sums are exact: 2^-20 s and 2^-40 m.
 const TIME_QUANTUM: f64 = 1.0 / 1_048_576.0;
 const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
@@ -15,6 +18,8 @@ const DISPLACEMENT_QUANTUM: f64 = 1.0 / 1_099_511_627_776.0;
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub drive: Drive,
+    /// Time in the frame at which it moves, in s.
+    pub span: f64,
     /// Time and displacement of the origin since the start of the run, in s and m.
     origin_time: f64,
     origin_displacement: f64,
@@ -27,10 +32,11 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame at the start of a run.
-    pub fn new(drive: Drive) -> Self {
+    /// The frame at the start of a run, which moves at a time of `span` s in it.
+    pub fn new(drive: Drive, span: f64) -> Self {
         Self {
             drive,
+            span,
             origin_time: 0.0,
             origin_displacement: 0.0,
             time: 0.0,
@@ -44,6 +50,18 @@ impl Frame {
     #[inline]
     pub fn now(&self) -> f64 {
         self.origin_time + self.time
+    }
+
+    /// Whether it is time to move the frame.
+    #[inline]
+    pub fn is_worn(&self) -> bool {
+        self.time > self.span
+    }
+
+    /// Whether a step of `length` s spans so many units in the last place of the time that events in it can be located.
+    #[inline]
+    pub fn resolves(&self, length: f64) -> bool {
+        length >= MIN_RESOLUTION * f64::EPSILON * self.time.max(self.span)
     }
 
     /// Time since the start of the run, in s, for a time in the frame.
@@ -127,6 +145,13 @@ impl Frame {
     pub fn drive_motion(&self) -> Harmonic {
         let Drive { velocity, amplitude, angular_frequency, .. } = self.drive;
         Harmonic { start: self.ramp(), rate: velocity, amplitude, phase: self.phase(), angular_frequency }
+    }
+
+    /// The drive for a grid of steps of `length` s, from the present on.
+    pub fn grid_drive(&self, length: f64) -> GridDrive {
+        let angle = if self.drive.is_modulated() { self.drive.angular_frequency * length } else { 0.0 };
+        let (sine, cosine) = libm::sincos(angle);
+        GridDrive { ramp: [self.ramp(), self.drive.velocity * length], swing: self.swing, turn: [sine, cosine], angle }
     }
 
     /// The derivatives of the drive's displacement, for a step of `length` s.

@@ -3,8 +3,10 @@
 use super::chain::{Chain, State};
 use super::chebyshev::{ChebyshevPropagator, propagate};
 use super::free_motion::{SplitMotion, split};
+use super::grid::{Grid, GridDrive, GridStep, advance, velocity};
 use super::series::{Series, evaluate, reachable};
 use super::simd::Simd;
+use super::slider::Slider;
 use super::taylor::{StepInput, expand};
 use crate::solver::harmonic::Harmonic;
 use pulp::Scalar512b;
@@ -23,6 +25,10 @@ pub(super) trait Kernels {
     fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64>;
     /// Carries the free motion over `seconds` s; see [`propagate`].
     fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator);
+    /// Takes up to `steps` steps of the grid; see [`advance`].
+    fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize;
+    /// Writes the velocities of a motion on the grid; see [`velocity`].
+    fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State);
 }
 
 /// The loops compiled for the features of `S` and for `R` rows, or for any number if that is 0.
@@ -61,6 +67,20 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
         self.0.run(
             #[inline(always)]
             |simd| propagate(simd, chain, seconds, error, propagator),
+        );
+    }
+
+    fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize {
+        self.0.run(
+            #[inline(always)]
+            |simd| advance::<S, R>(simd, slider, grid, time, steps),
+        )
+    }
+
+    fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State) {
+        self.0.run(
+            #[inline(always)]
+            |simd| velocity::<S, R>(simd, chain, step, drive, state),
         );
     }
 }

@@ -1,9 +1,10 @@
 //! Event-driven: from contact event to contact event, in closed form where nothing happens.
 //!
-//! Between events the model is linear with constant coefficients. While it moves, a Taylor series resolves it and
-//! locates the first crossing of a break position rigorously ([`taylor`], [`crossing`]); while it is quiet, a leap
-//! follows the driven solution to the next event ([`leap`]). Contract: events in the right order, and errors of
-//! displacement of the order of `tolerance` · f_s/k.
+//! Between events the model is linear with constant coefficients. While it is quiet, a leap follows the driven solution
+//! to the next event ([`leap`]). While it moves, it is resolved in one of two ways: on a constant grid of time, which
+//! events correct to fourth order ([`grid`]); or in Taylor series, of which each locates the first crossing of a break
+//! position rigorously ([`taylor`], [`crossing`]). Contract: errors of displacement of the order of `tolerance` · f_s/k,
+//! and events in the right order within that.
 //!
 //! Displacements and times are kept in a moving [`frame`], so that neither loses digits in long runs.
 
@@ -14,6 +15,7 @@ mod crossing;
 mod driven_solution;
 mod frame;
 mod free_motion;
+mod grid;
 mod kernels;
 mod layout;
 mod leap;
@@ -24,7 +26,8 @@ mod step;
 mod taylor;
 mod tolerances;
 
-use self::frame::{FRAME_SPAN, Frame};
+use self::frame::Frame;
+use self::grid::Grid;
 use self::kernels::Kernels;
 use self::layout::Layout;
 use self::leap::{Attempt, Bounds, Leap};
@@ -33,12 +36,13 @@ use self::step::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::ledger::Audit;
 use super::segment::Segment;
-use super::{Limits, Observer, SimulationError, Summary};
+use super::{GRID_TOLERANCE, Limits, Observer, Resolve, SimulationError, Summary};
 use crate::model::{Drive, Parameters};
 use std::sync::atomic::Ordering;
 
-/// A leap is tried only if no reattachment is due within this many longest steps.
+/// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
 const WORTHWHILE_LEAP: f64 = 6.0;
+const WORTHWHILE_GRID_LEAP: f64 = 80.0;
 /// Steps between two checks of the interrupt flag.
 const STEPS_PER_CHECK: u64 = 1024;
 
@@ -46,12 +50,19 @@ const STEPS_PER_CHECK: u64 = 1024;
 pub(super) fn run(
     parameters: &Parameters,
     tolerance: f64,
+    resolve: Resolve,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let rows = Layout::new(parameters.blocks).rows;
-    let integration = Integration::new(parameters, tolerance, limits, kernels::fastest(rows));
+    let takes_grid = match resolve {
+        Resolve::Auto => audit.is_none() && tolerance >= GRID_TOLERANCE && Grid::is_resolved(parameters, tolerance),
+        Resolve::Grid if audit.is_some() => return Err(SimulationError::LedgerOnGrid),
+        Resolve::Grid => true,
+        Resolve::Taylor => false,
+    };
+    let integration = Integration::new(parameters, tolerance, takes_grid, limits, kernels::fastest(rows));
     Integration { audit, ..integration }.integrate(observer)
 }
 
@@ -65,6 +76,9 @@ struct Integration<'a> {
     control: StepControl,
     step: Step,
     leap: Leap,
+    /// Whether motion is resolved on the grid, and not in Taylor steps.
+    takes_grid: bool,
+    grid: Grid,
     /// Time before which no leap is tried, in s.
     next_leap: f64,
     /// Largest shear force at the last break and at the ends of steps since, in N.
@@ -74,15 +88,24 @@ struct Integration<'a> {
 }
 
 impl<'a> Integration<'a> {
-    fn new(parameters: &Parameters, tolerance: f64, limits: Limits<'a>, kernels: Box<dyn Kernels>) -> Self {
+    fn new(
+        parameters: &Parameters,
+        tolerance: f64,
+        takes_grid: bool,
+        limits: Limits<'a>,
+        kernels: Box<dyn Kernels>,
+    ) -> Self {
         let tolerances = Tolerances::new(parameters, tolerance);
         let slider = Slider::new(parameters);
         let layout = slider.chain.layout;
+        let span = if takes_grid { grid::FRAME_SPAN } else { frame::SPAN };
         Self {
             limits,
             kernels,
             tolerances,
-            frame: Frame::new(Drive::new(parameters)),
+            frame: Frame::new(Drive::new(parameters), span),
+            takes_grid,
+            grid: Grid::new(parameters, tolerance, &slider.chain, &slider.state),
             slider,
             control: StepControl::new(tolerances.max_step),
             step: Step::new(layout),
@@ -98,6 +121,8 @@ impl<'a> Integration<'a> {
     /// has nothing to drop if an observer panics.
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+        self.grid.follows_attachments(observer.follows_attachments());
+        let mut next_check = STEPS_PER_CHECK;
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
         }
@@ -114,10 +139,16 @@ impl<'a> Integration<'a> {
             let until_change = until_cycle_end.min(until_end);
             let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
             let horizon = until_attach.min(until_change);
-            let leapt = horizon > WORTHWHILE_LEAP * self.tolerances.max_step
+            let worthwhile = if self.takes_grid {
+                WORTHWHILE_GRID_LEAP * self.grid.step.length
+            } else {
+                WORTHWHILE_LEAP * self.tolerances.max_step
+            };
+            let leapt = horizon > worthwhile
                 && self.frame.time >= self.next_leap
                 && self.try_leap(horizon, until_cycle_end, observer);
-            if !leapt {
+            let moved = leapt || (self.takes_grid && self.take_grid_steps(until_change, observer)?);
+            if !moved {
                 self.take_step(until_change, observer)?;
             }
             if self.summary.breaks + self.summary.reattachments > self.limits.events {
@@ -128,10 +159,11 @@ impl<'a> Integration<'a> {
             if !self.slider.state.displacement[0][0].is_finite() {
                 return Err(SimulationError::NotFinite { time: self.frame.now() });
             }
-            if self.frame.time > FRAME_SPAN {
-                self.move_frame();
+            if self.frame.is_worn() {
+                self.move_frame(observer);
             }
-            let is_check = self.summary.steps.is_multiple_of(STEPS_PER_CHECK);
+            let is_check = self.summary.steps >= next_check;
+            next_check += if is_check { STEPS_PER_CHECK } else { 0 };
             if is_check && self.limits.interrupt.is_some_and(|flag| flag.load(Ordering::Relaxed)) {
                 return Err(SimulationError::Interrupted { time: self.frame.now() });
             }
@@ -141,6 +173,7 @@ impl<'a> Integration<'a> {
 
     #[inline(never)]
     fn finish(&mut self, satisfied: bool, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
+        self.leave_grid(observer);
         self.summary.end_time = self.frame.now();
         let displacement: Vec<f64> = self.slider.displacements().map(|x| self.frame.absolute_displacement(x)).collect();
         if !displacement.iter().sum::<f64>().is_finite() {
@@ -158,6 +191,7 @@ impl<'a> Integration<'a> {
     /// false if none is allowed yet.
     #[inline(never)]
     fn try_leap(&mut self, horizon: f64, until_cycle_end: f64, observer: &mut dyn Observer) -> bool {
+        self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let start = self.frame.now();
         let bounds =
@@ -181,6 +215,7 @@ impl<'a> Integration<'a> {
                 if let (Some(before), Some(reported)) = (before.filter(|_| is_carried), reported) {
                     self.audit_carried_leap(before, &reported);
                 }
+                self.grid.is_on = false;
                 self.summary.steps += 1;
                 self.summary.leaps += 1;
                 self.next_leap = 0.0;
@@ -234,10 +269,14 @@ impl<'a> Integration<'a> {
 
     /// Moves the frame to where the slider and the clock are.
     #[inline(never)]
-    fn move_frame(&mut self) {
+    fn move_frame(&mut self, observer: &mut dyn Observer) {
+        self.update_velocities(observer);
         let (time, displacement) = self.frame.move_origin(self.slider.state.displacement[0][0]);
         self.slider.move_origin(time, displacement);
         self.next_leap -= time;
+        if self.grid.is_on {
+            self.grid.follow_frame(&self.slider.chain, &self.frame);
+        }
     }
 }
 
@@ -257,13 +296,13 @@ mod tests {
             seed: 5,
             ..Parameters::default()
         };
-        for parameters in [plain, modulated] {
+        for (parameters, takes_grid) in [(&plain, true), (&plain, false), (&modulated, true), (&modulated, false)] {
             let logs: Vec<(&str, Vec<ContactEvent>)> = kernels::available(Layout::new(parameters.blocks).rows)
                 .into_iter()
                 .map(|(name, kernels)| {
                     let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
                     let mut log = ContactLog::default();
-                    Integration::new(&parameters, 1e-6, limits, kernels).integrate(&mut log).unwrap();
+                    Integration::new(parameters, 1e-6, takes_grid, limits, kernels).integrate(&mut log).unwrap();
                     (name, log.events)
                 })
                 .collect();
@@ -283,7 +322,7 @@ mod tests {
             let log = |tolerance: f64| {
                 let limits = Limits { end_time: 0.1, events: u64::MAX, interrupt: None };
                 let mut log = ContactLog::default();
-                let summary = run(&parameters, tolerance, limits, &mut log, None).unwrap();
+                let summary = run(&parameters, tolerance, Resolve::Taylor, limits, &mut log, None).unwrap();
                 (summary.steps, log.events)
             };
             let (steps_alone, alone) = log(1e-10);
@@ -322,7 +361,7 @@ mod tests {
                 let kernels = kernels::fastest(Layout::new(parameters.blocks).rows);
                 let recording = Recording { discard: 0, ..Recording::default() };
                 let mut observer = SlipObserver::new(&parameters, &recording);
-                let integration = Integration::new(&parameters, 1e-10, limits, kernels);
+                let integration = Integration::new(&parameters, 1e-10, false, limits, kernels);
                 let summary = Integration { next_leap, ..integration }.integrate(&mut observer).unwrap();
                 (summary, observer.into_rows().0)
             };
@@ -344,7 +383,7 @@ mod tests {
         let log = |tolerance: f64| {
             let limits = Limits { end_time: 0.5, events: u64::MAX, interrupt: None };
             let mut log = ContactLog::default();
-            run(&parameters, tolerance, limits, &mut log, None).unwrap();
+            run(&parameters, tolerance, Resolve::Taylor, limits, &mut log, None).unwrap();
             log.events
         };
         let (loose, tight) = (log(1e-4), log(1e-10));

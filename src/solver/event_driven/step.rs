@@ -16,7 +16,6 @@
 use super::Integration;
 use super::chain::Chain;
 use super::crossing::first_exit;
-use super::frame::FRAME_SPAN;
 use super::layout::Layout;
 use super::series::Series;
 use super::slider::Slider;
@@ -30,8 +29,6 @@ use crate::solver::{Observer, SimulationError};
 const MAX_HALVINGS: usize = 7;
 /// Halvings at which a series that does not converge ends the run.
 const HOPELESS_HALVINGS: usize = 60;
-/// A step must span this many units in the last place of the time, so that events are located to a millionth of it.
-const MIN_RESOLUTION: f64 = 1_048_576.0;
 /// Order up to which an event changes the series.
 const MERGED_ORDER: usize = 4;
 /// Events that may be merged into one step.
@@ -164,7 +161,7 @@ impl Integration<'_> {
         let until_attach = self.slider.interface.next_reattachment() - self.frame.time + self.control.attach_window;
         self.expand(horizon.min(until_attach))?;
         let (start, length) = (self.step.start, self.step.length);
-        if length < MIN_RESOLUTION * f64::EPSILON * self.frame.time.max(FRAME_SPAN) {
+        if !self.frame.resolves(length) {
             return Err(SimulationError::StepTooShort { time: self.frame.now(), step: length });
         }
         self.summary.steps += 1;

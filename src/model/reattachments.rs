@@ -1,0 +1,249 @@
+//! The reattachments to come, in order of time: a calendar queue (R. Brown, Commun. ACM 31, 1220, 1988).
+//!
+//! Times fall into bins of a fraction of the mean delay; the present bin is sorted, those ahead are lists, and what lies
+//! beyond a turn of the calendar waits aside. A contact has at most one reattachment, so lists run through the contacts
+//! and nothing is allocated. Contract: reattachments come in order of time, then block, then contact.
+
+/// Bins of a turn, and of a mean delay.
+const BINS: usize = 4096;
+const BINS_PER_DELAY: f64 = 512.0;
+const BITS: usize = u64::BITS as usize;
+/// The end of a list.
+const NONE: u32 = u32::MAX;
+
+/// A reattachment that is due, in order of time, then block, then contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Due {
+    /// Bits of the time in s, which order as it does, since it is not negative.
+    time: u64,
+    block: u32,
+    contact: u32,
+}
+
+impl Due {
+    #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
+    pub fn new(time: f64, block: usize, contact: usize) -> Self {
+        Self { time: time.to_bits(), block: block as u32, contact: contact as u32 }
+    }
+
+    pub fn time(self) -> f64 {
+        f64::from_bits(self.time)
+    }
+
+    pub fn block(self) -> usize {
+        self.block as usize
+    }
+
+    pub fn contact(self) -> usize {
+        self.contact as usize
+    }
+}
+
+/// The reattachments to come.
+#[derive(Clone, Debug)]
+pub(super) struct Reattachments {
+    contacts_per_block: usize,
+    bins_per_second: f64,
+    /// The next one, which lies in no bin.
+    next: Option<Due>,
+    /// Number of the present bin, and what is due up to its end, the latest first.
+    present_bin: u64,
+    present: Vec<Due>,
+    /// For each bin of the turn ahead whether it holds anything, and the first contact of its list.
+    occupied: [u64; BINS / BITS],
+    first: Vec<u32>,
+    /// For each contact what is due, and the contact after it in its list.
+    due: Vec<Due>,
+    after: Vec<u32>,
+    /// What lies beyond the turn.
+    beyond: Vec<Due>,
+}
+
+impl Reattachments {
+    /// None yet, for contacts that reattach after `mean_delay` s on average.
+    pub fn new(blocks: usize, contacts_per_block: usize, mean_delay: f64) -> Self {
+        let contacts = blocks * contacts_per_block;
+        Self {
+            contacts_per_block,
+            bins_per_second: BINS_PER_DELAY / mean_delay,
+            next: None,
+            present_bin: 0,
+            present: Vec::new(),
+            occupied: [0; BINS / BITS],
+            first: vec![NONE; BINS],
+            due: vec![Due::new(0.0, 0, 0); contacts],
+            after: vec![NONE; contacts],
+            beyond: Vec::new(),
+        }
+    }
+
+    /// The next one, if any contact is detached.
+    #[inline]
+    pub fn next(&self) -> Option<Due> {
+        self.next
+    }
+
+    /// Adds one. Its contact has none yet.
+    #[inline]
+    pub fn push(&mut self, due: Due) {
+        match &mut self.next {
+            None => self.next = Some(due),
+            Some(next) => {
+                let later = (*next).max(due);
+                *next = (*next).min(due);
+                self.file(later);
+            }
+        }
+    }
+
+    /// Takes the next one out.
+    #[inline]
+    pub fn pop(&mut self) -> Option<Due> {
+        let next = self.next?;
+        if self.present.is_empty() {
+            self.turn();
+        }
+        self.next = self.present.pop();
+        Some(next)
+    }
+
+    /// Moves the origin of time: subtracts `shift` s from every one.
+    pub fn shift(&mut self, shift: f64) {
+        let mut all: Vec<Due> = self.next.take().into_iter().chain(self.present.drain(..)).collect();
+        all.append(&mut self.beyond);
+        for word in 0..BINS / BITS {
+            while self.occupied[word] != 0 {
+                self.empty(word * BITS + self.occupied[word].trailing_zeros() as usize, |due| all.push(due));
+            }
+        }
+        self.present_bin = 0;
+        for due in all {
+            // Not negative, whatever rounding does; see `Due`.
+            self.push(Due { time: (due.time() - shift).max(0.0).to_bits(), ..due });
+        }
+    }
+
+    /// Number of the bin of a time.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative; saturates far ahead")]
+    fn bin(&self, due: Due) -> u64 {
+        (due.time() * self.bins_per_second) as u64
+    }
+
+    /// Puts one into its bin.
+    #[inline]
+    fn file(&mut self, due: Due) {
+        let bin = self.bin(due);
+        if bin <= self.present_bin {
+            let place = self.present.partition_point(|other| *other > due);
+            self.present.insert(place, due);
+        } else if bin - self.present_bin < BINS as u64 {
+            let (bin, contact) = (place_of(bin), due.block() * self.contacts_per_block + due.contact());
+            self.due[contact] = due;
+            self.after[contact] = self.first[bin];
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1e7 contacts")]
+            (self.first[bin] = contact as u32);
+            self.occupied[bin / BITS] |= 1 << (bin % BITS);
+        } else {
+            self.beyond.push(due);
+        }
+    }
+
+    /// Turns to the next bin that holds anything, and sorts it.
+    fn turn(&mut self) {
+        let here = place_of(self.present_bin);
+        // The words of the turn ahead, of the first without the bins up to the present one, which come last.
+        let words = (0..=BINS / BITS).map(|ahead| (here / BITS + ahead) % (BINS / BITS));
+        let found = words.enumerate().find_map(|(ahead, word)| {
+            let up_to_here = u64::MAX >> (BITS - 1 - here % BITS);
+            let bits = match ahead {
+                0 => self.occupied[word] & !up_to_here,
+                _ if ahead == BINS / BITS => self.occupied[word] & up_to_here,
+                _ => self.occupied[word],
+            };
+            (bits != 0).then(|| word * BITS + bits.trailing_zeros() as usize)
+        });
+        let mut present = std::mem::take(&mut self.present);
+        if let Some(bin) = found {
+            self.present_bin += ((bin + BINS - here) % BINS) as u64;
+            self.empty(bin, |due| present.push(due));
+        }
+        if !self.beyond.is_empty() {
+            // Nothing may stay aside that now lies within the turn.
+            if present.is_empty() {
+                self.present_bin = self.beyond.iter().map(|due| self.bin(*due)).min().unwrap_or(0);
+            }
+            self.present = present;
+            for due in std::mem::take(&mut self.beyond) {
+                self.file(due);
+            }
+            present = std::mem::take(&mut self.present);
+        }
+        present.sort_unstable_by(|a, b| b.cmp(a));
+        self.present = present;
+    }
+
+    /// Takes everything out of a bin.
+    fn empty(&mut self, bin: usize, mut take: impl FnMut(Due)) {
+        let mut contact = std::mem::replace(&mut self.first[bin], NONE);
+        while contact != NONE {
+            take(self.due[contact as usize]);
+            contact = self.after[contact as usize];
+        }
+        self.occupied[bin / BITS] &= !(1 << (bin % BITS));
+    }
+}
+
+/// Place of a bin in the calendar.
+#[expect(clippy::cast_possible_truncation, reason = "under the number of bins")]
+fn place_of(bin: u64) -> usize {
+    (bin % BINS as u64) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::cmp::Reverse;
+    use std::collections::BinaryHeap;
+
+    proptest! {
+        /// Whatever the delays, the pauses and the shifts.
+        #[test]
+        fn they_come_in_the_order_of_a_heap(
+            steps in prop::collection::vec((0_usize..40, -4.0_f64..5.0, 0_usize..60), 1..400), shifts in any::<bool>()
+        ) {
+            let mut queue = Reattachments::new(8, 5, 1e-3);
+            let (mut heap, mut time, mut waiting) = (BinaryHeap::new(), 0.0, [false; 40]);
+            for (step, (contact, exponent, pops)) in steps.into_iter().enumerate() {
+                if !std::mem::replace(&mut waiting[contact], true) {
+                    // Ties, too.
+                    let delay = 1e-3 * libm::exp2(exponent.floor());
+                    let due = Due::new(time + delay, contact / 5, contact % 5);
+                    queue.push(due);
+                    heap.push(Reverse(due));
+                }
+                if shifts && step % 7 == 6 {
+                    let by = 0.5 * time;
+                    time -= by;
+                    queue.shift(by);
+                    heap = heap.into_iter().map(|Reverse(due): Reverse<Due>| {
+                        Reverse(Due { time: (due.time() - by).max(0.0).to_bits(), ..due })
+                    }).collect();
+                }
+                for _ in 0..pops / 20 {
+                    let expected = heap.pop().map(|Reverse(due)| due);
+                    prop_assert_eq!(queue.next(), expected);
+                    prop_assert_eq!(queue.pop(), expected);
+                    if let Some(due) = expected {
+                        time = due.time();
+                        waiting[due.block() * 5 + due.contact()] = false;
+                    }
+                }
+            }
+            while let Some(Reverse(due)) = heap.pop() {
+                prop_assert_eq!(queue.pop(), Some(due));
+            }
+            prop_assert_eq!(queue.pop(), None);
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! Contact events within a step of the grid, without redoing it.
+//!
+//! Within a step, σ from 0 to 1, a block moves as X(σ) = x + σ q + ((r³ - r) a0 + (σ³ - σ) a1)/6 with r = 1 - σ, where
+//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s changes the force on its block and so its motion by
+//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = σ - s, and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`super::super::step`], where
+//! the same terms are derived. Added at ξ = 1 - s they correct the displacement, and at ξ = -s, backwards, the increment.
+
+use super::super::slider::Slider;
+use super::Grid;
+use super::step::{GridDrive, GridStep};
+use crate::model::{Change, ContactEvent};
+
+const SIXTH: f64 = 1.0 / 6.0;
+/// Newton's steps to a crossing, and the last step that leaves an error of the order of its square: rounding.
+const MAX_NEWTON_STEPS: usize = 6;
+const QUADRATIC: f64 = 1e-5;
+
+/// The motion of one block within a step, as a polynomial about its last event.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    block: usize,
+    /// Row and lane of the block, and its entry in the diagonal of S without contacts, in N/m.
+    slot: (usize, usize),
+    bare: f64,
+    /// Where in the step it is expanded.
+    about: f64,
+    /// Coefficients in σ - `about`, in m.
+    coefficients: [f64; 5],
+    /// Displacement at the end of the step, in m.
+    end: f64,
+    /// What events have added to it and to the increment, in m, and what to those of the blocks beside.
+    added: Correction,
+    beside: Correction,
+}
+
+/// What events add to a displacement at the end of a step and to the increment of the next, in m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Correction {
+    pub displacement: f64,
+    pub increment: f64,
+}
+
+impl Correction {
+    #[inline(always)]
+    fn add(&mut self, ahead: f64, back: f64) {
+        self.displacement += ahead;
+        self.increment += ahead - back;
+    }
+}
+
+impl Path {
+    /// The path of a block over the last step.
+    #[inline(always)]
+    fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize, (row, lane): (usize, usize)) -> Self {
+        let layout = slider.chain.layout;
+        let x = &slider.state.displacement;
+        let end = x[row][lane];
+        let rise = step.increment[row][lane];
+        let [before, after] = layout.beside(row, lane).map(|slot| slot.map_or(0.0, |(row, lane)| x[row][lane]));
+        let mut force = step.force_on(row, lane, [before, end, after]);
+        if block == 0 {
+            force += step.pulling * drive.displacement();
+        }
+        // x'' = φ - γh x' at both ends, with the slopes of this very path.
+        let damping = step.damping;
+        let (from, to) = (step.force[row][lane] - damping * rise, force - damping * rise);
+        let inverse = step.inverse_damped;
+        let first = ((1.0 + 2.0 * SIXTH * damping) * from + SIXTH * damping * to) * inverse;
+        let last = ((1.0 - 2.0 * SIXTH * damping) * to - SIXTH * damping * from) * inverse;
+        let coefficients = [end - rise, rise - (2.0 * first + last) * SIXTH, 0.5 * first, (last - first) * SIXTH, 0.0];
+        let none = Correction::default();
+        let bare = slider.chain.bare[row][lane];
+        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, end, added: none, beside: none }
+    }
+
+    /// Expands it about another point of the step.
+    #[inline(always)]
+    fn move_to(&mut self, s: f64) {
+        let by = s - self.about;
+        let [c0, c1, c2, c3, c4] = self.coefficients;
+        self.coefficients = [
+            c0 + by * (c1 + by * (c2 + by * (c3 + by * c4))),
+            c1 + by * (2.0 * c2 + by * (3.0 * c3 + by * 4.0 * c4)),
+            c2 + by * (3.0 * c3 + by * 6.0 * c4),
+            c3 + by * 4.0 * c4,
+            c4,
+        ];
+        self.about = s;
+    }
+
+    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: a step of Halley's, and
+    /// Newton's.
+    #[inline(always)]
+    fn crossing(&self, level: f64) -> f64 {
+        let [c0, c1, c2, c3, c4] = self.coefficients;
+        let (before, left) = (c0 - level, 1.0 - self.about);
+        let within = |beyond: f64| if beyond > 0.0 { if beyond < left { beyond } else { left } } else { 0.0 };
+        let mut beyond = within(before * c1 / (before * c2 - c1 * c1));
+        for _ in 0..MAX_NEWTON_STEPS {
+            let height = before + beyond * (c1 + beyond * (c2 + beyond * (c3 + beyond * c4)));
+            let slope = c1 + beyond * (2.0 * c2 + beyond * (3.0 * c3 + beyond * 4.0 * c4));
+            let next = within(beyond - height / slope);
+            let moved = (next - beyond).abs();
+            beyond = next;
+            if moved <= QUADRATIC {
+                break;
+            }
+        }
+        self.about + beyond
+    }
+}
+
+/// The events of a step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StepEvents {
+    /// Whether attachments are collected, too.
+    pub follows_attachments: bool,
+    /// What has happened, in the order of time, in the frame; and how often in this run of steps.
+    pub events: Vec<ContactEvent>,
+    pub breaks: u64,
+    pub reattachments: u64,
+    /// Paths of the blocks to which it has.
+    paths: Vec<Path>,
+}
+
+/// Breaks and attaches what the last step reaches and what is due in it, block after block. The step began at `start` s
+/// in the frame.
+#[inline(always)]
+pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) {
+    let Grid { step, drive, events, .. } = grid;
+    events.paths.clear();
+    for index in 0..step.reached.len() {
+        let (row, lane) = step.reached[index];
+        let block = slider.chain.layout.block(row, lane);
+        let mut path = Path::new(slider, step, drive, block, (row, lane));
+        break_along(slider, step, events, &mut path, start);
+        settle(slider, step, &mut path);
+        events.paths.push(path);
+    }
+    let end = start + step.length;
+    while let Some((due, block)) = slider.interface.next_reattachment_by(end) {
+        let known = events.paths.iter().position(|path| path.block == block);
+        let mut path = match known {
+            Some(index) => events.paths.swap_remove(index),
+            None => Path::new(slider, step, drive, block, slider.chain.layout.slot(block)),
+        };
+        path.move_to(((due - start) * step.inverse_length).clamp(0.0, 1.0));
+        change_contact(slider, step, events, Change::Attach, &mut path, due);
+        // It may break again at once.
+        break_along(slider, step, events, &mut path, start);
+        settle(slider, step, &mut path);
+        events.paths.push(path);
+    }
+    if events.events.len() > 1 {
+        events.events.sort_by(|a, b| a.time.total_cmp(&b.time));
+    }
+}
+
+/// Breaks what a block reaches along the rest of its path.
+#[inline(always)]
+fn break_along(slider: &mut Slider, step: &GridStep, events: &mut StepEvents, path: &mut Path, start: f64) {
+    loop {
+        let (upper, lower) = (slider.interface.block_upper[path.block], slider.interface.block_lower[path.block]);
+        let level = if path.end >= upper {
+            upper
+        } else if path.end <= lower {
+            lower
+        } else {
+            return;
+        };
+        let s = path.crossing(level);
+        path.move_to(s);
+        path.coefficients[0] = level;
+        change_contact(slider, step, events, Change::Break, path, start + s * step.length);
+    }
+}
+
+/// Breaks the contacts that a block has reached, or attaches the one that is due, where its path is expanded, and changes
+/// the path.
+#[inline(always)]
+fn change_contact(
+    slider: &mut Slider,
+    step: &GridStep,
+    events: &mut StepEvents,
+    change: Change,
+    path: &mut Path,
+    time: f64,
+) {
+    let block = path.block;
+    let [x, slope, half_curvature, ..] = path.coefficients;
+    let interface = &mut slider.interface;
+    let (stiffness, pull) = (interface.block_stiffness[block], interface.block_pull[block]);
+    match change {
+        Change::Break => interface.break_reached(block, time, x, |event| {
+            events.events.push(event);
+            events.breaks += 1;
+        }),
+        Change::Attach => {
+            let event = interface.reattach_next(x);
+            if events.follows_attachments {
+                events.events.push(event);
+            }
+            events.reattachments += 1;
+        }
+    }
+    let stiffened = (interface.block_stiffness[block] - stiffness) * step.by_mass;
+    let pulled = (interface.block_pull[block] - pull) * step.by_mass;
+    let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
+    let second = 0.5 * (pulled - stiffened * x);
+    let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
+    let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
+    path.coefficients[2] += second;
+    path.coefficients[3] += third;
+    path.coefficients[4] += fourth;
+    let moved = |by: f64| by * by * (second + by * (third + by * fourth));
+    let (ahead, back) = (1.0 - path.about, -path.about);
+    path.end += moved(ahead);
+    path.added.add(moved(ahead), moved(back));
+    let beside = |by: f64| 0.5 * SIXTH * step.coupling * second * ((by * by) * (by * by));
+    path.beside.add(beside(ahead), beside(back));
+}
+
+/// Enters what has happened to a block into the motion.
+#[inline(always)]
+fn settle(slider: &mut Slider, step: &mut GridStep, path: &mut Path) {
+    let Slider { chain, interface, state } = slider;
+    chain.update(path.block, interface);
+    step.correct(chain, path.block, path.slot, [path.added, path.beside], &mut state.displacement);
+    (path.added, path.beside) = (Correction::default(), Correction::default());
+}

@@ -1,0 +1,69 @@
+//! The shear force along the grid since the last segment that observers have seen.
+
+use crate::solver::segment::{CubicStep, ForcePath, Segment};
+
+/// Steps of shear force, from somewhere in the first of them on.
+#[derive(Clone, Debug)]
+pub(super) struct ForceHistory {
+    steps: Vec<CubicStep>,
+    /// Where in the first step it begins.
+    first: f64,
+    /// The time there, in s in the frame.
+    start: f64,
+    /// Bounds on F_S, in N, and the integral by steps from the beginning of the first, in N.
+    bounds: [f64; 2],
+    integral: f64,
+}
+
+impl ForceHistory {
+    pub fn new() -> Self {
+        Self { steps: Vec::new(), first: 0.0, start: 0.0, bounds: [f64::INFINITY, f64::NEG_INFINITY], integral: 0.0 }
+    }
+
+    /// Begins anew at a time in s, at the next step.
+    pub fn restart(&mut self, start: f64) {
+        self.steps.clear();
+        *self = Self { steps: std::mem::take(&mut self.steps), start, ..Self::new() };
+    }
+
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, step: CubicStep) {
+        let [low, high] = step.bounds();
+        self.bounds = [self.bounds[0].min(low), self.bounds[1].max(high)];
+        self.integral += step.integral();
+        self.steps.push(step);
+    }
+
+    /// The segment up to s in the last step, with `origin` s to add to times in the frame.
+    #[inline]
+    pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {
+        let (first, last) = (self.steps.first()?, self.steps.last()?);
+        let steps = (self.steps.len() - 1) as f64 + s - self.first;
+        let before = if self.first > 0.0 { first.integral_to(self.first) } else { 0.0 };
+        let beyond = if s < 1.0 { last.integral() - last.integral_to(s) } else { 0.0 };
+        let path = ForcePath::Grid {
+            steps: &self.steps,
+            first: self.first,
+            spacing,
+            bounds: self.bounds,
+            end: last.value(s),
+            integral: self.integral - before - beyond,
+        };
+        Some(Segment { start: origin + self.start, duration: steps * spacing, path })
+    }
+
+    /// Forgets all before s in the last step, which is at a time in s.
+    #[inline]
+    pub fn forget_to(&mut self, s: f64, time: f64) {
+        let last = self.steps.pop();
+        self.restart(time);
+        if let Some(last) = last.filter(|_| s < 1.0) {
+            self.push(last);
+            self.first = s;
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Resolved motion on a constant grid of time: steps of two stencils ([`step`]), corrected for contact events where
+//! they happen ([`events`]). Errors are of fourth order in the step, so that one tolerance steers it.
+//!
+//! Cheaper than Taylor steps by a factor at tolerances of 1e-7 and above: nothing is redone when an event comes.
+
+mod events;
+mod history;
+mod step;
+
+pub(super) use self::step::{GridDrive, GridStep, velocity};
+
+use self::events::{StepEvents, change_contacts};
+use self::history::ForceHistory;
+use self::step::{MAX_RUN, march};
+use super::Integration;
+use super::chain::{Chain, State};
+use super::frame::{Frame, MIN_RESOLUTION};
+use super::simd::Simd;
+use super::slider::Slider;
+use super::taylor::StepInput;
+use crate::model::equation::largest_frequency;
+use crate::model::{Change, Parameters};
+use crate::solver::segment::CubicStep;
+use crate::solver::{Observer, SimulationError};
+
+/// Step in units of 1/ω_max at a tolerance of 1e-3, and at most: stable below 2√3.
+const STEP_AT_DEFAULT: f64 = 2.0;
+const MAX_STEP: f64 = 2.5;
+/// The step in units of 1/ω_s of a block on its contacts alone, by that in units of 1/ω_max.
+const CONTACT_SHARE: f64 = 0.12;
+/// Time in the frame at which it moves, in s: rounding is far below the errors of the grid.
+pub(super) const FRAME_SPAN: f64 = 0.5;
+/// Steps of history after which it is told.
+const MAX_HISTORY: usize = 4 * MAX_RUN;
+
+/// Length of a step for a tolerance relative to the contact reach, in s.
+fn step_length(parameters: &Parameters, tolerance: f64) -> f64 {
+    let share = (STEP_AT_DEFAULT * (tolerance / 1e-3).sqrt().sqrt()).min(MAX_STEP);
+    let contacts = (parameters.block_contact_stiffness() / parameters.block_mass()).sqrt();
+    let fastest = largest_frequency(parameters)
+        .max(2.0 / CONTACT_SHARE * contacts)
+        .max(4.0 * parameters.damping_rate)
+        .max(8.0 * parameters.largest_modulation_frequency());
+    share / fastest
+}
+
+/// The grid, and the motion while it is on it.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    pub step: GridStep,
+    /// Whether the motion is on it: displacements are then those of the slider, velocities are not.
+    pub is_on: bool,
+    pub drive: GridDrive,
+    events: StepEvents,
+    /// Shear force since the last segment told.
+    history: ForceHistory,
+    /// Shear force at the present point, in N.
+    force: f64,
+    /// The state one step before an entry.
+    before: State,
+}
+
+impl Grid {
+    pub fn new(parameters: &Parameters, tolerance: f64, chain: &Chain, state: &State) -> Self {
+        Self {
+            step: GridStep::new(parameters, chain, step_length(parameters, tolerance)),
+            is_on: false,
+            drive: GridDrive::default(),
+            events: StepEvents::default(),
+            history: ForceHistory::new(),
+            force: 0.0,
+            before: state.clone(),
+        }
+    }
+
+    /// Whether a clock that runs to [`FRAME_SPAN`] resolves the step.
+    pub fn is_resolved(parameters: &Parameters, tolerance: f64) -> bool {
+        step_length(parameters, tolerance) >= MIN_RESOLUTION * f64::EPSILON * FRAME_SPAN
+    }
+
+    /// Whether attachments are told.
+    pub fn follows_attachments(&mut self, follows: bool) {
+        self.events.follows_attachments = follows;
+    }
+
+    /// Takes over a frame that has moved.
+    pub fn follow_frame(&mut self, chain: &Chain, frame: &Frame) {
+        self.step.update_all(chain);
+        self.drive = frame.grid_drive(self.step.length);
+        self.history.restart(frame.time);
+    }
+
+    /// Adds the last run of steps to the history, but for its last step. `before` is the shear force one step before
+    /// its start. Returns the force at the start of the last step and its second derivative there, in N.
+    #[inline(always)]
+    fn follow_run(&mut self, before: f64) -> [f64; 2] {
+        let (mut before, mut here) = (before, self.force);
+        let mut bend = (self.step.trail[0] - here) - (here - before);
+        for pair in self.step.trail.windows(2) {
+            let [next, beyond] = [pair[0], pair[1]];
+            let next_bend = (beyond - next) - (next - here);
+            self.history.push(CubicStep { force: [here, next], bend: [bend, next_bend] });
+            (before, here, bend) = (here, next, next_bend);
+        }
+        let _ = before;
+        [here, bend]
+    }
+
+    /// Adds the last step to the history, once its events are known. The drive was `drive` at its start.
+    #[inline(always)]
+    fn follow_last(&mut self, chain: &Chain, state: &State, [force, bend]: [f64; 2], start_bend: f64) {
+        let (step, drive) = (&self.step, &self.drive);
+        let x = |block: usize| if block < chain.layout.blocks { chain.at(&state.displacement, block) } else { 0.0 };
+        let (here, rise) = (x(0), step.increment[0][0]);
+        let own = step.force_on(0, 0, [0.0, here, x(1)]) + step.pulling * drive.displacement();
+        // h² x'' at the start of the step and, from the law of motion, at its end.
+        let first = start_bend - bend * step.inverse_stiffness;
+        let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;
+        let end = chain.drive_stiffness * (drive.displacement() - here);
+        let end_bend = chain.drive_stiffness * (drive.bend() - last);
+        self.history.push(CubicStep { force: [force, end], bend: [bend, end_bend] });
+        self.force = end;
+    }
+}
+
+/// Takes at most `steps` steps from `time` s in the frame on, and none after one with an event. Returns how many.
+#[inline(always)]
+pub(super) fn advance<S: Simd, const R: usize>(
+    simd: S,
+    slider: &mut Slider,
+    grid: &mut Grid,
+    time: f64,
+    steps: usize,
+) -> usize {
+    let Slider { chain, state, .. } = slider;
+    let before = chain.drive_stiffness
+        * (grid.drive.displacement_before() - (state.displacement[0][0] - grid.step.increment[0][0]));
+    let done = march::<S, R>(simd, chain, &mut grid.step, &mut grid.drive, &mut state.displacement, steps);
+    let at_start = grid.follow_run(before);
+    let start_bend = grid.drive.bend_before();
+    let start = time + (done - 1) as f64 * grid.step.length;
+    grid.events.events.clear();
+    (grid.events.breaks, grid.events.reattachments) = (0, 0);
+    if !grid.step.reached.is_empty() || slider.interface.next_reattachment() <= start + grid.step.length {
+        change_contacts(slider, grid, start);
+    }
+    grid.follow_last(&slider.chain, &slider.state, at_start, start_bend);
+    done
+}
+
+impl Integration<'_> {
+    /// Takes the motion on the grid, from the state.
+    fn enter_grid(&mut self) -> Result<(), SimulationError> {
+        let length = self.grid.step.length;
+        if !self.frame.resolves(length) {
+            return Err(SimulationError::StepTooShort { time: self.frame.now(), step: length });
+        }
+        let drive = self.frame.drive_derivatives(length);
+        let input = StepInput { length, error: self.tolerances.step_error, min_order: 0, drive };
+        let (chain, state) = (&self.slider.chain, &self.slider.state);
+        if !self.kernels.expand(chain, state, &input, &mut self.step.series) {
+            return Err(SimulationError::NotFinite { time: self.frame.now() });
+        }
+        let grid = &mut self.grid;
+        self.kernels.evaluate(&self.step.series, -1.0, length, &mut grid.before);
+        for ((increment, now), before) in
+            grid.step.increment.iter_mut().zip(&state.displacement).zip(&grid.before.displacement)
+        {
+            for lane in 0..increment.len() {
+                increment[lane] = now[lane] - before[lane];
+            }
+        }
+        grid.step.update_all(chain);
+        grid.drive = self.frame.grid_drive(length);
+        grid.force = self.frame.shear_force(state.displacement[0][0]);
+        grid.history.restart(self.frame.time);
+        grid.is_on = true;
+        Ok(())
+    }
+
+    /// Completes the state, if it is on the grid, by velocities, and tells what is left to tell.
+    pub(super) fn update_velocities(&mut self, observer: &mut dyn Observer) {
+        if self.grid.is_on {
+            self.tell_force(1.0, observer);
+            let Self { kernels, slider, grid, .. } = self;
+            kernels.velocity(&slider.chain, &mut grid.step, &grid.drive, &mut slider.state);
+            self.frame.set_time(self.frame.time);
+        }
+    }
+
+    /// Takes the motion off the grid.
+    pub(super) fn leave_grid(&mut self, observer: &mut dyn Observer) {
+        self.update_velocities(observer);
+        self.grid.is_on = false;
+    }
+
+    /// Takes steps of the grid, to the end of the next that holds an event, within `horizon` s. False if none has room.
+    pub(super) fn take_grid_steps(
+        &mut self,
+        horizon: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<bool, SimulationError> {
+        let length = self.grid.step.length;
+        let room = horizon / length;
+        if room < 1.0 {
+            self.leave_grid(observer);
+            return Ok(false);
+        }
+        if !self.grid.is_on {
+            self.enter_grid()?;
+        }
+        let until_attach = (self.slider.interface.next_reattachment() - self.frame.time) / length;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small and not negative")]
+        let steps = (MAX_RUN as f64).min(room.floor()).min(until_attach.ceil().max(1.0)) as usize;
+        let done = self.kernels.advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
+        self.summary.steps += done as u64;
+        self.summary.grid_steps += done as u64;
+        self.summary.breaks += self.grid.events.breaks;
+        self.summary.reattachments += self.grid.events.reattachments;
+        let start = self.frame.time + (done - 1) as f64 * length;
+        self.frame.time += done as f64 * length;
+        self.tell_events(start, observer);
+        self.largest_force = self.largest_force.max(self.grid.force);
+        if self.grid.history.len() > MAX_HISTORY {
+            self.tell_force(1.0, observer);
+        }
+        Ok(true)
+    }
+
+    /// Tells the shear force up to s in the last step.
+    fn tell_force(&mut self, s: f64, observer: &mut dyn Observer) {
+        let length = self.grid.step.length;
+        let grid = &mut self.grid;
+        if let Some(segment) = grid.history.segment_to(s, length, self.frame.absolute_time(0.0)) {
+            observer.advance(&segment);
+            self.largest_force = self.largest_force.max(segment.end_force());
+            grid.history.forget_to(s, self.frame.time - (1.0 - s) * length);
+        }
+    }
+
+    /// Tells the shear force up to the last event of the last step, and the events.
+    fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
+        let Some(last) = self.grid.events.events.last() else { return };
+        let s = ((last.time - start) / self.grid.step.length).clamp(0.0, 1.0);
+        if self.grid.events.events.iter().any(|event| event.change == Change::Break) {
+            self.largest_force = f64::NEG_INFINITY;
+        }
+        self.tell_force(s, observer);
+        for event in &self.grid.events.events {
+            observer.contact(&self.frame.absolute(*event));
+        }
+    }
+}

@@ -1,0 +1,461 @@
+//! One step of the grid: a recurrence of two stencils, of fourth order in ω_max h.
+//!
+//! With h constant, σ = γh/2, e = exp(-σ), Z = h² S/m and φ_n = h² f_n, where f is all force per mass but the damping,
+//!
+//! ```text
+//! x_{n+1} - x_n = e² (x_n - x_{n-1}) + e (g1 φ_n - g2 Z φ_n + g2 h² (h² K_d/m) (u'' + γ u')),
+//! g1 = sinh σ/σ,   g2 = (cosh σ - sinh σ/σ)/(4 σ²) = 1/12 + σ²/120 + ...
+//! ```
+//!
+//! the expansion in Z of the exact recurrence of a damped oscillator, 2 e cos(√(Z - σ²)); the last term is what the
+//! drive u adds to the second derivative of the force. It is exact for damping, for equilibrium and for uniform motion.
+//! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present law.
+
+use super::super::chain::{Chain, State};
+use super::super::simd::{Simd, Vector};
+use super::events::Correction;
+use crate::model::{LANES, Parameters, Row};
+
+/// Longest run of steps without a look at the clock.
+pub(super) const MAX_RUN: usize = 64;
+
+/// The drive's displacement at a point of the grid, and what takes it to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct GridDrive {
+    /// Displacement of the ramp, in m, and its rise in a step.
+    pub ramp: [f64; 2],
+    /// Δ cos θ and -Δ sin θ at the phase θ, in m.
+    pub swing: [f64; 2],
+    /// Sine and cosine of the turn ωh of a step.
+    pub turn: [f64; 2],
+    /// ωh, in rad; 0 without modulation.
+    pub angle: f64,
+}
+
+impl GridDrive {
+    /// Displacement, in m.
+    #[inline(always)]
+    pub fn displacement(&self) -> f64 {
+        self.ramp[0] + self.swing[0]
+    }
+
+    /// Displacement one step before, in m.
+    #[inline(always)]
+    pub fn displacement_before(&self) -> f64 {
+        (self.ramp[0] - self.ramp[1]) + self.swing_before()
+    }
+
+    /// Δ cos θ one step before, in m.
+    #[inline(always)]
+    fn swing_before(&self) -> f64 {
+        self.swing[0] * self.turn[1] - self.swing[1] * self.turn[0]
+    }
+
+    /// h² u'' one step before, in m.
+    #[inline(always)]
+    pub fn bend_before(&self) -> f64 {
+        -self.angle * self.angle * self.swing_before()
+    }
+
+    /// h u', in m.
+    #[inline(always)]
+    pub fn increment(&self) -> f64 {
+        self.ramp[1] + self.angle * self.swing[1]
+    }
+
+    /// h² u'', in m.
+    #[inline(always)]
+    pub fn bend(&self) -> f64 {
+        -self.angle * self.angle * self.swing[0]
+    }
+
+    /// Moves on by a step.
+    #[inline(always)]
+    pub fn advance(&mut self) {
+        self.ramp[0] += self.ramp[1];
+        if self.angle != 0.0 {
+            let ([sine, cosine], [along, across]) = (self.turn, self.swing);
+            // Δ cos(θ + ωh) and -Δ sin(θ + ωh).
+            self.swing = [along * cosine + across * sine, across * cosine - along * sine];
+        }
+    }
+}
+
+/// What a step multiplies with, in units of h².
+#[derive(Clone, Debug)]
+pub(in super::super) struct GridStep {
+    /// Length h, in s, its inverse and its square.
+    pub length: f64,
+    pub inverse_length: f64,
+    pub square: f64,
+    /// γh, and 1/(1 - (γh)²/12).
+    pub damping: f64,
+    pub inverse_damped: f64,
+    /// 1/(1 + γh/3), and 1/K_d in m/N.
+    pub inverse_end: f64,
+    pub inverse_stiffness: f64,
+    /// h²/m, in m/N.
+    pub by_mass: f64,
+    /// e², e g1 and e g2.
+    decay: f64,
+    first: f64,
+    second: f64,
+    /// h² K_int/m and h² K_d/m.
+    pub coupling: f64,
+    pub pulling: f64,
+    /// A row a block: h² times pull; minus h² times the diagonal; e (g1 - g2 h² diagonal).
+    pull: Vec<Row>,
+    diagonal: Vec<Row>,
+    own: Vec<Row>,
+    /// Nearest break positions, in m.
+    upper: Vec<Row>,
+    lower: Vec<Row>,
+    /// h² times the coupling, and e g2 times that; 0 in padding.
+    couplings: Vec<Row>,
+    second_couplings: Vec<Row>,
+    /// Increments q_n, in m.
+    pub increment: Vec<Row>,
+    /// φ_n of the last step, in m.
+    pub force: Vec<Row>,
+    /// Shear force at the points of the last run but the first, in N.
+    pub trail: Vec<f64>,
+    /// Row and lane of every block that reached a break position in the last step.
+    pub reached: Vec<(usize, usize)>,
+    /// Work space.
+    saved_displacement: Vec<Row>,
+    saved_increment: Vec<Row>,
+}
+
+impl GridStep {
+    /// Steps of `length` s.
+    pub fn new(parameters: &Parameters, chain: &Chain, length: f64) -> Self {
+        let layout = chain.layout;
+        let square = length * length;
+        let half = 0.5 * parameters.damping_rate * length;
+        let [g1, g2] = weights(half);
+        let decay = libm::exp(-half);
+        let mut step = Self {
+            length,
+            inverse_length: 1.0 / length,
+            square,
+            damping: 2.0 * half,
+            inverse_damped: 1.0 / (1.0 - half * half / 3.0),
+            inverse_end: 1.0 / (1.0 + 2.0 / 3.0 * half),
+            inverse_stiffness: 1.0 / chain.drive_stiffness,
+            by_mass: square / chain.mass,
+            decay: decay * decay,
+            first: decay * g1,
+            second: decay * g2,
+            coupling: square * chain.coupling[0][0],
+            pulling: square * chain.drive_stiffness / chain.mass,
+            pull: layout.filled(0.0),
+            diagonal: layout.filled(0.0),
+            own: layout.filled(0.0),
+            upper: layout.filled(f64::INFINITY),
+            lower: layout.filled(f64::NEG_INFINITY),
+            couplings: chain.coupling.clone(),
+            second_couplings: chain.coupling.clone(),
+            increment: layout.filled(0.0),
+            force: layout.filled(0.0),
+            trail: Vec::with_capacity(MAX_RUN),
+            reached: Vec::new(),
+            saved_displacement: layout.filled(0.0),
+            saved_increment: layout.filled(0.0),
+        };
+        for (first, second) in step.couplings.iter_mut().zip(&mut step.second_couplings) {
+            for (first, second) in first.iter_mut().zip(second.iter_mut()) {
+                *first *= square;
+                *second *= square * step.second;
+            }
+        }
+        step
+    }
+
+    /// The coefficients of the block in a slot: pull, diagonal, own.
+    #[inline(always)]
+    fn coefficients(&self, chain: &Chain, row: usize, lane: usize) -> [f64; 3] {
+        let diagonal = self.square * chain.diagonal[row][lane];
+        [self.square * chain.pull[row][lane], -diagonal, self.first - self.second * diagonal]
+    }
+
+    /// Takes over the coefficients of all blocks.
+    pub fn update_all(&mut self, chain: &Chain) {
+        for row in 0..chain.layout.rows {
+            for lane in 0..LANES {
+                [self.pull[row][lane], self.diagonal[row][lane], self.own[row][lane]] =
+                    self.coefficients(chain, row, lane);
+            }
+        }
+        self.upper.copy_from_slice(&chain.upper);
+        self.lower.copy_from_slice(&chain.lower);
+    }
+
+    /// Takes over the coefficients of a block, and the corrections to its motion and to that of the blocks beside.
+    #[inline(always)]
+    pub(super) fn correct(
+        &mut self,
+        chain: &Chain,
+        block: usize,
+        (row, lane): (usize, usize),
+        [own, beside]: [Correction; 2],
+        displacement: &mut [Row],
+    ) {
+        let [pull, diagonal, own_coefficient] = self.coefficients(chain, row, lane);
+        self.pull[row].set(lane, pull);
+        self.diagonal[row].set(lane, diagonal);
+        self.own[row].set(lane, own_coefficient);
+        self.upper[row].set(lane, chain.upper[row][lane]);
+        self.lower[row].set(lane, chain.lower[row][lane]);
+        add(displacement, row, lane, own.displacement);
+        add(&mut self.increment, row, lane, own.increment);
+        if beside.displacement != 0.0 || beside.increment != 0.0 {
+            let [before, after] = chain.layout.beside(row, lane);
+            for (row, lane) in before.into_iter().chain(after.filter(|_| block + 1 < chain.layout.blocks)) {
+                add(displacement, row, lane, beside.displacement);
+                add(&mut self.increment, row, lane, beside.increment);
+            }
+        }
+    }
+
+    /// φ of the block in a slot at given displacements of it and of its neighbours, but for the drive, in m.
+    #[inline]
+    pub fn force_on(&self, row: usize, lane: usize, [before, here, after]: [f64; 3]) -> f64 {
+        self.coupling * (before + after) + (self.diagonal[row][lane] * here + self.pull[row][lane])
+    }
+}
+
+/// g1 and g2 at σ.
+fn weights(half: f64) -> [f64; 2] {
+    if half < 0.1 {
+        let square = half * half;
+        let g1 = 1.0 + square / 6.0 * (1.0 + square / 20.0 * (1.0 + square / 42.0));
+        let g2 = (1.0 + square / 10.0 * (1.0 + square / 28.0 * (1.0 + square / 54.0))) / 12.0;
+        [g1, g2]
+    } else {
+        let g1 = libm::sinh(half) / half;
+        [g1, (libm::cosh(half) - g1) / (4.0 * half * half)]
+    }
+}
+
+/// Block 1, at which the drive pulls.
+const FIRST_LANE: Row = {
+    let mut row = Row::filled(0.0);
+    row.0[0] = 1.0;
+    row
+};
+
+/// Takes at most `steps` steps, and none after one in which a block reaches a break position. Returns how many.
+#[inline(always)]
+pub(super) fn march<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &mut GridDrive,
+    displacement: &mut [Row],
+    steps: usize,
+) -> usize {
+    let rows = if R == 0 { chain.layout.rows } else { R };
+    let x = &mut displacement[..rows];
+    step.trail.clear();
+    step.reached.clear();
+    let (done, is_reached) = if R > 0 && S::HAS_MANY_REGISTERS {
+        march_in_registers::<S, R>(simd, chain, step, drive, x, steps)
+    } else {
+        march_in_memory(simd, chain, step, drive, x, steps)
+    };
+    if is_reached {
+        note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
+    }
+    done
+}
+
+/// Adds to one lane.
+#[inline(always)]
+fn add(rows: &mut [Row], row: usize, lane: usize, value: f64) {
+    let sum = rows[row][lane] + value;
+    rows[row].set(lane, sum);
+}
+
+/// Steps with all rows in memory.
+#[inline(always)]
+fn march_in_memory<S: Simd>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &mut GridDrive,
+    x: &mut [Row],
+    steps: usize,
+) -> (usize, bool) {
+    let rows = x.len();
+    let last = rows - 1;
+    let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
+    let (pull, diagonal, own) = (&step.pull[..rows], &step.diagonal[..rows], &step.own[..rows]);
+    let (couplings, second_couplings) = (&step.couplings[..rows], &step.second_couplings[..rows]);
+    let (upper, lower) = (&step.upper[..rows], &step.lower[..rows]);
+    let first_lane = simd.load(&FIRST_LANE);
+    let decay = simd.splat(step.decay);
+    for done in 1..=steps {
+        let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
+        // φ of every block.
+        let mut before = simd.load(&x[last]).to_next_lane();
+        let mut here = simd.load(&x[0]);
+        let beyond = here.to_lane_before();
+        for r in 0..rows {
+            let after = if r < last { simd.load(&x[r + 1]) } else { beyond };
+            let mut own = simd.load(&pull[r]);
+            if r == 0 {
+                own = first_lane.mul_add(simd.splat(push), own);
+            }
+            let own = here.mul_add(simd.load(&diagonal[r]), own);
+            before.plus(after).mul_add(simd.load(&couplings[r]), own).store(&mut force[r]);
+            (before, here) = (here, after);
+        }
+        // The increments, and where they take the blocks.
+        let mut before = simd.load(&force[last]).to_next_lane();
+        let mut here = simd.load(&force[0]);
+        let beyond = here.to_lane_before();
+        let mut reached = 0;
+        for r in 0..rows {
+            let after = if r < last { simd.load(&force[r + 1]) } else { beyond };
+            let mut kept = simd.load(&q[r]).times(decay);
+            if r == 0 {
+                kept = first_lane.mul_add(simd.splat(correction), kept);
+            }
+            let own = here.mul_add(simd.load(&own[r]), kept);
+            let next = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
+            let moved = simd.load(&x[r]).plus(next);
+            next.store(&mut q[r]);
+            moved.store(&mut x[r]);
+            reached |= moved.reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(moved);
+            (before, here) = (here, after);
+        }
+        drive.advance();
+        step.trail.push(chain.drive_stiffness * (drive.displacement() - x[0][0]));
+        if reached != 0 {
+            return (done, true);
+        }
+    }
+    (steps, false)
+}
+
+/// The same with displacements, increments and forces in registers.
+#[inline(always)]
+fn march_in_registers<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &mut GridDrive,
+    rows: &mut [Row],
+    steps: usize,
+) -> (usize, bool) {
+    let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
+    let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
+    let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
+    let first_lane = simd.load(&FIRST_LANE);
+    let decay = simd.splat(step.decay);
+    let (mut x, mut q, mut force) = ([decay; R], [decay; R], [decay; R]);
+    for r in 0..R {
+        (x[r], q[r]) = (simd.load(&rows[r]), simd.load(&step.increment[r]));
+    }
+    let mut done = 0;
+    let is_reached = loop {
+        done += 1;
+        let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
+        for r in 0..R {
+            let before = if r > 0 { x[r - 1] } else { x[R - 1].to_next_lane() };
+            let after = if r + 1 < R { x[r + 1] } else { x[0].to_lane_before() };
+            let mut own = simd.load(&pull[r]);
+            if r == 0 {
+                own = first_lane.mul_add(simd.splat(push), own);
+            }
+            let own = x[r].mul_add(simd.load(&diagonal[r]), own);
+            force[r] = before.plus(after).mul_add(simd.load(&couplings[r]), own);
+        }
+        let mut reached = 0;
+        for r in 0..R {
+            let before = if r > 0 { force[r - 1] } else { force[R - 1].to_next_lane() };
+            let after = if r + 1 < R { force[r + 1] } else { force[0].to_lane_before() };
+            let mut kept = q[r].times(decay);
+            if r == 0 {
+                kept = first_lane.mul_add(simd.splat(correction), kept);
+            }
+            let own = force[r].mul_add(simd.load(&own[r]), kept);
+            q[r] = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
+            x[r] = x[r].plus(q[r]);
+            reached |= x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
+        }
+        drive.advance();
+        step.trail.push(chain.drive_stiffness * (drive.displacement() - x[0].first()));
+        if reached != 0 || done == steps {
+            break reached != 0;
+        }
+    };
+    for r in 0..R {
+        x[r].store(&mut rows[r]);
+        q[r].store(&mut step.increment[r]);
+        force[r].store(&mut step.force[r]);
+    }
+    (done, is_reached)
+}
+
+/// What the drive adds to φ of block 1, and to its increment beside, in m.
+#[inline(always)]
+fn pushes(pulling: f64, second: f64, damping: f64, drive: &GridDrive) -> [f64; 2] {
+    [pulling * drive.displacement(), second * pulling * (drive.bend() + damping * drive.increment())]
+}
+
+/// Notes row and lane of every block at or beyond a break position.
+#[inline(always)]
+fn note_reached<S: Simd>(simd: S, [upper, lower]: [&[Row]; 2], x: &[Row], reached: &mut Vec<(usize, usize)>) {
+    for (row, ((x, upper), lower)) in x.iter().zip(upper).zip(lower).enumerate() {
+        let x = simd.load(x);
+        let mut lanes = x.reaches(simd.load(upper)) | simd.load(lower).reaches(x);
+        while lanes != 0 {
+            reached.push((row, lanes.trailing_zeros() as usize));
+            lanes &= lanes - 1;
+        }
+    }
+}
+
+/// Writes the velocities at the present point, in m/s, from a step on a copy: the central difference less the part of
+/// the third derivative, which follows from the derivative of the law of motion.
+#[inline(always)]
+pub(in super::super) fn velocity<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &GridDrive,
+    state: &mut State,
+) {
+    let rows = if R == 0 { chain.layout.rows } else { R };
+    let last = rows - 1;
+    step.saved_displacement.copy_from_slice(&state.displacement);
+    step.saved_increment.copy_from_slice(&step.increment);
+    let mut ahead = *drive;
+    march::<S, R>(simd, chain, step, &mut ahead, &mut state.displacement, 1);
+    state.displacement.copy_from_slice(&step.saved_displacement);
+    // Central differences, in the place of the displacements after the step.
+    let central = &mut step.saved_displacement[..rows];
+    for ((central, before), after) in central.iter_mut().zip(&step.saved_increment).zip(&step.increment) {
+        simd.load(before).plus(simd.load(after)).times(simd.splat(0.5)).store(central);
+    }
+    step.increment.copy_from_slice(&step.saved_increment);
+    let first_lane = simd.load(&FIRST_LANE);
+    let damping = simd.splat(-step.damping);
+    let mut before = simd.load(&central[last]).to_next_lane();
+    let mut here = simd.load(&central[0]);
+    let beyond = here.to_lane_before();
+    for r in 0..rows {
+        let after = if r < last { simd.load(&central[r + 1]) } else { beyond };
+        let bend = here.mul_add(damping, simd.load(&step.force[r]));
+        let mut third = bend.times(damping);
+        if r == 0 {
+            third = first_lane.mul_add(simd.splat(step.pulling * drive.increment()), third);
+        }
+        third = here.mul_add(simd.load(&step.diagonal[r]), third);
+        third = before.plus(after).mul_add(simd.load(&step.couplings[r]), third);
+        let increment = third.mul_add(simd.splat(-1.0 / 6.0), here);
+        increment.times(simd.splat(1.0 / step.length)).store(&mut state.velocity[r]);
+        (before, here) = (here, after);
+    }
+}
