@@ -13,7 +13,7 @@ mod segment;
 
 pub use harmonic::Harmonic;
 pub use ledger::Ledger;
-pub use segment::{ForcePath, Segment};
+pub use segment::{CubicStep, Extremes, ForcePath, Segment};
 
 use self::ledger::Audit;
 use crate::model::equation::stability_limit;

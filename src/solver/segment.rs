@@ -29,13 +29,51 @@ pub enum ForcePath<'a> {
         first: f64,
         /// Length of a step, in s.
         spacing: f64,
-        /// Lower and upper bound on F_S, in N.
-        bounds: [f64; 2],
+        /// Extremes of F_S over all steps but the first and the last.
+        inner: Extremes,
         /// F_S at the end, in N.
         end: f64,
         /// Integral of F_S over the segment by steps, in N.
         integral: f64,
     },
+}
+
+/// The largest and the least of something over a number of steps: how many steps from the beginning, and in N.
+#[derive(Clone, Copy, Debug)]
+pub struct Extremes {
+    /// The largest.
+    pub largest: (f64, f64),
+    /// The least.
+    pub least: (f64, f64),
+}
+
+impl Extremes {
+    /// Of nothing.
+    pub(super) const NONE: Self = Self { largest: (0.0, f64::NEG_INFINITY), least: (0.0, f64::INFINITY) };
+
+    /// Takes in a value.
+    #[inline(always)]
+    fn include(&mut self, at: f64, value: f64) {
+        if value > self.largest.1 {
+            self.largest = (at, value);
+        }
+        if value < self.least.1 {
+            self.least = (at, value);
+        }
+    }
+
+    /// Takes in a whole step, which begins after `begin` steps.
+    #[inline(always)]
+    pub(super) fn include_step(&mut self, begin: f64, step: &CubicStep) {
+        self.include(begin, step.force[0]);
+        self.include(begin + 1.0, step.force[1]);
+        if step.turns() {
+            for sign in [1.0, -1.0] {
+                let (s, value) = step.maximum(sign, 0.0, 1.0);
+                self.include(begin + s, sign * value);
+            }
+        }
+    }
 }
 
 /// The shear force over one step of a grid: a cubic, of which the second derivative is linear.
@@ -105,9 +143,19 @@ impl CubicStep {
         s * (c0 + s * (c1 / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
     }
 
+    /// Whether F_S has an extreme within the step: its slope changes sign, from end to end or up to where it is steepest.
+    #[inline(always)]
+    fn turns(&self) -> bool {
+        let ([start, end], [from, to]) = (self.force, self.bend);
+        let rise = 6.0 * (end - start);
+        let [first, last] = [rise - (2.0 * from + to), rise + (from + 2.0 * to)];
+        let change = from - to;
+        first * last <= 0.0 || (from * to < 0.0 && (first * change + 3.0 * from * from) * change * first < 0.0)
+    }
+
     /// Lower and upper bound on F_S, in N.
     #[inline(always)]
-    pub(super) fn bounds(&self) -> [f64; 2] {
+    fn bounds(&self) -> [f64; 2] {
         let ([start, end], [from, to]) = (self.force, self.bend);
         let largest = |a: f64, b: f64| if a > b { a } else { b };
         let spread = 0.125 * largest(from.abs(), to.abs());
@@ -211,7 +259,10 @@ impl Segment<'_> {
                 let end = start + rate * self.duration;
                 (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
             }
-            ForcePath::Grid { bounds: [low, high], .. } => (low, high),
+            ForcePath::Grid { steps, inner, .. } => {
+                let [first, last] = [&steps[0], &steps[steps.len() - 1]].map(CubicStep::bounds);
+                (inner.least.1.min(first[0]).min(last[0]), inner.largest.1.max(first[1]).max(last[1]))
+            }
         }
     }
 
@@ -312,22 +363,24 @@ impl Segment<'_> {
                     },
                 )
             }
-            ForcePath::Grid { first, spacing, bounds: [low, high], .. } => {
-                if (if sign > 0.0 { high } else { -low }) <= floor {
-                    return None;
-                }
-                // From the end on, since the force mostly rises.
-                let mut best = (0.0, f64::NEG_INFINITY);
-                for (begin, cubic, [from, to]) in self.cubics().rev() {
+            ForcePath::Grid { steps, first, spacing, inner, .. } => {
+                let (at, value) = if sign > 0.0 { inner.largest } else { inner.least };
+                let (mut at, mut extreme) = (at, sign * value);
+                let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
                     let [low, high] = cubic.bounds();
-                    if (if sign > 0.0 { high } else { -low }) > best.1.max(floor) {
+                    if (if sign > 0.0 { high } else { -low }) > if extreme > floor { extreme } else { floor } {
                         let (s, value) = cubic.maximum(sign, from, to);
-                        if value > best.1 {
-                            best = ((begin + s - first) * spacing, value);
-                        }
+                        (at, extreme) = if value > extreme { (begin + s, value) } else { (at, extreme) };
                     }
+                };
+                // The last first, since the force mostly rises.
+                let begin = (steps.len() - 1) as f64;
+                let to = (first + self.duration / spacing - begin).min(1.0);
+                offer(begin, &steps[steps.len() - 1], if begin > 0.0 { 0.0 } else { first }, to);
+                if begin > 0.0 {
+                    offer(0.0, &steps[0], first, 1.0);
                 }
-                best
+                ((at - first) * spacing, extreme)
             }
         };
         (extreme > floor).then_some((self.start + elapsed, extreme))
@@ -374,14 +427,14 @@ mod tests {
                 .collect();
             let last = (steps.len() - 1) as f64 + if steps.len() == 1 { first + (1.0 - first) * s } else { s };
             let spacing = 0.25;
-            let bounds = steps.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], step| {
-                let of_step = step.bounds();
-                [low.min(of_step[0]), high.max(of_step[1])]
-            });
+            let mut inner = Extremes::NONE;
+            for (begin, step) in steps.iter().enumerate().take(steps.len() - 1).skip(1) {
+                inner.include_step(begin as f64, step);
+            }
             let whole: f64 = steps[..steps.len() - 1].iter().map(CubicStep::integral).sum();
             let integral = whole + steps[steps.len() - 1].integral_to(last.fract()) - steps[0].integral_to(first);
             let end = steps[steps.len() - 1].value(last - (steps.len() - 1) as f64);
-            let path = ForcePath::Grid { steps: &steps, first, spacing, bounds, end, integral };
+            let path = ForcePath::Grid { steps: &steps, first, spacing, inner, end, integral };
             let segment = Segment { start: 3.0, duration: (last - first) * spacing, path };
             assert_turns(&segment);
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));

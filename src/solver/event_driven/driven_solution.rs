@@ -115,6 +115,16 @@ impl DrivenSolution {
         })
     }
 
+    /// Displacement of a block after `elapsed` s, in m.
+    pub fn displacement(&self, drive: &Harmonic, block: usize, elapsed: f64) -> f64 {
+        let ramp = self.start[block] + self.rate[block] * elapsed;
+        if drive.amplitude == 0.0 {
+            return ramp;
+        }
+        let (sine, cosine) = libm::sincos(drive.turn(elapsed));
+        ramp + product(self.wave[block], [cosine, sine])[0]
+    }
+
     /// Writes displacements and velocities after `elapsed` s, in m and m/s.
     pub fn evaluate(&self, drive: &Harmonic, elapsed: f64, displacement: &mut [f64], velocity: &mut [f64]) {
         let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };

@@ -40,6 +40,8 @@ pub(super) struct FreeMotion {
     pub shifted_velocity: Vec<f64>,
     /// Bound on |y| from now on, before its decay, in m.
     pub bound: Vec<f64>,
+    /// m (S'⁻¹)_jj, in s²: how far a force on a block displaces it, per mass.
+    pub compliance: Vec<f64>,
 }
 
 /// The motion of the blocks, and what it is split into; one entry a block.
@@ -63,6 +65,7 @@ impl SplitMotion {
             displacement: zeros.clone(),
             shifted_velocity: zeros.clone(),
             bound: zeros.clone(),
+            compliance: zeros.clone(),
         };
         let driven = DrivenSolution::new(layout.blocks);
         Self { displacement: zeros.clone(), velocity: zeros, driven, free }
@@ -180,11 +183,13 @@ impl FreeMotion {
         let shift = self.shift(chain);
         let [ahead, ahead_beyond] = self.ahead.each_ref().map(|minors| &minors[..blocks]);
         let [behind, behind_beyond] = self.behind.each_ref().map(|minors| &minors[..blocks]);
-        let (diagonal, bound) = (&chain.per_block.diagonal[..blocks], &mut self.bound[..blocks]);
+        let diagonal = &chain.per_block.diagonal[..blocks];
+        let (bound, compliance) = (&mut self.bound[..blocks], &mut self.compliance[..blocks]);
         for j in 0..blocks {
             // 1/(ahead/beyond + behind/beyond - diagonal), with one division.
             let beyond = ahead_beyond[j] * behind_beyond[j];
             let own = ahead[j] * behind_beyond[j] + behind[j] * ahead_beyond[j] - (diagonal[j] - shift) * beyond;
+            compliance[j] = beyond / own;
             bound[j] = (2.0 * energy * beyond / own).sqrt();
         }
         bound.iter().fold(0.0, |largest, bound| if *bound > largest { *bound } else { largest })

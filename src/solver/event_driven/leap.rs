@@ -21,6 +21,12 @@ use std::f64::consts::TAU;
 /// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
 
+/// Part of the error of a leap that the reattachments passed by it may add up to.
+const PASSED_SHARE: f64 = 0.2;
+
+/// Free motion at which a contact may attach on the driven solution, in errors of a leap.
+const LOOSE: f64 = 3.0;
+
 /// Part of the error of a leap that each term which the propagator leaves out may have.
 const PROPAGATED_SHARE: f64 = 1e-3;
 
@@ -63,28 +69,77 @@ impl Leap {
         Self { motion: SplitMotion::new(layout), propagator: ChebyshevPropagator::new(layout) }
     }
 
+    /// Splits a state into driven solution and free motion. Returns the largest bound on the latter, in m; `None` if it
+    /// does not decay.
+    pub fn split(&mut self, chain: &Chain, kernels: &dyn Kernels, drive: &Harmonic, state: &State) -> Option<f64> {
+        chain.layout.unfold(&state.displacement, &mut self.motion.displacement);
+        chain.layout.unfold(&state.velocity, &mut self.motion.velocity);
+        kernels.split(chain, drive, &mut self.motion)
+    }
+
+    /// Up to when a leap may pass the reattachments that `due` tells one by one, as seconds from now and block, until it
+    /// is told to stop: at most `end`, in s. The free motion is at most `largest` m.
+    ///
+    /// A contact that attaches on the way holds its block back by its stiffness times how far the block has moved since,
+    /// which the driven solution leaves out. The sum of what this displaces may be a part of `error` m.
+    pub fn pass(
+        &self,
+        chain: &Chain,
+        stiffness: f64,
+        reach: f64,
+        drive: &Harmonic,
+        [largest, error]: [f64; 2],
+        end: f64,
+        due: impl FnOnce(&mut dyn FnMut(f64, usize) -> bool),
+    ) -> f64 {
+        let SplitMotion { driven, free, .. } = &self.motion;
+        // By now what attaches is attached where the driven solution is.
+        let loose = libm::log(largest / (LOOSE * error)) / free.decay_rate;
+        let allowed = PASSED_SHARE * error;
+        let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, end);
+        due(&mut |seconds, block| {
+            let gained = rate * (seconds - last);
+            if seconds >= limit || displaced + gained > allowed {
+                return false;
+            }
+            if seconds < loose {
+                limit = seconds;
+                return false;
+            }
+            displaced += gained;
+            last = seconds;
+            let speed = driven.rate[block] + drive.angular_frequency * driven.amplitude(block);
+            rate += stiffness / chain.mass * speed * free.compliance[block];
+            // Nor may it break.
+            limit = limit.min(seconds + 0.5 * reach / speed);
+            true
+        });
+        if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit }
+    }
+
+    /// Displacement of a block along the driven solution after `elapsed` s, in m.
+    pub fn driven_displacement(&self, drive: &Harmonic, block: usize, elapsed: f64) -> f64 {
+        self.motion.driven.displacement(drive, block, elapsed)
+    }
+
     /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above
-    /// `error` m, and writes the state at its end. Shear forces up to `largest_force` N have been seen since the last
-    /// break. `report` receives the shear force on the way, `audit` the energies, unless the free motion was carried
-    /// over.
+    /// `error` m, and writes the state at its end. The state has been split; its free motion is at most `largest` m. Shear
+    /// forces up to `largest_force` N have been seen since the last break. `report` receives the shear force on the way,
+    /// `audit` the energies, unless the free motion was carried over.
     #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it reports")]
     pub fn attempt(
         &mut self,
         chain: &Chain,
         kernels: &dyn Kernels,
         drive: &Harmonic,
+        largest: f64,
         Bounds { horizon, until_cycle_end, error, largest_force }: Bounds,
         state: &mut State,
         report: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
     ) -> Attempt {
         let layout = chain.layout;
-        layout.unfold(&state.displacement, &mut self.motion.displacement);
-        layout.unfold(&state.velocity, &mut self.motion.velocity);
         // Worth another try after some e-foldings of the free motion, or after the next event.
-        let Some(largest) = kernels.split(chain, drive, &mut self.motion) else {
-            return Attempt::Wait { seconds: (2.0 / chain.damping_rate).min(horizon) };
-        };
         let decay_rate = self.motion.free.decay_rate;
         let max_wait = horizon;
         let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(max_wait) };
@@ -248,7 +303,9 @@ mod tests {
         state.displacement[0][0] = amplitude;
         let horizon = 1e9;
         let bounds = Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, largest_force: f64::INFINITY };
-        let attempt = Leap::new(layout).attempt(&chain, &*kernels, &drive, bounds, &mut state, |_| {}, None);
+        let mut leap = Leap::new(layout);
+        let largest = leap.split(&chain, &*kernels, &drive, &state).unwrap();
+        let attempt = leap.attempt(&chain, &*kernels, &drive, largest, bounds, &mut state, |_| {}, None);
         let Attempt::Leapt { elapsed, reached: None, is_carried: true } = attempt else { panic!("{attempt:?}") };
         let angle = squared.sqrt() * elapsed;
         assert!(angle > 1e5 && angle <= MAX_CARRIED_ANGLE, "{angle}");

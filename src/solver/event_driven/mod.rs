@@ -34,8 +34,9 @@ use self::leap::{Attempt, Bounds, Leap};
 use self::slider::Slider;
 use self::step::{Step, StepControl};
 use self::tolerances::Tolerances;
+use super::harmonic::Harmonic;
 use super::ledger::Audit;
-use super::segment::Segment;
+use super::segment::{ForcePath, Segment};
 use super::{GRID_TOLERANCE, Limits, Observer, Resolve, SimulationError, Summary};
 use crate::model::{Drive, Parameters};
 use std::sync::atomic::Ordering;
@@ -121,7 +122,7 @@ impl<'a> Integration<'a> {
     /// has nothing to drop if an observer panics.
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
-        self.grid.follows_attachments(observer.follows_attachments());
+        self.grid.set_tells_attachments(observer.follows_attachments());
         let mut next_check = STEPS_PER_CHECK;
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
@@ -139,14 +140,15 @@ impl<'a> Integration<'a> {
             let until_change = until_cycle_end.min(until_end);
             let until_attach = self.slider.interface.next_reattachment() - self.frame.time;
             let horizon = until_attach.min(until_change);
-            let worthwhile = if self.takes_grid {
-                WORTHWHILE_GRID_LEAP * self.grid.step.length
+            // Leaps from the grid pass reattachments.
+            let is_worthwhile = if self.takes_grid {
+                until_change > WORTHWHILE_GRID_LEAP * self.grid.step.length
             } else {
-                WORTHWHILE_LEAP * self.tolerances.max_step
+                horizon > WORTHWHILE_LEAP * self.tolerances.max_step
             };
-            let leapt = horizon > worthwhile
+            let leapt = is_worthwhile
                 && self.frame.time >= self.next_leap
-                && self.try_leap(horizon, until_cycle_end, observer);
+                && self.try_leap(horizon, [until_change, until_cycle_end], observer);
             let moved = leapt || (self.takes_grid && self.take_grid_steps(until_change, observer)?);
             if !moved {
                 self.take_step(until_change, observer)?;
@@ -187,33 +189,61 @@ impl<'a> Integration<'a> {
         Ok(self.summary)
     }
 
-    /// Tries a leap of at most `horizon` s, in a cycle of the modulation that lasts for another `until_cycle_end` s;
-    /// false if none is allowed yet.
+    /// Tries a leap of at most `horizon` s, or further over reattachments, up to the next change of the drive or the end.
+    /// The cycle of the modulation lasts for another `until_cycle_end` s. False if none is allowed yet.
     #[inline(never)]
-    fn try_leap(&mut self, horizon: f64, until_cycle_end: f64, observer: &mut dyn Observer) -> bool {
+    fn try_leap(
+        &mut self,
+        horizon: f64,
+        [until_change, until_cycle_end]: [f64; 2],
+        observer: &mut dyn Observer,
+    ) -> bool {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
-        let start = self.frame.now();
-        let bounds =
-            Bounds { horizon, until_cycle_end, error: self.tolerances.leap_error, largest_force: self.largest_force };
-        let mut reported = None;
-        let report = |segment: Segment<'static>| {
-            let segment = Segment { start, ..segment };
-            reported = Some(segment);
-            observer.advance(&segment);
+        let (start, began) = (self.frame.now(), self.frame.time);
+        let error = self.tolerances.leap_error;
+        let Slider { chain, state, interface } = &mut self.slider;
+        let Some(largest) = self.leap.split(chain, &*self.kernels, &drive, state) else {
+            let seconds = (2.0 / chain.damping_rate).min(horizon);
+            self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
+            return false;
         };
-        let Slider { chain, state, .. } = &mut self.slider;
+        let mut horizon = horizon;
+        if self.takes_grid {
+            let Tolerances { contact_stiffness, contact_reach, .. } = self.tolerances;
+            let passed = self.leap.pass(
+                chain,
+                contact_stiffness,
+                contact_reach,
+                &drive,
+                [largest, error],
+                until_change,
+                |visit| interface.look_ahead(|due, block| visit(due - began, block)),
+            );
+            horizon = horizon.max(passed);
+            let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
+            if horizon < least {
+                self.next_leap = self.frame.time + least;
+                return false;
+            }
+        }
+        let bounds = Bounds { horizon, until_cycle_end, error, largest_force: self.largest_force };
+        let mut reported = None;
+        let report = |segment: Segment<'static>| reported = Some(Segment { start, ..segment });
         let before = self.audit.is_some().then(|| state.clone());
         let audit = self.audit.as_deref_mut();
-        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, bounds, state, report, audit);
+        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, largest, bounds, state, report, audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
                 false
             }
             Attempt::Leapt { elapsed, reached, is_carried } => {
-                if let (Some(before), Some(reported)) = (before.filter(|_| is_carried), reported) {
-                    self.audit_carried_leap(before, &reported);
+                if let Some(reported) = &reported {
+                    self.tell_leap(reported, &drive, began, observer);
+                    if let Some(before) = before.filter(|_| is_carried) {
+                        self.audit_carried_leap(before, reported);
+                    }
                 }
                 self.grid.is_on = false;
                 self.summary.steps += 1;
@@ -230,6 +260,30 @@ impl<'a> Integration<'a> {
                 true
             }
         }
+    }
+
+    /// Tells the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
+    /// it passed.
+    fn tell_leap(&mut self, leap: &Segment<'static>, drive: &Harmonic, began: f64, observer: &mut dyn Observer) {
+        let ForcePath::Harmonic(path) = leap.path else { unreachable!("a leap follows the driven solution") };
+        let mut told = 0.0;
+        let mut tell = |until: f64, observer: &mut dyn Observer| {
+            let path = Harmonic { start: path.start + path.rate * told, phase: path.phase + path.turn(told), ..path };
+            let start = leap.start + told;
+            observer.advance(&Segment { start, duration: until - told, path: ForcePath::Harmonic(path) });
+            told = until;
+        };
+        // What is due at the very end is attached to the state there.
+        while let Some((due, block)) = self.slider.interface.next_reattachment_by(began + leap.duration)
+            && due - began < leap.duration
+        {
+            if self.grid.tells_attachments() {
+                tell(due - began, observer);
+            }
+            let x = self.leap.driven_displacement(drive, block, due - began);
+            self.attach_next(x, observer);
+        }
+        tell(leap.duration, observer);
     }
 
     /// Advances time by `elapsed` s, exactly to the next reattachment if that ended the leap.
@@ -264,7 +318,9 @@ impl<'a> Integration<'a> {
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
         let event = self.slider.attach_next(x);
         self.summary.reattachments += 1;
-        observer.contact(&self.frame.absolute(event));
+        if self.grid.tells_attachments() {
+            observer.contact(&self.frame.absolute(event));
+        }
     }
 
     /// Moves the frame to where the slider and the clock are.

@@ -11,9 +11,8 @@ use super::step::{GridDrive, GridStep};
 use crate::model::{Change, ContactEvent};
 
 const SIXTH: f64 = 1.0 / 6.0;
-/// Newton's steps to a crossing, and the last step that leaves an error of the order of its square: rounding.
-const MAX_NEWTON_STEPS: usize = 6;
-const QUADRATIC: f64 = 1e-5;
+/// A step of third order below this leaves an error of its cube: a billionth of a step.
+const CUBIC: f64 = 1e-3;
 
 /// The motion of one block within a step, as a polynomial about its last event.
 #[derive(Clone, Copy, Debug)]
@@ -88,25 +87,25 @@ impl Path {
         self.about = s;
     }
 
-    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: a step of Halley's, and
-    /// Newton's.
+    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: two steps of Halley's,
+    /// the first from the point of expansion, and where they do not suffice one of Newton's.
     #[inline(always)]
     fn crossing(&self, level: f64) -> f64 {
         let [c0, c1, c2, c3, c4] = self.coefficients;
         let (before, left) = (c0 - level, 1.0 - self.about);
         let within = |beyond: f64| if beyond > 0.0 { if beyond < left { beyond } else { left } } else { 0.0 };
-        let mut beyond = within(before * c1 / (before * c2 - c1 * c1));
-        for _ in 0..MAX_NEWTON_STEPS {
-            let height = before + beyond * (c1 + beyond * (c2 + beyond * (c3 + beyond * c4)));
-            let slope = c1 + beyond * (2.0 * c2 + beyond * (3.0 * c3 + beyond * 4.0 * c4));
-            let next = within(beyond - height / slope);
-            let moved = (next - beyond).abs();
-            beyond = next;
-            if moved <= QUADRATIC {
-                break;
-            }
+        let halley = |height: f64, slope: f64, half: f64| height * slope / (slope * slope - height * half);
+        let s = within(-halley(before, c1, c2));
+        let height = before + s * (c1 + s * (c2 + s * (c3 + s * c4)));
+        let slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4)));
+        let half = c2 + s * (3.0 * c3 + s * (6.0 * c4));
+        let next = within(s - halley(height, slope, half));
+        if (next - s).abs() < CUBIC {
+            return self.about + next;
         }
-        self.about + beyond
+        let height = before + next * (c1 + next * (c2 + next * (c3 + next * c4)));
+        let slope = c1 + next * (2.0 * c2 + next * (3.0 * c3 + next * (4.0 * c4)));
+        self.about + within(next - height / slope)
     }
 }
 
@@ -114,7 +113,7 @@ impl Path {
 #[derive(Clone, Debug, Default)]
 pub(super) struct StepEvents {
     /// Whether attachments are collected, too.
-    pub follows_attachments: bool,
+    pub tells_attachments: bool,
     /// What has happened, in the order of time, in the frame; and how often in this run of steps.
     pub events: Vec<ContactEvent>,
     pub breaks: u64,
@@ -151,7 +150,7 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
         settle(slider, step, &mut path);
         events.paths.push(path);
     }
-    if events.events.len() > 1 {
+    if !events.events.is_sorted_by(|a, b| a.time <= b.time) {
         events.events.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
 }
@@ -197,7 +196,7 @@ fn change_contact(
         }),
         Change::Attach => {
             let event = interface.reattach_next(x);
-            if events.follows_attachments {
+            if events.tells_attachments {
                 events.events.push(event);
             }
             events.reattachments += 1;

@@ -1,6 +1,6 @@
 //! The shear force along the grid since the last segment that observers have seen.
 
-use crate::solver::segment::{CubicStep, ForcePath, Segment};
+use crate::solver::segment::{CubicStep, Extremes, ForcePath, Segment};
 
 /// Steps of shear force, from somewhere in the first of them on.
 #[derive(Clone, Debug)]
@@ -10,14 +10,14 @@ pub(super) struct ForceHistory {
     first: f64,
     /// The time there, in s in the frame.
     start: f64,
-    /// Bounds on F_S, in N, and the integral by steps from the beginning of the first, in N.
-    bounds: [f64; 2],
+    /// Extremes over all steps but the first and the last, and the integral by steps from the beginning of the first, in N.
+    inner: Extremes,
     integral: f64,
 }
 
 impl ForceHistory {
     pub fn new() -> Self {
-        Self { steps: Vec::new(), first: 0.0, start: 0.0, bounds: [f64::INFINITY, f64::NEG_INFINITY], integral: 0.0 }
+        Self { steps: Vec::new(), first: 0.0, start: 0.0, inner: Extremes::NONE, integral: 0.0 }
     }
 
     /// Begins anew at a time in s, at the next step.
@@ -32,8 +32,9 @@ impl ForceHistory {
 
     #[inline(always)]
     pub fn push(&mut self, step: CubicStep) {
-        let [low, high] = step.bounds();
-        self.bounds = [self.bounds[0].min(low), self.bounds[1].max(high)];
+        if let [_, .., last] = &self.steps[..] {
+            self.inner.include_step((self.steps.len() - 1) as f64, last);
+        }
         self.integral += step.integral();
         self.steps.push(step);
     }
@@ -49,7 +50,7 @@ impl ForceHistory {
             steps: &self.steps,
             first: self.first,
             spacing,
-            bounds: self.bounds,
+            inner: self.inner,
             end: last.value(s),
             integral: self.integral - before - beyond,
         };

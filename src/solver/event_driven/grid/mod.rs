@@ -78,9 +78,13 @@ impl Grid {
         step_length(parameters, tolerance) >= MIN_RESOLUTION * f64::EPSILON * FRAME_SPAN
     }
 
-    /// Whether attachments are told.
-    pub fn follows_attachments(&mut self, follows: bool) {
-        self.events.follows_attachments = follows;
+    /// Whether the observer is told of attachments.
+    pub fn tells_attachments(&self) -> bool {
+        self.events.tells_attachments
+    }
+
+    pub fn set_tells_attachments(&mut self, tells: bool) {
+        self.events.tells_attachments = tells;
     }
 
     /// Takes over a frame that has moved.
@@ -93,10 +97,10 @@ impl Grid {
     /// Adds the last run of steps to the history, but for its last step. `before` is the shear force one step before
     /// its start. Returns the force at the start of the last step and its second derivative there, in N.
     #[inline(always)]
-    fn follow_run(&mut self, before: f64) -> [f64; 2] {
+    fn follow_run(&mut self, steps: usize, before: f64) -> [f64; 2] {
         let (mut before, mut here) = (before, self.force);
         let mut bend = (self.step.trail[0] - here) - (here - before);
-        for pair in self.step.trail.windows(2) {
+        for pair in self.step.trail[..steps].windows(2) {
             let [next, beyond] = [pair[0], pair[1]];
             let next_bend = (beyond - next) - (next - here);
             self.history.push(CubicStep { force: [here, next], bend: [bend, next_bend] });
@@ -136,7 +140,7 @@ pub(super) fn advance<S: Simd, const R: usize>(
     let before = chain.drive_stiffness
         * (grid.drive.displacement_before() - (state.displacement[0][0] - grid.step.increment[0][0]));
     let done = march::<S, R>(simd, chain, &mut grid.step, &mut grid.drive, &mut state.displacement, steps);
-    let at_start = grid.follow_run(before);
+    let at_start = grid.follow_run(done, before);
     let start_bend = grid.drive.bend_before();
     let start = time + (done - 1) as f64 * grid.step.length;
     grid.events.events.clear();

@@ -118,7 +118,7 @@ pub(in super::super) struct GridStep {
     /// φ_n of the last step, in m.
     pub force: Vec<Row>,
     /// Shear force at the points of the last run but the first, in N.
-    pub trail: Vec<f64>,
+    pub trail: [f64; MAX_RUN],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
     /// Work space.
@@ -157,7 +157,7 @@ impl GridStep {
             second_couplings: chain.coupling.clone(),
             increment: layout.filled(0.0),
             force: layout.filled(0.0),
-            trail: Vec::with_capacity(MAX_RUN),
+            trail: [0.0; MAX_RUN],
             reached: Vec::new(),
             saved_displacement: layout.filled(0.0),
             saved_increment: layout.filled(0.0),
@@ -256,7 +256,7 @@ pub(super) fn march<S: Simd, const R: usize>(
 ) -> usize {
     let rows = if R == 0 { chain.layout.rows } else { R };
     let x = &mut displacement[..rows];
-    step.trail.clear();
+    let steps = steps.min(MAX_RUN);
     step.reached.clear();
     let (done, is_reached) = if R > 0 && S::HAS_MANY_REGISTERS {
         march_in_registers::<S, R>(simd, chain, step, drive, x, steps)
@@ -330,7 +330,7 @@ fn march_in_memory<S: Simd>(
             (before, here) = (here, after);
         }
         drive.advance();
-        step.trail.push(chain.drive_stiffness * (drive.displacement() - x[0][0]));
+        step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if reached != 0 {
             return (done, true);
         }
@@ -385,7 +385,7 @@ fn march_in_registers<S: Simd, const R: usize>(
             reached |= x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
         }
         drive.advance();
-        step.trail.push(chain.drive_stiffness * (drive.displacement() - x[0].first()));
+        step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0].first());
         if reached != 0 || done == steps {
             break reached != 0;
         }
