@@ -203,6 +203,46 @@ impl Interface {
         self.gather(block);
     }
 
+    /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the order
+    /// in which the block comes to them.
+    #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
+    pub fn reached(&self, block: usize, displacement: f64, contacts: &mut Vec<(f64, usize)>) {
+        contacts.clear();
+        let mut is_sorted = true;
+        for (index, row) in self.rows_of(block).iter().enumerate() {
+            let in_row: [u8; LANES] =
+                array::from_fn(|lane| u8::from((row.upper[lane] <= displacement) | (row.lower[lane] >= displacement)));
+            let mut reached = u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56;
+            while reached != 0 {
+                let lane = reached.trailing_zeros() as usize;
+                // Further along in the direction of motion is larger.
+                let position = if row.upper[lane] <= displacement { row.upper[lane] } else { -row.lower[lane] };
+                reached &= reached - 1;
+                // A displacement that is not finite reaches lanes beyond the last contact.
+                if position.is_finite() {
+                    is_sorted &= contacts.last().is_none_or(|(last, _)| *last <= position);
+                    contacts.push((position, LANES * index + lane));
+                }
+            }
+        }
+        if !is_sorted {
+            contacts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        if displacement <= self.block_lower[block] {
+            contacts.iter_mut().for_each(|(position, _)| *position = -*position);
+        }
+    }
+
+    /// Breaks one contact, at a break position in m. The block's sums and nearest break positions are left as they are: see
+    /// [`Self::gather`].
+    #[inline(always)]
+    pub fn break_contact(&mut self, block: usize, contact: usize, time: f64, displacement: f64) -> ContactEvent {
+        let event = self.event(block, contact, time, displacement, Change::Break);
+        self.detach(block, contact, time);
+        event
+    }
+
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
         for row in &mut self.rows {
@@ -294,7 +334,7 @@ impl Interface {
 
     /// Computes the sums and nearest break positions of a block again.
     #[inline(always)]
-    fn gather(&mut self, block: usize) {
+    pub fn gather(&mut self, block: usize) {
         self.sum(block);
         let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
         for row in self.rows_of(block) {
@@ -312,10 +352,9 @@ impl Interface {
     fn sum(&mut self, block: usize) {
         let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
         for row in self.rows_of(block) {
-            for lane in 0..LANES {
-                stiffness[lane] += row.attached_stiffness[lane];
-                pull[lane] += row.attached_stiffness[lane] * row.anchor[lane];
-            }
+            let attached = row.attached_stiffness.0;
+            stiffness.0 = array::from_fn(|lane| stiffness[lane] + attached[lane]);
+            pull.0 = array::from_fn(|lane| pull[lane] + attached[lane] * row.anchor[lane]);
         }
         self.block_stiffness[block] = stiffness.reduce(|a, b| a + b);
         self.block_pull[block] = pull.reduce(|a, b| a + b);

@@ -77,8 +77,13 @@ impl Leap {
         kernels.split(chain, drive, &mut self.motion)
     }
 
+    /// After how many seconds the free motion, at most `largest` m now, is a small multiple of `error` m.
+    pub fn loose_after(&self, largest: f64, error: f64) -> f64 {
+        libm::log(largest / (LOOSE * error)) / self.motion.free.decay_rate
+    }
+
     /// Up to when a leap may pass the reattachments that `due` tells one by one, as seconds from now and block, until it
-    /// is told to stop: at most `end`, in s. The free motion is at most `largest` m.
+    /// is told to stop: at most `end`, in s. None is passed in the first `loose` s.
     ///
     /// A contact that attaches on the way holds its block back by its stiffness times how far the block has moved since,
     /// which the driven solution leaves out. The sum of what this displaces may be a part of `error` m.
@@ -88,13 +93,10 @@ impl Leap {
         stiffness: f64,
         reach: f64,
         drive: &Harmonic,
-        [largest, error]: [f64; 2],
-        end: f64,
+        [loose, error, end]: [f64; 3],
         due: impl FnOnce(&mut dyn FnMut(f64, usize) -> bool),
     ) -> f64 {
         let SplitMotion { driven, free, .. } = &self.motion;
-        // By now what attaches is attached where the driven solution is.
-        let loose = libm::log(largest / (LOOSE * error)) / free.decay_rate;
         let allowed = PASSED_SHARE * error;
         let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, end);
         due(&mut |seconds, block| {

@@ -210,20 +210,20 @@ impl<'a> Integration<'a> {
         };
         let mut horizon = horizon;
         if self.takes_grid {
+            let loose = self.leap.loose_after(largest, error);
             let Tolerances { contact_stiffness, contact_reach, .. } = self.tolerances;
             let passed = self.leap.pass(
                 chain,
                 contact_stiffness,
                 contact_reach,
                 &drive,
-                [largest, error],
-                until_change,
+                [loose, error, until_change],
                 |visit| interface.look_ahead(|due, block| visit(due - began, block)),
             );
             horizon = horizon.max(passed);
             let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
             if horizon < least {
-                self.next_leap = self.frame.time + least;
+                self.next_leap = self.frame.time + loose.clamp(0.5 * least, 4.0 * least);
                 return false;
             }
         }

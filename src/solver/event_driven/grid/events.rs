@@ -8,7 +8,7 @@
 use super::super::slider::Slider;
 use super::Grid;
 use super::step::{GridDrive, GridStep};
-use crate::model::{Change, ContactEvent};
+use crate::model::{ContactEvent, Interface};
 
 const SIXTH: f64 = 1.0 / 6.0;
 /// A step of third order below this leaves an error of its cube: a billionth of a step.
@@ -25,26 +25,17 @@ struct Path {
     about: f64,
     /// Coefficients in σ - `about`, in m.
     coefficients: [f64; 5],
-    /// Displacement at the end of the step, in m.
-    end: f64,
-    /// What events have added to it and to the increment, in m, and what to those of the blocks beside.
-    added: Correction,
+    /// Displacement at the end of the step and increment up to there that have been entered into the motion, in m.
+    entered: Correction,
+    /// What events add to the blocks beside.
     beside: Correction,
 }
 
-/// What events add to a displacement at the end of a step and to the increment of the next, in m.
+/// Displacement at the end of a step and increment from its start, or what events add to them, in m.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Correction {
     pub displacement: f64,
     pub increment: f64,
-}
-
-impl Correction {
-    #[inline(always)]
-    fn add(&mut self, ahead: f64, back: f64) {
-        self.displacement += ahead;
-        self.increment += ahead - back;
-    }
 }
 
 impl Path {
@@ -67,9 +58,25 @@ impl Path {
         let first = ((1.0 + 2.0 * SIXTH * damping) * from + SIXTH * damping * to) * inverse;
         let last = ((1.0 - 2.0 * SIXTH * damping) * to - SIXTH * damping * from) * inverse;
         let coefficients = [end - rise, rise - (2.0 * first + last) * SIXTH, 0.5 * first, (last - first) * SIXTH, 0.0];
-        let none = Correction::default();
         let bare = slider.chain.bare[row][lane];
-        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, end, added: none, beside: none }
+        let entered = Correction { displacement: end, increment: rise };
+        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, entered, beside: Correction::default() }
+    }
+
+    /// Displacement at a point of the step, in m.
+    #[inline(always)]
+    fn at(&self, s: f64) -> f64 {
+        let [c0, c1, c2, c3, c4] = self.coefficients;
+        let beyond = s - self.about;
+        c0 + beyond * (c1 + beyond * (c2 + beyond * (c3 + beyond * c4)))
+    }
+
+    /// Adds δ2 ξ² + δ3 ξ³ + δ4 ξ⁴ from the point of expansion on.
+    #[inline(always)]
+    fn change_by(&mut self, [second, third, fourth]: [f64; 3]) {
+        self.coefficients[2] += second;
+        self.coefficients[3] += third;
+        self.coefficients[4] += fourth;
     }
 
     /// Expands it about another point of the step.
@@ -120,6 +127,8 @@ pub(super) struct StepEvents {
     pub reattachments: u64,
     /// Paths of the blocks to which it has.
     paths: Vec<Path>,
+    /// Contacts that a block reaches, and where they break, in m.
+    contacts: Vec<(f64, usize)>,
 }
 
 /// Breaks and attaches what the last step reaches and what is due in it, block after block. The step began at `start` s
@@ -132,7 +141,7 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
         let (row, lane) = step.reached[index];
         let block = slider.chain.layout.block(row, lane);
         let mut path = Path::new(slider, step, drive, block, (row, lane));
-        break_along(slider, step, events, &mut path, start);
+        break_along(&mut slider.interface, step, events, &mut path, start);
         settle(slider, step, &mut path);
         events.paths.push(path);
     }
@@ -144,9 +153,9 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
             None => Path::new(slider, step, drive, block, slider.chain.layout.slot(block)),
         };
         path.move_to(((due - start) * step.inverse_length).clamp(0.0, 1.0));
-        change_contact(slider, step, events, Change::Attach, &mut path, due);
+        attach(&mut slider.interface, step, events, &mut path);
         // It may break again at once.
-        break_along(slider, step, events, &mut path, start);
+        break_along(&mut slider.interface, step, events, &mut path, start);
         settle(slider, step, &mut path);
         events.paths.push(path);
     }
@@ -155,68 +164,56 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
     }
 }
 
-/// Breaks what a block reaches along the rest of its path.
+/// Breaks what a block reaches along the rest of its path, contact after contact.
 #[inline(always)]
-fn break_along(slider: &mut Slider, step: &GridStep, events: &mut StepEvents, path: &mut Path, start: f64) {
+fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, path: &mut Path, start: f64) {
+    let block = path.block;
     loop {
-        let (upper, lower) = (slider.interface.block_upper[path.block], slider.interface.block_lower[path.block]);
-        let level = if path.end >= upper {
-            upper
-        } else if path.end <= lower {
-            lower
-        } else {
+        let end = path.at(1.0);
+        if end < interface.block_upper[block] && end > interface.block_lower[block] {
             return;
-        };
-        let s = path.crossing(level);
-        path.move_to(s);
-        path.coefficients[0] = level;
-        change_contact(slider, step, events, Change::Break, path, start + s * step.length);
+        }
+        interface.reached(block, end, &mut events.contacts);
+        if events.contacts.is_empty() {
+            // Not a number: the run ends soon.
+            return;
+        }
+        let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
+        for &(level, contact) in &events.contacts {
+            path.move_to(path.crossing(level));
+            path.coefficients[0] = level;
+            let event = interface.break_contact(block, contact, start + path.about * step.length, level);
+            let [_, slope, half_curvature, ..] = path.coefficients;
+            let stiffened = -step.by_mass * event.stiffness;
+            let second = 0.5 * step.by_mass * event.force;
+            let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
+            let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
+            path.change_by([second, third, fourth]);
+            let (ahead, back) = (1.0 - path.about, path.about);
+            let [ahead, back] = [ahead * ahead, back * back].map(|square| square * square);
+            let beside = 0.5 * SIXTH * step.coupling * second;
+            path.beside.displacement += beside * ahead;
+            path.beside.increment += beside * (ahead - back);
+            events.events.push(event);
+        }
+        events.breaks += events.contacts.len() as u64;
+        interface.gather(block);
     }
 }
 
-/// Breaks the contacts that a block has reached, or attaches the one that is due, where its path is expanded, and changes
-/// the path.
+/// Attaches the contact that is due where a path is expanded: unstressed there, so that its force only grows.
 #[inline(always)]
-fn change_contact(
-    slider: &mut Slider,
-    step: &GridStep,
-    events: &mut StepEvents,
-    change: Change,
-    path: &mut Path,
-    time: f64,
-) {
-    let block = path.block;
+fn attach(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, path: &mut Path) {
     let [x, slope, half_curvature, ..] = path.coefficients;
-    let interface = &mut slider.interface;
-    let (stiffness, pull) = (interface.block_stiffness[block], interface.block_pull[block]);
-    match change {
-        Change::Break => interface.break_reached(block, time, x, |event| {
-            events.events.push(event);
-            events.breaks += 1;
-        }),
-        Change::Attach => {
-            let event = interface.reattach_next(x);
-            if events.tells_attachments {
-                events.events.push(event);
-            }
-            events.reattachments += 1;
-        }
+    let event = interface.reattach_next(x);
+    if events.tells_attachments {
+        events.events.push(event);
     }
-    let stiffened = (interface.block_stiffness[block] - stiffness) * step.by_mass;
-    let pulled = (interface.block_pull[block] - pull) * step.by_mass;
-    let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
-    let second = 0.5 * (pulled - stiffened * x);
-    let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
-    let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
-    path.coefficients[2] += second;
-    path.coefficients[3] += third;
-    path.coefficients[4] += fourth;
-    let moved = |by: f64| by * by * (second + by * (third + by * fourth));
-    let (ahead, back) = (1.0 - path.about, -path.about);
-    path.end += moved(ahead);
-    path.added.add(moved(ahead), moved(back));
-    let beside = |by: f64| 0.5 * SIXTH * step.coupling * second * ((by * by) * (by * by));
-    path.beside.add(beside(ahead), beside(back));
+    events.reattachments += 1;
+    let stiffened = step.by_mass * event.stiffness;
+    let third = -SIXTH * stiffened * slope;
+    let fourth = -0.5 * SIXTH * stiffened * half_curvature - 0.25 * step.damping * third;
+    path.change_by([0.0, third, fourth]);
 }
 
 /// Enters what has happened to a block into the motion.
@@ -224,6 +221,12 @@ fn change_contact(
 fn settle(slider: &mut Slider, step: &mut GridStep, path: &mut Path) {
     let Slider { chain, interface, state } = slider;
     chain.update(path.block, interface);
-    step.correct(chain, path.block, path.slot, [path.added, path.beside], &mut state.displacement);
-    (path.added, path.beside) = (Correction::default(), Correction::default());
+    let displacement = path.at(1.0);
+    let now = Correction { displacement, increment: displacement - path.at(0.0) };
+    let own = Correction {
+        displacement: now.displacement - path.entered.displacement,
+        increment: now.increment - path.entered.increment,
+    };
+    step.correct(chain, path.block, path.slot, [own, path.beside], &mut state.displacement);
+    (path.entered, path.beside) = (now, Correction::default());
 }
