@@ -149,16 +149,7 @@ impl Interface {
 
     /// Visits the reattachments to come, with time in s and block, in order, until told to stop.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize) -> bool) {
-        let mut seen = Vec::new();
-        while let Some(due) = self.reattachments.pop() {
-            seen.push(due);
-            if !visit(due.time(), due.block()) {
-                break;
-            }
-        }
-        for due in seen.into_iter().rev() {
-            self.reattachments.push(due);
-        }
+        self.reattachments.look_ahead(|due| visit(due.time(), due.block()));
     }
 
     /// Attaches the contact that is due next, unstressed where its block is at that moment.

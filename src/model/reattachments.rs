@@ -57,6 +57,7 @@ pub(super) struct Reattachments {
     after: Vec<u32>,
     /// What lies beyond the turn.
     beyond: Vec<Due>,
+    work_space: Vec<Due>,
 }
 
 impl Reattachments {
@@ -74,6 +75,7 @@ impl Reattachments {
             due: vec![Due::new(0.0, 0, 0); contacts],
             after: vec![NONE; contacts],
             beyond: Vec::new(),
+            work_space: Vec::new(),
         }
     }
 
@@ -105,6 +107,40 @@ impl Reattachments {
         }
         self.next = self.present.pop();
         Some(next)
+    }
+
+    /// Visits them in order until told to stop.
+    pub fn look_ahead(&mut self, mut visit: impl FnMut(Due) -> bool) {
+        let mut sorted = std::mem::take(&mut self.work_space);
+        let known = self.next.into_iter().chain(self.present.iter().rev().copied());
+        let mut goes_on = known.map(&mut visit).all(|goes_on| goes_on);
+        let here = place_of(self.present_bin);
+        let mut bins = (1..BINS).map(|ahead| (here + ahead) % BINS);
+        while goes_on && let Some(bin) = bins.next() {
+            let word = self.occupied[bin / BITS];
+            if word >> (bin % BITS) == 0 {
+                // On to the next word, unless the turn ends in this one.
+                let rest = (BITS - 1 - bin % BITS).min(bins.len());
+                (0..rest).for_each(|_| drop(bins.next()));
+            } else if word >> (bin % BITS) & 1 == 1 {
+                sorted.clear();
+                sorted.extend(self.list(bin));
+                sorted.sort_unstable();
+                goes_on = sorted.iter().all(|due| visit(*due));
+            }
+        }
+        if goes_on && !self.beyond.is_empty() {
+            sorted.clone_from(&self.beyond);
+            sorted.sort_unstable();
+            let _ = sorted.iter().all(|due| visit(*due));
+        }
+        self.work_space = sorted;
+    }
+
+    /// What a bin holds, in no order.
+    fn list(&self, bin: usize) -> impl Iterator<Item = Due> {
+        let contact = |contact: u32| (contact != NONE).then_some(contact as usize);
+        std::iter::successors(contact(self.first[bin]), move |&last| contact(self.after[last])).map(|at| self.due[at])
     }
 
     /// Moves the origin of time: subtracts `shift` s from every one.
@@ -230,6 +266,15 @@ mod tests {
                         Reverse(Due { time: (due.time() - by).max(0.0).to_bits(), ..due })
                     }).collect();
                 }
+                let mut ahead = Vec::new();
+                queue.look_ahead(|due| {
+                    ahead.push(due);
+                    ahead.len() < pops
+                });
+                let mut expected: Vec<Due> = heap.iter().map(|Reverse(due)| *due).collect();
+                expected.sort_unstable();
+                expected.truncate(pops.max(1));
+                prop_assert_eq!(ahead, expected);
                 for _ in 0..pops / 20 {
                     let expected = heap.pop().map(|Reverse(due)| due);
                     prop_assert_eq!(queue.next(), expected);

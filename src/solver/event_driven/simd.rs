@@ -68,8 +68,6 @@ pub(super) trait Vector: Copy {
     fn within(self, bound: Self) -> bool {
         bound.reaches(self) == u8::MAX
     }
-    /// The first lane.
-    fn first(self) -> f64;
     /// Every lane moved to the next one, 0 into the first.
     fn to_next_lane(self) -> Self;
     /// Every lane moved to the one before, 0 into the last.
@@ -147,11 +145,6 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     #[inline(always)]
     fn reaches(self, other: Self) -> u8 {
         self.0.reaches(self.1, other.1)
-    }
-
-    #[inline(always)]
-    fn first(self) -> f64 {
-        bytemuck::cast_slice(&self.1)[0]
     }
 
     #[inline(always)]

@@ -244,6 +244,13 @@ const FIRST_LANE: Row = {
     row
 };
 
+/// Adds to one lane.
+#[inline(always)]
+fn add(rows: &mut [Row], row: usize, lane: usize, value: f64) {
+    let sum = rows[row][lane] + value;
+    rows[row].set(lane, sum);
+}
+
 /// Takes at most `steps` steps, and none after one in which a block reaches a break position. Returns how many.
 #[inline(always)]
 pub(super) fn march<S: Simd, const R: usize>(
@@ -258,35 +265,6 @@ pub(super) fn march<S: Simd, const R: usize>(
     let x = &mut displacement[..rows];
     let steps = steps.min(MAX_RUN);
     step.reached.clear();
-    let (done, is_reached) = if R > 0 && S::HAS_MANY_REGISTERS {
-        march_in_registers::<S, R>(simd, chain, step, drive, x, steps)
-    } else {
-        march_in_memory(simd, chain, step, drive, x, steps)
-    };
-    if is_reached {
-        note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
-    }
-    done
-}
-
-/// Adds to one lane.
-#[inline(always)]
-fn add(rows: &mut [Row], row: usize, lane: usize, value: f64) {
-    let sum = rows[row][lane] + value;
-    rows[row].set(lane, sum);
-}
-
-/// Steps with all rows in memory.
-#[inline(always)]
-fn march_in_memory<S: Simd>(
-    simd: S,
-    chain: &Chain,
-    step: &mut GridStep,
-    drive: &mut GridDrive,
-    x: &mut [Row],
-    steps: usize,
-) -> (usize, bool) {
-    let rows = x.len();
     let last = rows - 1;
     let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
     let (pull, diagonal, own) = (&step.pull[..rows], &step.diagonal[..rows], &step.own[..rows]);
@@ -332,70 +310,11 @@ fn march_in_memory<S: Simd>(
         drive.advance();
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if reached != 0 {
-            return (done, true);
+            note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
+            return done;
         }
     }
-    (steps, false)
-}
-
-/// The same with displacements, increments and forces in registers.
-#[inline(always)]
-fn march_in_registers<S: Simd, const R: usize>(
-    simd: S,
-    chain: &Chain,
-    step: &mut GridStep,
-    drive: &mut GridDrive,
-    rows: &mut [Row],
-    steps: usize,
-) -> (usize, bool) {
-    let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
-    let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
-    let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
-    let first_lane = simd.load(&FIRST_LANE);
-    let decay = simd.splat(step.decay);
-    let (mut x, mut q, mut force) = ([decay; R], [decay; R], [decay; R]);
-    for r in 0..R {
-        (x[r], q[r]) = (simd.load(&rows[r]), simd.load(&step.increment[r]));
-    }
-    let mut done = 0;
-    let is_reached = loop {
-        done += 1;
-        let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
-        for r in 0..R {
-            let before = if r > 0 { x[r - 1] } else { x[R - 1].to_next_lane() };
-            let after = if r + 1 < R { x[r + 1] } else { x[0].to_lane_before() };
-            let mut own = simd.load(&pull[r]);
-            if r == 0 {
-                own = first_lane.mul_add(simd.splat(push), own);
-            }
-            let own = x[r].mul_add(simd.load(&diagonal[r]), own);
-            force[r] = before.plus(after).mul_add(simd.load(&couplings[r]), own);
-        }
-        let mut reached = 0;
-        for r in 0..R {
-            let before = if r > 0 { force[r - 1] } else { force[R - 1].to_next_lane() };
-            let after = if r + 1 < R { force[r + 1] } else { force[0].to_lane_before() };
-            let mut kept = q[r].times(decay);
-            if r == 0 {
-                kept = first_lane.mul_add(simd.splat(correction), kept);
-            }
-            let own = force[r].mul_add(simd.load(&own[r]), kept);
-            q[r] = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
-            x[r] = x[r].plus(q[r]);
-            reached |= x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
-        }
-        drive.advance();
-        step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0].first());
-        if reached != 0 || done == steps {
-            break reached != 0;
-        }
-    };
-    for r in 0..R {
-        x[r].store(&mut rows[r]);
-        q[r].store(&mut step.increment[r]);
-        force[r].store(&mut step.force[r]);
-    }
-    (done, is_reached)
+    steps
 }
 
 /// What the drive adds to φ of block 1, and to its increment beside, in m.
