@@ -221,7 +221,9 @@ impl Interface {
             contacts.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         if displacement <= self.block_lower[block] {
-            contacts.iter_mut().for_each(|(position, _)| *position = -*position);
+            for (position, _) in contacts {
+                *position = -*position;
+            }
         }
     }
 

@@ -112,29 +112,36 @@ impl Reattachments {
     /// Visits them in order until told to stop.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(Due) -> bool) {
         let mut sorted = std::mem::take(&mut self.work_space);
-        let known = self.next.into_iter().chain(self.present.iter().rev().copied());
-        let mut goes_on = known.map(&mut visit).all(|goes_on| goes_on);
-        let here = place_of(self.present_bin);
-        let mut bins = (1..BINS).map(|ahead| (here + ahead) % BINS);
-        while goes_on && let Some(bin) = bins.next() {
-            let word = self.occupied[bin / BITS];
-            if word >> (bin % BITS) == 0 {
-                // On to the next word, unless the turn ends in this one.
-                let rest = (BITS - 1 - bin % BITS).min(bins.len());
-                (0..rest).for_each(|_| drop(bins.next()));
-            } else if word >> (bin % BITS) & 1 == 1 {
-                sorted.clear();
-                sorted.extend(self.list(bin));
-                sorted.sort_unstable();
-                goes_on = sorted.iter().all(|due| visit(*due));
-            }
+        let mut goes_on = self.next.into_iter().chain(self.present.iter().rev().copied()).all(&mut visit);
+        let mut ahead = 1;
+        while goes_on && let Some(found) = self.occupied_from(ahead) {
+            sorted.clear();
+            sorted.extend(self.list((place_of(self.present_bin) + found) % BINS));
+            sorted.sort_unstable();
+            goes_on = sorted.iter().copied().all(&mut visit);
+            ahead = found + 1;
         }
         if goes_on && !self.beyond.is_empty() {
             sorted.clone_from(&self.beyond);
             sorted.sort_unstable();
-            let _ = sorted.iter().all(|due| visit(*due));
+            let _ = sorted.iter().copied().all(visit);
         }
         self.work_space = sorted;
+    }
+
+    /// How many bins ahead, from `ahead` on and within the turn, the next one is that holds anything.
+    fn occupied_from(&self, mut ahead: usize) -> Option<usize> {
+        let here = place_of(self.present_bin);
+        while ahead < BINS {
+            let bin = (here + ahead) % BINS;
+            let bits = self.occupied[bin / BITS] >> (bin % BITS);
+            if bits != 0 {
+                let found = ahead + bits.trailing_zeros() as usize;
+                return (found < BINS).then_some(found);
+            }
+            ahead += BITS - bin % BITS;
+        }
+        None
     }
 
     /// What a bin holds, in no order.
@@ -186,22 +193,10 @@ impl Reattachments {
 
     /// Turns to the next bin that holds anything, and sorts it.
     fn turn(&mut self) {
-        let here = place_of(self.present_bin);
-        // The words of the turn ahead, of the first without the bins up to the present one, which come last.
-        let words = (0..=BINS / BITS).map(|ahead| (here / BITS + ahead) % (BINS / BITS));
-        let found = words.enumerate().find_map(|(ahead, word)| {
-            let up_to_here = u64::MAX >> (BITS - 1 - here % BITS);
-            let bits = match ahead {
-                0 => self.occupied[word] & !up_to_here,
-                _ if ahead == BINS / BITS => self.occupied[word] & up_to_here,
-                _ => self.occupied[word],
-            };
-            (bits != 0).then(|| word * BITS + bits.trailing_zeros() as usize)
-        });
         let mut present = std::mem::take(&mut self.present);
-        if let Some(bin) = found {
-            self.present_bin += ((bin + BINS - here) % BINS) as u64;
-            self.empty(bin, |due| present.push(due));
+        if let Some(ahead) = self.occupied_from(1) {
+            self.present_bin += ahead as u64;
+            self.empty(place_of(self.present_bin), |due| present.push(due));
         }
         if !self.beyond.is_empty() {
             // Nothing may stay aside that now lies within the turn.

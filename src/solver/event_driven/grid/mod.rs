@@ -205,7 +205,7 @@ impl Integration<'_> {
         observer: &mut dyn Observer,
     ) -> Result<bool, SimulationError> {
         let length = self.grid.step.length;
-        let room = horizon / length;
+        let room = horizon * self.grid.step.inverse_length;
         if room < 1.0 {
             self.leave_grid(observer);
             return Ok(false);
@@ -213,9 +213,11 @@ impl Integration<'_> {
         if !self.grid.is_on {
             self.enter_grid()?;
         }
-        let until_attach = (self.slider.interface.next_reattachment() - self.frame.time) / length;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small and not negative")]
-        let steps = (MAX_RUN as f64).min(room.floor()).min(until_attach.ceil().max(1.0)) as usize;
+        let until_attach =
+            (self.slider.interface.next_reattachment() - self.frame.time) * self.grid.step.inverse_length;
+        // Casts saturate: nothing need be due.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, which saturates")]
+        let steps = (room as usize).min((until_attach as usize).saturating_add(1));
         let done = self.kernels.advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
         self.summary.steps += done as u64;
         self.summary.grid_steps += done as u64;
