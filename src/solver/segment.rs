@@ -267,8 +267,8 @@ impl Segment<'_> {
     }
 
     /// Times in s and values in N of the local extremes of F_S, in order of time. Of a harmonic segment these are the
-    /// first and the last maximum and minimum; those in between lie on lines between them. On a grid the points of the
-    /// grid are visited as well.
+    /// first and the last maximum and minimum; those in between lie on lines between them. On a grid its points are visited
+    /// as well.
     pub fn for_each_turn(&self, mut visit: impl FnMut(f64, f64)) {
         match self.path {
             ForcePath::Polynomial { coefficients, first, scale, .. } => {
@@ -289,12 +289,13 @@ impl Segment<'_> {
                     visit(self.start + elapsed, self.force_after(elapsed));
                 }
             }
-            ForcePath::Grid { spacing, first, .. } => {
+            ForcePath::Grid { steps, spacing, first, .. } => {
                 for (begin, cubic, [from, to]) in self.cubics() {
                     let mut turns = [1.0, -1.0].map(|sign| cubic.crest(sign));
                     turns.sort_by(f64::total_cmp);
                     // Where cubics join, their slopes need not have the same sign.
-                    for s in turns.into_iter().filter(|s| *s > from && *s < to).chain([to]) {
+                    let joint = (begin + 1.0 < steps.len() as f64).then_some(to);
+                    for s in turns.into_iter().filter(|s| *s > from && *s < to).chain(joint) {
                         visit(self.start + (begin + s - first) * spacing, cubic.value(s));
                     }
                 }

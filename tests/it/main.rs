@@ -13,6 +13,7 @@ mod failures;
 mod figures;
 mod fuzz;
 mod golden;
+mod grid;
 mod hard_cases;
 mod kills;
 mod program;

@@ -244,16 +244,23 @@ impl Integration<'_> {
         }
     }
 
-    /// Tells the shear force up to the last event of the last step, and the events.
+    /// Tells the shear force up to the last break of the last step, and what has happened up to then; then the attachments
+    /// beyond.
     fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
-        let Some(last) = self.grid.events.events.last() else { return };
-        let s = ((last.time - start) / self.grid.step.length).clamp(0.0, 1.0);
-        if self.grid.events.events.iter().any(|event| event.change == Change::Break) {
+        let events = std::mem::take(&mut self.grid.events.events);
+        let breaks = events.iter().rposition(|event| event.change == Change::Break).map_or(0, |last| last + 1);
+        if breaks > 0 {
             self.largest_force = f64::NEG_INFINITY;
         }
-        self.tell_force(s, observer);
-        for event in &self.grid.events.events {
-            observer.contact(&self.frame.absolute(*event));
+        for events in [&events[..breaks], &events[breaks..]] {
+            if let Some(last) = events.last() {
+                let s = ((last.time - start) * self.grid.step.inverse_length).clamp(0.0, 1.0);
+                self.tell_force(s, observer);
+                for event in events {
+                    observer.contact(&self.frame.absolute(*event));
+                }
+            }
         }
+        self.grid.events.events = events;
     }
 }

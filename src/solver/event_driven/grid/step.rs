@@ -378,3 +378,118 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
         (before, here) = (here, after);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Drive;
+    use crate::solver::event_driven::frame::{Frame, SPAN};
+    use crate::solver::event_driven::slider::Slider;
+    use pulp::Scalar512b as Baseline;
+
+    /// A slider of ten blocks with all its contacts, far from any break position.
+    fn parameters() -> Parameters {
+        Parameters { blocks: 10, mean_threshold: 1e6, threshold_deviation: 0.0, ..Parameters::default() }
+    }
+
+    /// A slider on the grid, from the present and the displacements one step before.
+    fn on_grid(parameters: &Parameters, length: f64, x: &[f64], before: &[f64]) -> (Slider, GridStep, GridDrive) {
+        let mut slider = Slider::new(parameters);
+        let layout = slider.chain.layout;
+        let mut step = GridStep::new(parameters, &slider.chain, length);
+        step.update_all(&slider.chain);
+        for block in 0..layout.blocks {
+            let (row, lane) = layout.slot(block);
+            slider.state.displacement[row][lane] = x[block];
+            step.increment[row][lane] = x[block] - before[block];
+        }
+        (slider, step, Frame::new(Drive::new(parameters), SPAN).grid_drive(length))
+    }
+
+    fn take(slider: &mut Slider, step: &mut GridStep, drive: &mut GridDrive, mut steps: usize) {
+        while steps > 0 {
+            steps -= march::<_, 0>(Baseline, &slider.chain, step, drive, &mut slider.state.displacement, steps);
+        }
+    }
+
+    #[test]
+    fn uniform_motion_is_exact() {
+        // Without contacts, with the spring stretched by what damping takes: every block at the velocity of the drive.
+        let bare = Parameters { contact_stiffness: 1e-30, damping_rate: 1e4, ..parameters() };
+        let (length, velocity) = (2e-6, bare.drive_velocity);
+        // The tension between blocks falls by mγV0 from one to the next.
+        let drag = bare.block_mass() * bare.damping_rate * velocity;
+        let mut start = vec![-drag * bare.blocks as f64 / bare.drive_stiffness; bare.blocks];
+        for j in 1..bare.blocks {
+            start[j] = start[j - 1] - drag * (bare.blocks - j) as f64 / bare.coupling_stiffness();
+        }
+        let at = |steps: f64| start.iter().map(|x| x + velocity * length * steps).collect::<Vec<_>>();
+        let (mut slider, mut step, mut drive) = on_grid(&bare, length, &at(0.0), &at(-1.0));
+        take(&mut slider, &mut step, &mut drive, 1000);
+        for (x, expected) in slider.displacements().zip(at(1000.0)) {
+            assert!((x - expected).abs() < 1e-12 * expected.abs().max(1e-9), "{x} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_mode_falls_sixteenfold_when_the_step_is_halved() {
+        // One block on its contacts and its spring: x'' + γ x' + ω² x = 0, about an equilibrium that does not move.
+        let one = Parameters { blocks: 1, drive_velocity: 1e-30, damping_rate: 500.0, ..parameters() };
+        let squared = (one.drive_stiffness + one.block_contact_stiffness()) / one.block_mass();
+        let half = 0.5 * one.damping_rate;
+        let frequency = (squared - half * half).sqrt();
+        let exact = |t: f64| 1e-6 * libm::exp(-half * t) * libm::cos(frequency * t);
+        let time = 20.0 / frequency;
+        let error = |steps: usize| {
+            let length = time / steps as f64;
+            let (mut slider, mut step, mut drive) = on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
+            take(&mut slider, &mut step, &mut drive, steps);
+            (slider.displacement(0) - exact(time)).abs() / 1e-6
+        };
+        let errors = [40, 80, 160, 320].map(error);
+        for pair in errors.windows(2) {
+            assert!((14.0..18.0).contains(&(pair[0] / pair[1])), "{errors:?}");
+        }
+        // h = 1/(2 ω).
+        assert!(errors[0] < 1e-2, "{errors:?}");
+    }
+
+    #[test]
+    fn velocities_are_of_fourth_order_and_taking_them_changes_nothing() {
+        let one = Parameters { blocks: 1, drive_velocity: 1e-30, ..parameters() };
+        let squared = (one.drive_stiffness + one.block_contact_stiffness()) / one.block_mass();
+        let half = 0.5 * one.damping_rate;
+        let frequency = (squared - half * half).sqrt();
+        let exact = |t: f64| 1e-6 * libm::exp(-half * t) * libm::cos(frequency * t + 0.5);
+        let rate = -1e-6 * (half * libm::cos(0.5) + frequency * libm::sin(0.5));
+        let error = |length: f64| {
+            let (mut slider, mut step, drive) = on_grid(&one, length, &[exact(0.0)], &[exact(-length)]);
+            let before = (slider.displacement(0), step.increment[0][0]);
+            velocity::<_, 0>(Baseline, &slider.chain, &mut step, &drive, &mut slider.state);
+            assert_eq!(before, (slider.displacement(0), step.increment[0][0]));
+            (slider.state.velocity[0][0] / rate - 1.0).abs()
+        };
+        let errors = [0.5, 0.25, 0.125].map(|angle| error(angle / frequency));
+        for pair in errors.windows(2) {
+            assert!((12.0..20.0).contains(&(pair[0] / pair[1])), "{errors:?}");
+        }
+    }
+
+    #[test]
+    fn padding_stays_at_rest() {
+        let (mut slider, mut step, mut drive) = on_grid(&parameters(), 4e-6, &[1e-7; 10], &[0.0; 10]);
+        take(&mut slider, &mut step, &mut drive, 100);
+        let layout = slider.chain.layout;
+        for (row, lane) in (0..layout.rows).flat_map(|row| (0..LANES).map(move |lane| (row, lane))) {
+            let x = slider.state.displacement[row][lane];
+            assert_eq!(x == 0.0, layout.block(row, lane) >= layout.blocks, "{x} in row {row}, lane {lane}");
+        }
+    }
+
+    #[test]
+    fn weights_join_where_their_formula_changes() {
+        for (below, above) in weights(0.1 - 1e-9).into_iter().zip(weights(0.1 + 1e-9)) {
+            assert!((below / above - 1.0).abs() < 1e-10, "{below} {above}");
+        }
+    }
+}
