@@ -61,6 +61,16 @@ impl Resolve {
         Self::ALL[self as usize].1
     }
 
+    /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
+    #[must_use]
+    pub fn takes_grid(self, tolerance: f64) -> bool {
+        match self {
+            Self::Auto => tolerance >= GRID_TOLERANCE,
+            Self::Grid => true,
+            Self::Taylor => false,
+        }
+    }
+
     /// The one with this word.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {

@@ -13,7 +13,7 @@ pub const PART_COST: f64 = 5.0;
 /// Most jobs of a part, so that a part of cheap jobs fits in memory.
 pub const PART_JOBS: usize = 4096;
 /// Version of how sweeps become parts: order, cost and limits. A directory keeps the one that it was started with.
-pub const PLAN_VERSION: u32 = 2;
+pub const PLAN_VERSION: u32 = 3;
 
 /// The sweeps of a directory in the order in which they were run.
 #[derive(Clone, Copy, Debug)]

@@ -37,7 +37,7 @@ use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
 use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
-use super::{GRID_TOLERANCE, Limits, Observer, Resolve, SimulationError, Summary};
+use super::{Limits, Observer, Resolve, SimulationError, Summary};
 use crate::model::{Drive, Parameters};
 use std::sync::atomic::Ordering;
 
@@ -57,12 +57,11 @@ pub(super) fn run(
     audit: Option<&mut Audit>,
 ) -> Result<Summary, SimulationError> {
     let rows = Layout::new(parameters.blocks).rows;
-    let takes_grid = match resolve {
-        Resolve::Auto => audit.is_none() && tolerance >= GRID_TOLERANCE && Grid::is_resolved(parameters, tolerance),
-        Resolve::Grid if audit.is_some() => return Err(SimulationError::LedgerOnGrid),
-        Resolve::Grid => true,
-        Resolve::Taylor => false,
-    };
+    if resolve == Resolve::Grid && audit.is_some() {
+        return Err(SimulationError::LedgerOnGrid);
+    }
+    let is_possible = audit.is_none() && Grid::is_resolved(parameters, tolerance);
+    let takes_grid = resolve.takes_grid(tolerance) && (is_possible || resolve == Resolve::Grid);
     let integration = Integration::new(parameters, tolerance, takes_grid, limits, kernels::fastest(rows));
     Integration { audit, ..integration }.integrate(observer)
 }
