@@ -3,13 +3,16 @@
 //! Source: the textbook scheme (Verlet 1967; Swope et al. 1982), the damping taken half before and half after the
 //! force, implicitly after, so that its limit of stability dt < 2/ω_max holds for any damping rate. Contract:
 //! first-order errors in the times of events, second-order between them; O(N) work per step through the block sums. It
-//! is kept plain: the baseline of speed, and a witness for the other solver.
+//! is kept plain: the baseline of speed, and a witness for the other solver. So that it is a fair one, its loops are
+//! compiled for the features of the processor, chosen at run time, as those of the other solver are; nothing is fused
+//! or reassociated, so all give the same bits.
 
 use super::ledger::Audit;
 use super::polynomial;
 use super::segment::{ForceAt, ForcePath, Segment};
 use super::{Limits, Observer, SimulationError, Summary};
 use crate::model::{ContactEvent, Drive, Interface, Parameters};
+use pulp::Arch;
 use std::sync::atomic::Ordering;
 
 /// Steps between two checks of the interrupt flag and of whether the state is finite.
@@ -24,6 +27,7 @@ struct Motion {
 
 impl Motion {
     /// Accelerations without damping, from the chain, the contacts and the shear force at the trailing edge, in N.
+    #[inline(always)]
     fn accelerate(&mut self, interface: &Interface, shear_force: f64, coupling: f64, mass: f64) {
         let x = &self.displacement[..];
         let blocks = x.len();
@@ -63,6 +67,7 @@ impl Motion {
     }
 
     /// Whether any block is at or past a break position.
+    #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "without branches the loop runs in vectors")]
     fn reaches_a_break(&self, interface: &Interface) -> bool {
         let blocks = self.displacement.len();
@@ -74,6 +79,33 @@ impl Motion {
 
 /// Runs the scheme with a stable `time_step`, in s; see [`super::simulate`].
 pub(super) fn run(
+    parameters: &Parameters,
+    time_step: f64,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+    audit: Option<&mut Audit>,
+) -> Result<Summary, SimulationError> {
+    run_compiled_for(Arch::new(), parameters, time_step, limits, observer, audit)
+}
+
+/// The same, compiled for these features of the processor.
+fn run_compiled_for(
+    features: Arch,
+    parameters: &Parameters,
+    time_step: f64,
+    limits: Limits<'_>,
+    observer: &mut dyn Observer,
+    audit: Option<&mut Audit>,
+) -> Result<Summary, SimulationError> {
+    features.dispatch(
+        #[inline(always)]
+        || integrate(parameters, time_step, limits, observer, audit),
+    )
+}
+
+/// The scheme, inlined into code compiled for the features of a processor.
+#[inline(always)]
+fn integrate(
     parameters: &Parameters,
     time_step: f64,
     limits: Limits<'_>,
@@ -161,6 +193,7 @@ pub(super) fn run(
 }
 
 /// Reattaches what is due and breaks what is reached, at the end of a step.
+#[inline(always)]
 fn change_contacts(
     interface: &mut Interface,
     displacement: &[f64],
@@ -189,4 +222,77 @@ fn change_contacts(
 fn hermite(start: f64, end: f64, start_slope: f64, end_slope: f64) -> [f64; 4] {
     let rise = end - start;
     [start, start_slope, 3.0 * rise - 2.0 * start_slope - end_slope, start_slope + end_slope - 2.0 * rise]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ledger;
+    use super::*;
+    #[cfg(target_arch = "x86_64")]
+    use pulp::x86::{V3, V4};
+
+    /// All that an observer is told.
+    #[derive(Debug, Default, PartialEq)]
+    struct Told {
+        forces: Vec<[f64; 2]>,
+        events: Vec<ContactEvent>,
+        displacement: Vec<f64>,
+    }
+
+    impl Observer for Told {
+        fn advance(&mut self, segment: &Segment<'_>) {
+            self.forces.push([segment.end_force(), segment.impulse()]);
+        }
+
+        fn contact(&mut self, event: &ContactEvent) {
+            self.events.push(*event);
+        }
+
+        fn is_satisfied(&self) -> bool {
+            false
+        }
+
+        fn end(&mut self, _: f64, displacement: &[f64]) {
+            self.displacement = displacement.to_vec();
+        }
+    }
+
+    /// The features for which the loops can be compiled and that this processor has.
+    fn available() -> Vec<Arch> {
+        #[cfg(target_arch = "x86_64")]
+        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)].into_iter().flatten();
+        #[cfg(not(target_arch = "x86_64"))]
+        let more = [Arch::new()];
+        [Arch::Scalar].into_iter().chain(more).collect()
+    }
+
+    #[test]
+    fn every_set_of_processor_features_gives_the_same_bits() {
+        // The second has a block beside the last whole register, and a modulation that breaks contacts in reverse.
+        let modulated = Parameters {
+            blocks: 13,
+            modulation_amplitude: 1e-4,
+            modulation_period: Some(0.02),
+            seed: 5,
+            ..Parameters::default()
+        };
+        for parameters in [Parameters::default(), modulated] {
+            let runs = available().into_iter().map(|features| {
+                let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
+                let mut told = Told::default();
+                let audited = ledger::audited(&parameters, &mut told, |observer, audit| {
+                    run_compiled_for(features, &parameters, 2e-6, limits, observer, Some(audit))
+                });
+                (format!("{features:?}"), (told, audited.unwrap()))
+            });
+            let runs: Vec<_> = runs.collect();
+            assert!(
+                runs[0].1.0.events.len() > 2 * parameters.blocks * parameters.contacts_per_block,
+                "no slip to compare"
+            );
+            for (name, run) in &runs[1..] {
+                assert!(*run == runs[0].1, "{name} differs from {}", runs[0].0);
+            }
+        }
+    }
 }
