@@ -1,13 +1,15 @@
-//! Hard cases: parameters that break a naive code, each run with an audit and within budgets, so that none hangs.
+//! Hard cases: parameters that break a naive code, each run within budgets, so that none hangs.
 //!
-//! A case passes if it ends as it must: the simulation reaches its end and its ledger balances, bad values are refused
-//! by name, or it stops and gives the cause.
+//! Each is run with an audit, the event-driven solver then in Taylor steps; and that solver once more as a job runs it,
+//! on the grid and without a ledger. A case passes if it ends as it must: the simulation reaches its end and its ledger
+//! balances, bad values are refused by name, or it stops and gives the cause. A run as a job must break about as many
+//! contacts as the audited one.
 
 use super::cpu;
 use crate::model::equation::{StiffnessMatrix, stability_limit};
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
-use crate::solver::{Limits, SimulationError, Solver, Summary, simulate_audited};
+use crate::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
 use crate::table::columns::{Table, columns};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,6 +24,13 @@ const TIME_BUDGET: Duration = Duration::from_secs(40);
 /// limit of stability. Measured at the default tolerance: 0.08 at T = 1e-5 and under 0.01 elsewhere; 6e-3.
 const BALANCED_TOLERANCES: f64 = 1.0;
 const BALANCED_FIXED_STEP: f64 = 2e-2;
+/// Largest difference of the breaks of two runs, relative to the larger count, that passes. Seen: 0.05. Two of 24 seeds
+/// of that case differ by up to 0.09.
+const ALIKE: f64 = 0.1;
+/// The same where counts spread far from seed to seed: weak damping lets the whole slider vibrate, and a soft one breaks
+/// in pieces. Any two of 24 seeds differ by up to 0.39, and of 6 seeds by up to 0.37, with either way of resolving motion
+/// and at tolerances from 1e-3 to 1e-8, of which the means agree.
+const ALIKE_CHAOTIC: f64 = 0.4;
 
 /// What a case must lead to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +54,8 @@ pub struct HardCase {
     /// Ends at this model time in s, or after this number of slips.
     end_time: f64,
     slips: u64,
+    /// Largest difference of the breaks of two runs that passes, relative to the larger count.
+    alike: f64,
     expected: Expected,
 }
 
@@ -61,15 +72,17 @@ columns! {
         slips: u64 = "", "slips";
         steps: u64 = "", "steps of the solver";
         leaps: u64 = "", "of these, leaps";
+        grid_steps: u64 = "", "of these, steps of the grid";
         breaks: u64 = "", "contacts broken";
-        ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
-        cpu_seconds as "cpu_time": f64 = "s", "CPU time with the audit";
+        ledger_residual: Option<f64> = "",
+            "residual of the energy ledger, relative to the work of the drive; null without an audit";
+        cpu_seconds as "cpu_time": f64 = "s", "CPU time, with the audit if there is one";
     }
 }
 
 impl Table for Stability {
     const NAME: &'static str = "hard-cases";
-    const MEANING: &'static str = "One row per hard case";
+    const MEANING: &'static str = "One row per hard case that is refused or takes fixed steps, else two: in Taylor steps with an audit, and as a job";
 }
 
 /// Why a case did not reach its end, in words.
@@ -101,11 +114,16 @@ impl From<SimulationError> for Failure {
 impl HardCase {
     fn new(threat: &'static str, settings: &[(Symbol, Value)], end_time: f64) -> Self {
         let settings = settings.to_vec();
-        Self { threat, settings, solver: Solver::default(), end_time, slips: 3, expected: Expected::Ends }
+        let (solver, expected) = (Solver::default(), Expected::Ends);
+        Self { threat, settings, solver, end_time, slips: 3, alike: ALIKE, expected }
     }
 
     fn slips(self, slips: u64) -> Self {
         Self { slips, ..self }
+    }
+
+    fn alike(self, alike: f64) -> Self {
+        Self { alike, ..self }
     }
 
     fn solver(self, solver: Solver) -> Self {
@@ -128,29 +146,46 @@ impl HardCase {
         if words.is_empty() { "defaults".to_owned() } else { words.join(", ") }
     }
 
-    /// Runs it within its budgets.
+    /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
     #[must_use]
-    pub fn run(&self) -> Stability {
-        let (cpu_seconds, ended) = cpu::timed(|| self.simulate());
+    pub fn run(&self) -> Vec<Stability> {
+        let Solver::EventDriven { tolerance, .. } = self.solver else { return vec![self.row(self.solver, None)] };
+        let audited = self.row(Solver::EventDriven { tolerance, resolve: Resolve::Taylor }, None);
+        if matches!(self.expected, Expected::Refused(_)) {
+            return vec![audited];
+        }
+        let as_a_job = self.row(self.solver, Some(&audited));
+        vec![audited, as_a_job]
+    }
+
+    /// Runs it with this solver: with an audit, or held against the run that had one.
+    fn row(&self, solver: Solver, audited: Option<&Stability>) -> Stability {
+        let (cpu_seconds, ended) = cpu::timed(|| self.simulate(solver, audited.is_none()));
         let row = Stability {
             threat: self.threat.to_owned(),
             case: self.name(),
-            solver: super::solver_in_words(self.solver),
+            solver: super::solver_in_words(solver),
             cpu_seconds,
             ..Stability::default()
         };
         match ended {
             Ok((summary, slips, residual)) => {
-                let is_balanced = residual.abs() <= self.max_residual();
-                let outcome = if is_balanced { "done" } else { "done, but energy does not balance" };
+                let is_balanced = residual.is_none_or(|residual| residual.abs() <= self.max_residual());
+                let is_alike = audited.is_none_or(|audited| self.are_alike(audited.breaks, summary.breaks));
+                let outcome = match (is_balanced, is_alike) {
+                    (true, true) => "done",
+                    (false, _) => "done, but energy does not balance",
+                    (_, false) => "done, but with too many or too few breaks",
+                };
                 Stability {
-                    passed: self.expected == Expected::Ends && is_balanced,
+                    passed: self.expected == Expected::Ends && is_balanced && is_alike,
                     outcome: outcome.to_owned(),
                     simulated_seconds: Some(summary.end_time),
-                    ledger_residual: Some(residual),
+                    ledger_residual: residual,
                     slips,
                     steps: summary.steps,
                     leaps: summary.leaps,
+                    grid_steps: summary.grid_steps,
                     breaks: summary.breaks,
                     ..row
                 }
@@ -166,6 +201,11 @@ impl HardCase {
         }
     }
 
+    /// Whether counts of breaks may be those of two runs.
+    fn are_alike(&self, left: u64, right: u64) -> bool {
+        left.abs_diff(right) as f64 <= self.alike * left.max(right) as f64
+    }
+
     /// Largest residual of the ledger that passes.
     fn max_residual(&self) -> f64 {
         match self.solver {
@@ -174,8 +214,8 @@ impl HardCase {
         }
     }
 
-    /// Summary, slips and residual of the ledger.
-    fn simulate(&self) -> Result<(Summary, u64, f64), Failure> {
+    /// Summary, slips and, with an audit, residual of the ledger.
+    fn simulate(&self, solver: Solver, has_audit: bool) -> Result<(Summary, u64, Option<f64>), Failure> {
         let mut parameters = Parameters::default();
         for &(symbol, value) in &self.settings {
             parameters.set(symbol, value)?;
@@ -183,11 +223,16 @@ impl HardCase {
         let parameters = parameters.validated()?;
         let recording = Recording { slips: self.slips, discard: 0, ..Recording::default() };
         let mut observer = SlipObserver::new(&parameters, &recording);
-        let (summary, ledger) = interrupted_after(TIME_BUDGET, |interrupt| {
+        let (summary, residual) = interrupted_after(TIME_BUDGET, |interrupt| {
             let limits = Limits { end_time: self.end_time, events: EVENT_BUDGET, interrupt: Some(interrupt) };
-            simulate_audited(&parameters, self.solver, limits, &mut observer)
+            if has_audit {
+                let audited = simulate_audited(&parameters, solver, limits, &mut observer);
+                audited.map(|(summary, ledger)| (summary, Some(ledger.residual())))
+            } else {
+                simulate(&parameters, solver, limits, &mut observer).map(|summary| (summary, None))
+            }
         })?;
-        Ok((summary, observer.into_rows().0.len() as u64, ledger.residual()))
+        Ok((summary, observer.into_rows().0.len() as u64, residual))
     }
 }
 
@@ -236,9 +281,9 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.extend([0.411, 1.37].map(|spread| case(wide, &[(Dfs, Real(spread))], 0.5)));
 
     let damping = "no damping, overdamping";
-    cases.push(case(damping, &[(Gamma, Real(0.0))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(0.0))], 0.3).alike(ALIKE_CHAOTIC));
     cases.push(case(damping, &[(Gamma, Real(0.0)), (N, Count(1))], 0.3));
-    cases.push(case(damping, &[(Gamma, Real(1.0))], 0.3));
+    cases.push(case(damping, &[(Gamma, Real(1.0))], 0.3).alike(ALIKE_CHAOTIC));
     cases.push(case(damping, &[(Gamma, Real(1e7))], 0.3));
     cases.push(case(damping, &[(Gamma, Real(1e7)), (V0, Real(1e-6))], 10.0));
 
@@ -264,7 +309,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(sizes, &[(Ns, Count(1))], 0.1));
     cases.push(case(sizes, &[(Ns, Count(1000))], 1.0));
     cases.push(case(sizes, &[(K, Real(1e10))], 2.0));
-    cases.push(case(sizes, &[(K, Real(1e6))], 0.3));
+    cases.push(case(sizes, &[(K, Real(1e6))], 0.3).alike(ALIKE_CHAOTIC));
 
     let stability = "the limit of stability";
     let limit = stability_limit(&Parameters::default());

@@ -60,13 +60,24 @@ pub enum AccuracyError {
     Storage(#[from] StorageError),
 }
 
+/// The method of a solver in words; the event-driven one by how it resolves motion, where that is set.
+#[must_use]
+pub const fn method_in_words(solver: Solver) -> &'static str {
+    match solver {
+        Solver::EventDriven { resolve: Resolve::Auto, .. } => "event-driven",
+        Solver::EventDriven { resolve: Resolve::Grid, .. } => "grid",
+        Solver::EventDriven { resolve: Resolve::Taylor, .. } => "Taylor steps",
+        Solver::FixedStep { .. } => "fixed step",
+    }
+}
+
 /// A solver and its setting in words.
 #[must_use]
 pub fn solver_in_words(solver: Solver) -> String {
+    let method = method_in_words(solver);
     match solver {
-        Solver::EventDriven { tolerance, resolve: Resolve::Auto } => format!("event-driven, tolerance {tolerance:e}"),
-        Solver::EventDriven { tolerance, resolve } => format!("{}, tolerance {tolerance:e}", resolve.word()),
-        Solver::FixedStep { time_step } => format!("fixed step, dt {time_step:e} s"),
+        Solver::EventDriven { tolerance, .. } => format!("{method}, tolerance {tolerance:e}"),
+        Solver::FixedStep { time_step } => format!("{method}, dt {time_step:e} s"),
     }
 }
 

@@ -3,9 +3,8 @@
 use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{Findings, MethodRow, Quantity, Study};
-use super::tables::method;
-use super::{AccuracyError, Stability, cpu};
-use crate::figure::{ErrorPanel, Growth, Line, Picture, WorkPrecision, scaling, work_precision};
+use super::{AccuracyError, Stability, cpu, method_in_words};
+use crate::figure::{ErrorPanel, Growth, Line, MethodLine, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
 use crate::results::commit::Commit;
 use crate::table::arrow;
@@ -16,7 +15,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Version of the JSON.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// The findings of a study, with a figure for each velocity.
 ///
@@ -136,34 +135,30 @@ fn work_precision_figure(velocity: f64, findings: &Findings) -> Result<Picture, 
         Some(WorkPrecision { error, uncertainty: Some((error, largest)), work: row.cost.per_slip })
     });
     let label = "First break times, error (s)".to_owned();
-    let mut panels = vec![ErrorPanel { label, by_chance: None, methods: breaks }];
+    let mut panels = vec![ErrorPanel { label, by_chance: None, lines: breaks }];
     for (quantity, name) in [(Quantity::Interval, "τ"), (Quantity::FrontSpeed, "front speed")] {
-        let methods = lines(&findings.methods, velocity, |row| {
+        let lines = lines(&findings.methods, velocity, |row| {
             let Distance { value, low, high, floor } = findings.distances_of(row, quantity)?.wasserstein;
             let uncertainty = Some((low / floor, high / floor));
             Some(WorkPrecision { error: value / floor, uncertainty, work: row.cost.per_slip })
         });
-        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance"), by_chance: Some(1.0), methods });
+        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance"), by_chance: Some(1.0), lines });
     }
-    panels.retain(|panel| !panel.methods.is_empty());
+    panels.retain(|panel| !panel.lines.is_empty());
     Ok(work_precision(WORK, &panels)?)
 }
 
 /// A line per method and drive at this velocity.
-fn lines(
-    rows: &[MethodRow],
-    velocity: f64,
-    point: impl Fn(&MethodRow) -> Option<WorkPrecision>,
-) -> Vec<(String, Vec<WorkPrecision>)> {
-    let mut lines: Vec<(String, Vec<WorkPrecision>)> = Vec::new();
+fn lines(rows: &[MethodRow], velocity: f64, point: impl Fn(&MethodRow) -> Option<WorkPrecision>) -> Vec<MethodLine> {
+    let mut lines: Vec<MethodLine> = Vec::new();
     for row in rows.iter().filter(|row| row.parameters.drive_velocity == velocity) {
         let Some(point) = point(row) else { continue };
         let drive = if row.parameters.modulation_amplitude > 0.0 { "Δ > 0" } else { "Δ = 0" };
-        let cost = if row.cost.timed_slips == 0 { "*" } else { "" };
-        let name = format!("{}{cost}, {drive}", method(row.solver));
-        match lines.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, points)) => points.push(point),
-            None => lines.push((name, vec![point])),
+        let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
+        let method = format!("{}{mark}", method_in_words(row.solver));
+        match lines.iter_mut().find(|line| line.method == method && line.drive == drive) {
+            Some(line) => line.points.push(point),
+            None => lines.push(MethodLine { method, drive: drive.to_owned(), points: vec![point] }),
         }
     }
     lines
@@ -221,7 +216,9 @@ mod tests {
             parameters: Selected::new(parameters.clone()),
             solver,
             cost,
-            cost_spread: 1.0,
+            timings: 2,
+            median_per_slip: 0.02,
+            largest_per_slip: 0.03,
             break_times,
             ledger_residual: Some(-1e-3),
         };

@@ -1,7 +1,7 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! Under each drive: the first breaks against the tightest tolerance there is; the energy ledger; and an ensemble of
-//! slips that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first
+//! The event-driven solver counts as two methods, by how it resolves motion. Under each drive: the first breaks against
+//! the tightest tolerance there is; the energy ledger, of all but the grid; and an ensemble of slips that is timed and whose distributions are held against a reference ensemble of other seeds. Under the first
 //! drive more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
 //! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip
 //! follows from the steps in one.
@@ -12,7 +12,7 @@ use super::distance::{Distances, deviation, distances, mean};
 use super::{AccuracyError, Realisation, drive_in_words};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
-use crate::solver::{Solver, Summary, TOLERANCES};
+use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 use crate::table::selected::{Selected, Selection};
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub struct Study {
     pub velocities: Vec<f64>,
     /// Solvers and their settings.
     pub solvers: Vec<Solver>,
-    /// Realisations of each ensemble, all timed.
+    /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
     /// Multiple of these realisations under the first drive; those beyond them are not timed.
     pub first_drive_multiple: u64,
@@ -63,7 +63,11 @@ impl Study {
     pub fn full() -> Self {
         Self {
             velocities: vec![1e-4, 1e-5, 1e-6],
-            solvers: solvers(&[4e-6, 2e-6, 1e-6, 5e-7], &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10]),
+            solvers: solvers(
+                &[4e-6, 2e-6, 1e-6, 5e-7],
+                &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
+                &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
+            ),
             seeds: 8,
             first_drive_multiple: 8,
             slips: 100,
@@ -79,9 +83,9 @@ impl Study {
     #[must_use]
     pub fn quick() -> Self {
         Self {
-            seeds: 2,
+            seeds: 4,
             first_drive_multiple: 1,
-            slips: 12,
+            slips: 6,
             followed_breaks: 10_000,
             fixed_step_breaks_from: 1e-4,
             timed_steps: 300_000,
@@ -102,9 +106,14 @@ impl Study {
     }
 }
 
-fn solvers(time_steps: &[f64], tolerances: &[f64]) -> Vec<Solver> {
+fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
     let fixed = time_steps.iter().map(|&time_step| Solver::FixedStep { time_step });
-    fixed.chain(tolerances.iter().map(|&tolerance| Solver::event_driven(tolerance))).collect()
+    let grid = on_the_grid.iter().map(|&tolerance| Solver::EventDriven { tolerance, resolve: Resolve::Grid });
+    fixed.chain(grid).chain(in_taylor_steps.iter().map(|&tolerance| taylor(tolerance))).collect()
+}
+
+const fn taylor(tolerance: f64) -> Solver {
+    Solver::EventDriven { tolerance, resolve: Resolve::Taylor }
 }
 
 /// The drive under which solvers run.
@@ -117,14 +126,16 @@ impl Selection for DriveAlone {
 
 columns! {
     /// One solver under one drive. Costs are those of its cheapest realisation per step: other work on the machine can only
-    /// add to them. Errors of break times and the ledger are left out where they would take too long.
+    /// add to them. Errors of break times and the ledger are left out where they would take too long, and the ledger
+    /// along the grid, where none is kept.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MethodRow {
         parameters: Selected<DriveAlone>;
         solver: Solver;
         cost: Cost;
-        cost_spread as "cpu_spread": f64 = "",
-            "CPU time per step of the dearest realisation over that of the cheapest, which the costs are";
+        timings: u64 = "", "timings, one of each realisation; the costs are by the cheapest per step";
+        median_per_slip as "median_cpu_per_slip": f64 = "s", "CPU time per slip by the median timing";
+        largest_per_slip as "largest_cpu_per_slip": f64 = "s", "CPU time per slip by the dearest timing";
         break_times: BreakErrors;
         ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
     }
@@ -234,29 +245,31 @@ struct Ensemble {
     slips_seen: u64,
     end_time: f64,
     steps: u64,
-    /// CPU time per step of the fastest and of the slowest realisation, in s.
-    per_step: Option<(f64, f64)>,
+    /// CPU time per step of each realisation that was timed, in s.
+    per_step: Vec<f64>,
 }
 
 impl Ensemble {
     fn add(&mut self, cpu_seconds: f64, summary: &Summary, slips: Vec<Slip>) {
-        let per_step = cpu_seconds / summary.steps as f64;
-        let (least, most) = self.per_step.unwrap_or((per_step, per_step));
-        self.per_step = Some((least.min(per_step), most.max(per_step)));
+        self.per_step.push(cpu_seconds / summary.steps as f64);
         self.end_time += summary.end_time;
         self.steps += summary.steps;
         self.slips_seen += if slips.is_empty() { 0 } else { DISCARD + slips.len() as u64 };
         self.slips.extend(slips);
     }
 
-    /// Cost by the CPU time per step of the fastest realisation, and that of the slowest over it. Without slips the
-    /// cost per slip follows from the mean interval in s.
-    fn cost(&self, mean_interval: f64) -> (Cost, f64) {
-        let (least, most) = self.per_step.unwrap_or_default();
+    /// Costs by the CPU time per step of the fastest realisation, of the median one and of the slowest. Without slips
+    /// those per slip follow from the mean interval in s.
+    fn costs(&self, mean_interval: f64) -> [Cost; 3] {
+        let mut per_step = self.per_step.clone();
+        per_step.sort_by(f64::total_cmp);
+        let last = per_step.len() - 1;
         let summary = Summary { end_time: self.end_time, steps: self.steps, ..Summary::default() };
-        let cost = Cost::of(least * self.steps as f64, &summary, self.slips_seen);
         let steps_per_slip = mean_interval * self.steps as f64 / self.end_time;
-        (if self.slips_seen > 0 { cost } else { cost.extrapolated(steps_per_slip) }, most / least)
+        [0, last / 2, last].map(|place| {
+            let cost = Cost::of(per_step[place] * self.steps as f64, &summary, self.slips_seen);
+            if self.slips_seen > 0 { cost } else { cost.extrapolated(steps_per_slip) }
+        })
     }
 }
 
@@ -270,7 +283,7 @@ impl Study {
         for (drive, parameters) in self.drives().iter().enumerate() {
             report(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
-            let tightest = Solver::event_driven(*TOLERANCES.start());
+            let tightest = taylor(*TOLERANCES.start());
             realisation(parameters, tightest).simulate(&mut first_breaks)?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
@@ -281,7 +294,7 @@ impl Study {
             let mut ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if drive == 0 { self.first_drive_multiple } else { 1 };
             report("reference ensemble, and the realisations of the others that are not timed");
-            let reference = Solver::event_driven(ENSEMBLE_TOLERANCE);
+            let reference = taylor(ENSEMBLE_TOLERANCE);
             let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
             for (&solver, ensemble) in self.solvers.iter().zip(&mut ensembles) {
@@ -293,12 +306,14 @@ impl Study {
             let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
                 let parameters = parameters.clone();
-                let (cost, cost_spread) = ensemble.cost(mean_interval);
+                let [cost, median, dearest] = ensemble.costs(mean_interval);
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters.clone()),
                     solver,
                     cost,
-                    cost_spread,
+                    timings: self.seeds,
+                    median_per_slip: median.per_slip,
+                    largest_per_slip: dearest.per_slip,
                     break_times,
                     ledger_residual,
                 });
@@ -336,7 +351,8 @@ impl Study {
     }
 
     fn ledger_residual(&self, realisation: &Realisation<'_>) -> Result<Option<f64>, AccuracyError> {
-        if self.is_stretch_only(realisation.parameters, realisation.solver) {
+        let is_on_grid = matches!(realisation.solver, Solver::EventDriven { resolve: Resolve::Grid, .. });
+        if is_on_grid || self.is_stretch_only(realisation.parameters, realisation.solver) {
             return Ok(None);
         }
         let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
@@ -406,11 +422,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_small_study_distinguishes_a_coarse_step_from_a_tight_tolerance() {
-        let (coarse, tight) = (Solver::FixedStep { time_step: 4e-6 }, Solver::event_driven(1e-8));
+    fn a_small_study_distinguishes_a_coarse_step_from_the_grid_and_that_from_a_tight_tolerance() {
         let study = Study {
             velocities: vec![1e-4],
-            solvers: vec![coarse, tight],
+            solvers: solvers(&[4e-6], &[1e-4], &[1e-8]),
             seeds: 1,
             first_drive_multiple: 3,
             slips: 4,
@@ -419,21 +434,21 @@ mod tests {
             ..Study::quick()
         };
         let findings = study.run(&mut |_| {}).unwrap();
-        assert_eq!(findings.methods.len(), 4);
-        for pair in findings.methods.chunks(2) {
-            let (coarse, tight) = (&pair[0], &pair[1]);
-            let (late, close) = (coarse.break_times, tight.break_times);
-            assert!(
-                late.median > Some(1e-7) && close.median < Some(1e-9) && close.missing == Some(0),
-                "{late:?} {close:?}"
-            );
-            assert!(coarse.ledger_residual.unwrap().abs() > 1e-4 && tight.ledger_residual.unwrap().abs() < 1e-8);
-            for row in pair {
-                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
+        assert_eq!(findings.methods.len(), 6);
+        for rows in findings.methods.chunks(3) {
+            let [coarse, grid, tight] = [0, 1, 2].map(|row| rows[row].break_times);
+            assert!(coarse.median > Some(1e-7), "{coarse:?}");
+            // Seen: 1e-8 s and 2e-14 s.
+            assert!(grid.median > Some(1e-10) && grid.median < Some(1e-7) && grid.missing == Some(0), "{grid:?}");
+            assert!(tight.median < Some(1e-12) && tight.missing == Some(0), "{tight:?}");
+            assert!(rows[0].ledger_residual.unwrap().abs() > 1e-4 && rows[2].ledger_residual.unwrap().abs() < 1e-8);
+            assert_eq!(rows[1].ledger_residual, None);
+            for row in rows {
+                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9 && row.timings == 1, "{row:?}");
             }
         }
-        // All quantities of both solvers, but no phase where there is no modulation.
-        assert_eq!(findings.distances.len(), 2 * 5 + 2 * 6);
+        // All quantities of all solvers, but no phase where there is no modulation.
+        assert_eq!(findings.distances.len(), 3 * 5 + 3 * 6);
         for row in &findings.distances {
             let seeds = if row.parameters.modulation_period.is_none() { 3 } else { 1 };
             assert_eq!((row.slips, row.reference_slips), (4 * seeds, 8 * seeds), "{row:?}");
@@ -467,12 +482,13 @@ mod tests {
         let mut ensemble = Ensemble::default();
         let summary = Summary { end_time: 0.5, steps: 500_000, ..Summary::default() };
         ensemble.add(0.1, &summary, Vec::new());
-        let (cost, _) = ensemble.cost(10.0);
+        let [cost, ..] = ensemble.costs(10.0);
         assert_eq!((cost.steps_per_slip, cost.timed_slips), (1e7, 0));
         assert!((cost.per_slip - 2.0).abs() < 1e-12 && (cost.per_simulated_second - 0.2).abs() < 1e-12);
-        // Another realisation that other work has slowed down changes nothing but the spread.
+        // Others that other work has slowed down change nothing but the spread.
         ensemble.add(0.3, &summary, Vec::new());
-        let (cost, spread) = ensemble.cost(10.0);
-        assert!((cost.per_slip - 2.0).abs() < 1e-12 && (spread - 3.0).abs() < 1e-12);
+        ensemble.add(0.2, &summary, Vec::new());
+        let per_slip = ensemble.costs(10.0).map(|cost| cost.per_slip);
+        assert!(per_slip.iter().zip([2.0, 4.0, 6.0]).all(|(cost, expected)| (cost - expected).abs() < 1e-12));
     }
 }

@@ -31,7 +31,7 @@ pub use draw::draw_all;
 pub use picture::Picture;
 pub use scaling::{Growth, Line, scaling};
 pub use simulation::{AttachedMap, simulation};
-pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
+pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
