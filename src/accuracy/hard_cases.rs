@@ -275,7 +275,8 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(reattachment, &[(TauR, Real(1e-6))], 0.12));
     cases.push(case(reattachment, &[(TauR, Real(1e-6)), (Dfs, Real(0.0))], 0.12));
     cases.push(case(reattachment, &[(TauR, Real(10.0))], 30.0));
-    cases.push(case(reattachment, &[(TauR, Real(10.0)), (V0, Real(1e-6))], 60.0));
+    // Few contacts hold: breaks of single seeds differ threefold, while means over 20 seeds agree within 2 %.
+    cases.push(case(reattachment, &[(TauR, Real(10.0)), (V0, Real(1e-6))], 60.0).alike(0.7));
 
     let wide = "thresholds that could be drawn negative";
     cases.extend([0.411, 1.37].map(|spread| case(wide, &[(Dfs, Real(spread))], 0.5)));

@@ -22,7 +22,7 @@ use std::f64::consts::TAU;
 const LOOK_AHEAD: f64 = 10.0;
 
 /// Part of the error of a leap that the reattachments passed by it may add up to.
-const PASSED_SHARE: f64 = 0.4;
+const PASSED_SHARE: f64 = 0.2;
 
 /// Free motion at which a contact may attach on the driven solution, in errors of a leap.
 const LOOSE: f64 = 3.0;
