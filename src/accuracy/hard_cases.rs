@@ -299,6 +299,10 @@ pub fn hard_cases() -> Vec<HardCase> {
     cases.push(case(drive, &modulated(1e-6, 1e-5), 0.2));
     cases.push(case(drive, &modulated(1e-9, 1e-5), 0.5));
     cases.push(case(drive, &modulated(1e-6, 100.0), 0.5));
+    for blocks in [1, 2, 8] {
+        let [amplitude, period] = modulated(1e-6, 2e-4);
+        cases.push(case(drive, &[amplitude, period, (V0, Real(2e-6)), (N, Count(blocks))], 0.7).slips(u64::MAX));
+    }
     for (index, gamma) in [(0, 10.0), (0, 0.0), (69, 10.0)] {
         let [amplitude, period] = modulated(1e-8, resonant_period(index));
         cases.push(case(drive, &[amplitude, period, (Gamma, Real(gamma))], 0.2));

@@ -2,8 +2,8 @@
 
 use stickslip::accuracy::{HardCase, hard_cases};
 use stickslip::model::{Change, Parameters};
-use stickslip::observe::ContactLog;
-use stickslip::solver::{Limits, SimulationError, Solver, simulate};
+use stickslip::observe::{ContactLog, Observers, Profile, Recording, SlipObserver};
+use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate};
 
 #[track_caller]
 fn all_pass(threat: &str) {
@@ -76,6 +76,77 @@ fn a_strong_modulation_breaks_contacts_in_reverse() {
         assert!((event.force.abs() / event.threshold - 1.0).abs() < 1e-5, "{event:?}");
     }
     assert!(breaks().any(|event| event.force < 0.0) && breaks().any(|event| event.force > 0.0));
+}
+
+/// Displacement of the leading edge at a time in s, in m, if nothing breaks before.
+fn displacement_at(parameters: &Parameters, solver: Solver, end_time: f64) -> Option<f64> {
+    let (mut log, mut profile) = (ContactLog::default(), Profile::new(parameters));
+    let limits = Limits { end_time, events: 1_000_000, interrupt: None };
+    let mut both = Observers { lead: &mut log, others: vec![&mut profile] };
+    let summary = simulate(parameters, solver, limits, &mut both).unwrap();
+    (summary.breaks == 0).then(|| profile.rows.last().unwrap().displacement)
+}
+
+#[test]
+fn from_rest_a_fast_modulation_is_followed_within_the_tolerance() {
+    // At rest the first terms of a Taylor series vanish: a series cut there is off by hundreds of tolerances.
+    for (blocks, period) in [(1, 2e-4), (2, 2e-4), (8, 2e-4), (8, 5e-5), (1, 1e-5), (70, 2e-4)] {
+        let parameters = Parameters {
+            blocks,
+            drive_velocity: 2e-6,
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(period),
+            ..Parameters::default()
+        };
+        let mut compared = 0;
+        for end_time in (1..30).map(|step| 3.9e-5 * f64::from(step)) {
+            let at =
+                |tolerance, resolve| displacement_at(&parameters, Solver::EventDriven { tolerance, resolve }, end_time);
+            let Some(exact) = at(1e-12, Resolve::Taylor) else { break };
+            for resolve in [Resolve::Taylor, Resolve::Grid] {
+                for tolerance in [1e-3, 1e-4, 1e-6] {
+                    let error = (at(tolerance, resolve).unwrap() - exact).abs() / parameters.contact_reach();
+                    // Seen: 0.8 of the tolerance.
+                    assert!(error < tolerance, "{error:e} at {end_time} s, {tolerance:e}, {resolve:?}, N = {blocks}");
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared >= 6 * 5, "{compared} compared");
+    }
+}
+
+#[test]
+fn where_a_cycle_gains_less_than_the_tolerance_onsets_are_right_to_a_few_cycles() {
+    let period = 2e-4;
+    let parameters = Parameters {
+        blocks: 1,
+        drive_velocity: 2e-6,
+        modulation_amplitude: 1e-6,
+        modulation_period: Some(period),
+        ..Parameters::default()
+    };
+    let onsets = |solver| -> Vec<f64> {
+        let recording = Recording { slips: 100, discard: 0, ..Recording::default() };
+        let mut observer = SlipObserver::new(&parameters, &recording);
+        simulate(&parameters, solver, Limits { end_time: 0.7, events: 1_000_000, interrupt: None }, &mut observer)
+            .unwrap();
+        observer.into_rows().0.iter().map(|slip| slip.onset).collect()
+    };
+    let exact = onsets(Solver::event_driven(1e-9));
+    // The third at 0.4792 s, as with a fixed step of 5e-8 s.
+    assert!(exact.len() == 5 && (exact[2] - 0.479_200).abs() < 1e-6, "{exact:?}");
+    for resolve in [Resolve::Taylor, Resolve::Grid] {
+        for tolerance in [1e-3, 1e-4] {
+            let found = onsets(Solver::EventDriven { tolerance, resolve });
+            assert_eq!(found.len(), exact.len());
+            for (found, exact) in found.iter().zip(&exact) {
+                let cycles = (found - exact) / period;
+                // 2.4 cycles gain the tolerance of 1e-3; and the phase stays.
+                assert!(cycles.abs() < 2.5 && (cycles - cycles.round()).abs() < 1e-3, "{found} and {exact}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Taylor steps of the chain: x(t + s h) = Σ Y_p s^p/p! for s in [0, 1], with Y_p = h^p x^(p).
 //!
 //! The equation of motion gives each order from the two before, Y_{p+2} = h² (A Y_p + forces) - γ h Y_{p+1}, one sweep
-//! of a tridiagonal stencil. Orders are added until two successive terms, times their order, fall below the error
-//! allowed. The sum of the terms' magnitudes bounds how far each block moves within the step.
+//! of a tridiagonal stencil. Orders are added until two successive terms, times their order, and what the drive adds to
+//! the next, fall below the error allowed. The sum of the terms' magnitudes bounds how far each block moves within the
+//! step.
 
 use super::chain::{Chain, State};
 use super::series::{DriveDerivatives, INVERSE_FACTORIAL, Series};
@@ -12,6 +13,9 @@ use crate::solver::polynomial::MAX_COEFFICIENTS;
 
 /// Largest order of a step.
 const MAX_ORDER: usize = MAX_COEFFICIENTS - 1;
+
+/// Order at which convergence is first looked at.
+const MIN_ORDER: usize = 3;
 
 /// What a step needs to know about its length and the drive.
 #[derive(Clone, Copy, Debug)]
@@ -65,13 +69,29 @@ pub(super) fn expand<S: Simd, const R: usize>(
         pulling: input.length * input.length * (chain.drive_stiffness / chain.mass),
         drive: input.drive,
     };
+    let min_order = input.min_order.max(order_of_drive(input.drive, recurrence.pulling, input.error));
+    let input = StepInput { min_order, ..*input };
     let order = if R > 0 && S::HAS_MANY_REGISTERS {
-        converge_in_registers::<S, R>(recurrence, input, terms)
+        converge_in_registers::<S, R>(recurrence, &input, terms)
     } else {
-        converge_in_memory(recurrence, input, terms, rows)
+        converge_in_memory(recurrence, &input, terms, rows)
     };
     series.order = order.unwrap_or(series.order);
     order.is_some()
+}
+
+/// Least order from which on what a modulated drive adds to the orders left out, times their order, is within `error` m.
+/// Terms may vanish that the drive is still to make: at rest, those of the first four orders do.
+#[inline(always)]
+fn order_of_drive(drive: DriveDerivatives, pulling: f64, error: f64) -> usize {
+    let mut order = MIN_ORDER;
+    // Of order + 1, times that; from here on they fall, since a step is at most four radians of the modulation.
+    let mut term = pulling * (drive.swing[0].abs() + drive.swing[1].abs()) * drive.angle * drive.angle / 6.0;
+    while term > error && order < MAX_ORDER {
+        order += 1;
+        term *= drive.angle / order as f64;
+    }
+    order
 }
 
 /// The recurrence from the last two orders to the next.
