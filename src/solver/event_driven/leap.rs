@@ -52,6 +52,8 @@ pub(super) struct Bounds {
     pub until_cycle_end: f64,
     /// Displacement that may be left out, in m.
     pub error: f64,
+    /// Mean contact reach, in m: how far a contact that attaches later moves until it breaks.
+    pub reach: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
     pub largest_force: f64,
 }
@@ -135,7 +137,7 @@ impl Leap {
         kernels: &dyn Kernels,
         drive: &Harmonic,
         largest: f64,
-        Bounds { horizon, until_cycle_end, error, largest_force }: Bounds,
+        Bounds { horizon, until_cycle_end, error, reach, largest_force }: Bounds,
         state: &mut State,
         report: impl FnOnce(Segment<'static>),
         audit: Option<&mut Audit>,
@@ -166,9 +168,9 @@ impl Leap {
         }
         let path = self.motion.driven.force_path(drive, chain.drive_stiffness);
         let segment = Segment { start: 0.0, duration: elapsed, path };
-        if largest > error
-            && !self.hides_no_peak(chain, drive, &segment, [moving, until_cycle_end], left, largest_force)
-        {
+        // No block moves faster than the first. What attaches later breaks beyond, where nothing is known.
+        let known = until_cycle_end.min(moving + reach / self.motion.driven.rate[0]);
+        if largest > error && !self.hides_no_peak(chain, drive, &segment, [moving, known], left, largest_force) {
             return wait(0.7);
         }
         report(segment);
@@ -186,14 +188,14 @@ impl Leap {
     }
 
     /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear
-    /// force: one as large is on record, or comes later in the segment, or comes after it, within `until_cycle_end` s
+    /// force: one as large is on record, or comes later in the segment, or comes after it, within `known` s
     /// and before any break.
     fn hides_no_peak(
         &self,
         chain: &Chain,
         drive: &Harmonic,
         segment: &Segment<'_>,
-        [moving, until_cycle_end]: [f64; 2],
+        [moving, known]: [f64; 2],
         left: f64,
         largest_force: f64,
     ) -> bool {
@@ -216,7 +218,7 @@ impl Leap {
         } else {
             (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
         };
-        let ahead = (moving + further).min(until_cycle_end);
+        let ahead = (moving + further).min(known);
         driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
     }
 
@@ -304,7 +306,8 @@ mod tests {
         let amplitude = 1e-6;
         state.displacement[0][0] = amplitude;
         let horizon = 1e9;
-        let bounds = Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, largest_force: f64::INFINITY };
+        let bounds =
+            Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, reach: 1e-6, largest_force: f64::INFINITY };
         let mut leap = Leap::new(layout);
         let largest = leap.split(&chain, &*kernels, &drive, &state).unwrap();
         let attempt = leap.attempt(&chain, &*kernels, &drive, largest, bounds, &mut state, |_| {}, None);

@@ -226,7 +226,13 @@ impl<'a> Integration<'a> {
                 return false;
             }
         }
-        let bounds = Bounds { horizon, until_cycle_end, error, largest_force: self.largest_force };
+        let bounds = Bounds {
+            horizon,
+            until_cycle_end,
+            error,
+            reach: self.tolerances.contact_reach,
+            largest_force: self.largest_force,
+        };
         let mut reported = None;
         let report = |segment: Segment<'static>| reported = Some(Segment { start, ..segment });
         let before = self.audit.is_some().then(|| state.clone());
