@@ -256,8 +256,6 @@ const SOLVERS: [(f64, Resolve); 4] =
 const TOLERANCES: f64 = 3.0;
 /// What a perturbation does to the time of a break is known to within this factor, by four examples.
 const FACTOR: f64 = 4.0;
-/// And along the grid, since the events of a block that share a step are not taken in their order: 1 once they are.
-const OUT_OF_ORDER: f64 = 2.0;
 /// Radians of the fastest mode that a slider remembers at the default damping: errors of the grid may add up beyond.
 const REMEMBERED: f64 = 130.0;
 /// Halvings of the fixed step.
@@ -288,7 +286,7 @@ fn sensitivity(parameters: &Parameters, reference: &Run, size: f64) -> Result<Ve
 /// How many tolerances the grid's displacements may be off by: more where little is forgotten.
 fn grid_share(parameters: &Parameters, end: f64) -> f64 {
     let memory = if parameters.damping_rate > 0.0 { end.min(2.0 / parameters.damping_rate) } else { end };
-    OUT_OF_ORDER * TOLERANCES * (largest_frequency(parameters) * memory / REMEMBERED).max(1.0)
+    TOLERANCES * (largest_frequency(parameters) * memory / REMEMBERED).max(1.0)
 }
 
 fn check(number: u64) -> Result<Shown, String> {

@@ -28,8 +28,8 @@ struct Path {
     about: f64,
     /// Coefficients in σ - `about`, in m.
     coefficients: [f64; 5],
-    /// Displacement at the end of the step and increment up to there that have been entered into the motion, in m.
-    entered: Correction,
+    /// Displacement at the end of the step and increment up to there without events, in m.
+    eventless: Correction,
     /// What events add to the blocks beside.
     beside: Correction,
 }
@@ -62,8 +62,8 @@ impl Path {
         let last = ((1.0 - 2.0 * SIXTH * damping) * to - SIXTH * damping * from) * inverse;
         let coefficients = [end - rise, rise - (2.0 * first + last) * SIXTH, 0.5 * first, (last - first) * SIXTH, 0.0];
         let bare = slider.chain.bare[row][lane];
-        let entered = Correction { displacement: end, increment: rise };
-        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, entered, beside: Correction::default() }
+        let eventless = Correction { displacement: end, increment: rise };
+        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, eventless, beside: Correction::default() }
     }
 
     /// Displacement at a point of the step, in m.
@@ -138,22 +138,26 @@ pub(super) struct StepEvents {
     contacts: Vec<(f64, usize)>,
 }
 
-/// Breaks and attaches what the last step reaches and what is due in it, block after block. The step began at `start` s
-/// in the frame.
+/// Breaks and attaches what the last step reaches and what is due in it, in the order of time at each block. The step began
+/// at `start` s in the frame.
 #[inline(always)]
 pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) {
     let Grid { step, drive, events, .. } = grid;
-    events.paths.clear();
-    for index in 0..step.reached.len() {
-        let (row, lane) = step.reached[index];
+    let StepEvents { paths, .. } = events;
+    paths.clear();
+    for &(row, lane) in &step.reached {
         let block = slider.chain.layout.block(row, lane);
-        let mut path = Path::new(slider, step, drive, block, (row, lane));
-        break_along(&mut slider.interface, step, events, &mut path, start);
-        settle(slider, step, &mut path);
-        events.paths.push(path);
+        paths.push(Path::new(slider, step, drive, block, (row, lane)));
     }
     let end = start + step.length;
-    while let Some((due, block)) = slider.interface.next_reattachment_by(end) {
+    loop {
+        let mut paths = std::mem::take(&mut events.paths);
+        for path in &mut paths {
+            break_along(&mut slider.interface, step, events, path, start);
+        }
+        events.paths = paths;
+        // Breaks may have made something due within the step.
+        let Some((due, block)) = slider.interface.next_reattachment_by(end) else { break };
         let known = events.paths.iter().position(|path| path.block == block);
         let mut path = match known {
             Some(index) => events.paths.swap_remove(index),
@@ -161,17 +165,17 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
         };
         path.move_to(((due - start) * step.inverse_length).clamp(0.0, 1.0));
         attach(&mut slider.interface, step, events, &mut path);
-        // It may break again at once.
-        break_along(&mut slider.interface, step, events, &mut path, start);
-        settle(slider, step, &mut path);
         events.paths.push(path);
+    }
+    for path in &events.paths {
+        settle(slider, step, path);
     }
     if !events.events.is_sorted_by(|a, b| a.time <= b.time) {
         events.events.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
 }
 
-/// Breaks what a block reaches along the rest of its path, contact after contact.
+/// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach.
 #[inline(always)]
 fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, path: &mut Path, start: f64) {
     let block = path.block;
@@ -181,15 +185,17 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
             return;
         }
         interface.reached(block, end, &mut events.contacts);
-        if events.contacts.is_empty() {
-            // Not a number: the run ends soon.
-            return;
-        }
         let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
+        let mut broken = 0;
         for &(level, contact) in &events.contacts {
-            path.move_to(path.crossing(level));
+            let s = path.crossing(level);
+            let time = start + s * step.length;
+            if time > interface.next_reattachment() {
+                break;
+            }
+            path.move_to(s);
             path.coefficients[0] = level;
-            let event = interface.break_contact(block, contact, start + path.about * step.length, level);
+            let event = interface.break_contact(block, contact, time, level);
             let [_, slope, half_curvature, ..] = path.coefficients;
             let stiffened = -step.by_mass * event.stiffness;
             let second = 0.5 * step.by_mass * event.force;
@@ -202,8 +208,13 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
             events.events.push(event);
+            broken += 1;
         }
-        events.breaks += events.contacts.len() as u64;
+        if broken == 0 {
+            // Something attaches before, or the path is not a number and the run ends soon.
+            return;
+        }
+        events.breaks += broken;
         interface.gather(block);
     }
 }
@@ -225,17 +236,15 @@ fn attach(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, p
 
 /// Enters what has happened to a block into the motion.
 #[inline(always)]
-fn settle(slider: &mut Slider, step: &mut GridStep, path: &mut Path) {
+fn settle(slider: &mut Slider, step: &mut GridStep, path: &Path) {
     let Slider { chain, interface, state } = slider;
     chain.update(path.block, interface);
     let displacement = path.at(1.0);
-    let now = Correction { displacement, increment: displacement - path.at(0.0) };
     let own = Correction {
-        displacement: now.displacement - path.entered.displacement,
-        increment: now.increment - path.entered.increment,
+        displacement: displacement - path.eventless.displacement,
+        increment: displacement - path.at(0.0) - path.eventless.increment,
     };
     step.correct(chain, path.block, path.slot, [own, path.beside], &mut state.displacement);
-    (path.entered, path.beside) = (now, Correction::default());
 }
 
 #[cfg(test)]
@@ -245,7 +254,7 @@ mod tests {
 
     fn path(coefficients: [f64; 5], about: f64) -> Path {
         let none = Correction::default();
-        Path { block: 0, slot: (0, 0), bare: 0.0, about, coefficients, entered: none, beside: none }
+        Path { block: 0, slot: (0, 0), bare: 0.0, about, coefficients, eventless: none, beside: none }
     }
 
     proptest! {

@@ -244,22 +244,23 @@ impl Integration<'_> {
         }
     }
 
-    /// Tells the shear force up to the last break of the last step, and what has happened up to then; then the attachments
-    /// beyond.
+    /// Tells what has happened in the last step, and the shear force up to it: event after event to an observer that
+    /// follows attachments; else up to the first break, so that a pause before it shows, and then up to the last.
     fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
         let events = std::mem::take(&mut self.grid.events.events);
-        let breaks = events.iter().rposition(|event| event.change == Change::Break).map_or(0, |last| last + 1);
-        if breaks > 0 {
+        if events.iter().any(|event| event.change == Change::Break) {
             self.largest_force = f64::NEG_INFINITY;
         }
-        for events in [&events[..breaks], &events[breaks..]] {
-            if let Some(last) = events.last() {
-                let s = ((last.time - start) * self.grid.step.inverse_length).clamp(0.0, 1.0);
-                self.tell_force(s, observer);
-                for event in events {
-                    observer.contact(&self.frame.absolute(*event));
-                }
+        let mut rest = &events[..];
+        while let [first, ..] = rest {
+            let is_alone = self.grid.tells_attachments() || rest.len() == events.len();
+            let (told, later) = rest.split_at(if is_alone { 1 } else { rest.len() });
+            let until = told.last().unwrap_or(first).time;
+            self.tell_force(((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0), observer);
+            for event in told {
+                observer.contact(&self.frame.absolute(*event));
             }
+            rest = later;
         }
         self.grid.events.events = events;
     }
