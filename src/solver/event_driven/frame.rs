@@ -58,7 +58,7 @@ impl Frame {
         self.time > self.span
     }
 
-    /// Whether a step of `length` s spans so many units in the last place of the time that events in it can be located.
+    /// Whether the clock is fine enough to locate events within a step of `length` s.
     #[inline]
     pub fn resolves(&self, length: f64) -> bool {
         length >= MIN_RESOLUTION * f64::EPSILON * self.time.max(self.span)

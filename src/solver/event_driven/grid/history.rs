@@ -20,7 +20,7 @@ impl ForceHistory {
         Self { steps: Vec::new(), first: 0.0, start: 0.0, inner: Extremes::NONE, integral: 0.0 }
     }
 
-    /// Begins anew at a time in s, at the next step.
+    /// Restarts at a time in s, with the next step.
     pub fn restart(&mut self, start: f64) {
         self.steps.clear();
         *self = Self { steps: std::mem::take(&mut self.steps), start, ..Self::new() };

@@ -98,15 +98,14 @@ impl Grid {
     /// its start. Returns the force at the start of the last step and its second derivative there, in N.
     #[inline(always)]
     fn follow_run(&mut self, steps: usize, before: f64) -> [f64; 2] {
-        let (mut before, mut here) = (before, self.force);
+        let mut here = self.force;
         let mut bend = (self.step.trail[0] - here) - (here - before);
         for pair in self.step.trail[..steps].windows(2) {
             let [next, beyond] = [pair[0], pair[1]];
             let next_bend = (beyond - next) - (next - here);
             self.history.push(CubicStep { force: [here, next], bend: [bend, next_bend] });
-            (before, here, bend) = (here, next, next_bend);
+            (here, bend) = (next, next_bend);
         }
-        let _ = before;
         [here, bend]
     }
 
