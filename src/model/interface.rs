@@ -61,6 +61,17 @@ struct ContactRow {
     generation: [u32; LANES],
 }
 
+impl ContactRow {
+    /// One bit a lane: whether its contact breaks up to a displacement in m.
+    #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
+    fn reached(&self, displacement: f64) -> u64 {
+        let lanes: [u8; LANES] =
+            array::from_fn(|lane| u8::from((self.upper[lane] <= displacement) | (self.lower[lane] >= displacement)));
+        u64::from_le_bytes(lanes).wrapping_mul(GATHER_BITS) >> 56
+    }
+}
+
 /// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::shift`].
 #[derive(Clone, Debug)]
 pub struct Interface {
@@ -170,15 +181,12 @@ impl Interface {
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// passes each to `log`.
     #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
         // As many rows at a time as have a bit for each contact.
         for start in (0..self.rows_per_block).step_by(LANES) {
             let mut reached = 0_u64;
-            for (row, ContactRow { upper, lower, .. }) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
-                let in_row: [u8; LANES] =
-                    array::from_fn(|lane| u8::from((upper[lane] <= displacement) | (lower[lane] >= displacement)));
-                reached |= (u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56) << (LANES * row);
+            for (index, row) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
+                reached |= row.reached(displacement) << (LANES * index);
             }
             while reached != 0 {
                 let contact = LANES * start + reached.trailing_zeros() as usize;
@@ -197,14 +205,11 @@ impl Interface {
     /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the order
     /// in which the block comes to them.
     #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
     pub fn reached(&self, block: usize, displacement: f64, contacts: &mut Vec<(f64, usize)>) {
         contacts.clear();
         let mut is_sorted = true;
         for (index, row) in self.rows_of(block).iter().enumerate() {
-            let in_row: [u8; LANES] =
-                array::from_fn(|lane| u8::from((row.upper[lane] <= displacement) | (row.lower[lane] >= displacement)));
-            let mut reached = u64::from_le_bytes(in_row).wrapping_mul(GATHER_BITS) >> 56;
+            let mut reached = row.reached(displacement);
             while reached != 0 {
                 let lane = reached.trailing_zeros() as usize;
                 // Further along in the direction of motion is larger.
