@@ -158,6 +158,21 @@ impl Interface {
         self.reattachments.next().map(|due| (due.time(), due.block())).filter(|(due, _)| *due <= time)
     }
 
+    /// Time in s of the next reattachment at a block, if it is due by a time in s; else infinite.
+    #[inline(always)]
+    pub fn next_reattachment_at(&mut self, block: usize, by: f64) -> f64 {
+        let mut next = f64::INFINITY;
+        if self.next_reattachment() <= by {
+            self.look_ahead(|due, other| {
+                if due <= by && other == block {
+                    next = due;
+                }
+                due <= by && other != block
+            });
+        }
+        next
+    }
+
     /// Visits the reattachments to come, with time in s and block, in order, until told to stop.
     pub fn look_ahead(&mut self, mut visit: impl FnMut(f64, usize) -> bool) {
         self.reattachments.look_ahead(|due| visit(due.time(), due.block()));
@@ -232,13 +247,12 @@ impl Interface {
         }
     }
 
-    /// Breaks one contact, at a break position in m. The block's sums and nearest break positions are left as they are: see
-    /// [`Self::gather`].
+    /// Breaks one contact, at a break position in m. Returns the event, and when the contact reattaches, in s. The block's
+    /// sums and nearest break positions are left as they are: see [`Self::gather`].
     #[inline(always)]
-    pub fn break_contact(&mut self, block: usize, contact: usize, time: f64, displacement: f64) -> ContactEvent {
+    pub fn break_contact(&mut self, block: usize, contact: usize, time: f64, displacement: f64) -> (ContactEvent, f64) {
         let event = self.event(block, contact, time, displacement, Change::Break);
-        self.detach(block, contact, time);
-        event
+        (event, self.detach(block, contact, time))
     }
 
     /// Moves the frame: subtracts `shift` m from every position.
@@ -317,9 +331,9 @@ impl Interface {
         levels
     }
 
-    /// Ends the life of a contact and draws the next.
+    /// Ends the life of a contact and draws the next, which begins at the time returned, in s.
     #[inline(always)]
-    fn detach(&mut self, block: usize, contact: usize, time: f64) {
+    fn detach(&mut self, block: usize, contact: usize, time: f64) -> f64 {
         let (row, lane) = self.place(block, contact);
         let row = &mut self.rows[row];
         row.attached_stiffness.set(lane, 0.0);
@@ -327,7 +341,9 @@ impl Interface {
         row.lower.set(lane, f64::NEG_INFINITY);
         row.generation[lane] += 1;
         row.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, row.generation[lane]);
-        self.reattachments.push(Due::new(time + row.life[lane].delay, block, contact));
+        let due = time + row.life[lane].delay;
+        self.reattachments.push(Due::new(due, block, contact));
+        due
     }
 
     /// Computes the sums and nearest break positions of a block again.

@@ -186,16 +186,17 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
         }
         interface.reached(block, end, &mut events.contacts);
         let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
+        let mut until = interface.next_reattachment_at(block, start + step.length);
         let mut broken = 0;
         for &(level, contact) in &events.contacts {
             let s = path.crossing(level);
             let time = start + s * step.length;
-            if time > interface.next_reattachment() {
+            if time > until {
                 break;
             }
             path.move_to(s);
             path.coefficients[0] = level;
-            let event = interface.break_contact(block, contact, time, level);
+            let (event, due) = interface.break_contact(block, contact, time, level);
             let [_, slope, half_curvature, ..] = path.coefficients;
             let stiffened = -step.by_mass * event.stiffness;
             let second = 0.5 * step.by_mass * event.force;
@@ -208,6 +209,7 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
             events.events.push(event);
+            until = until.min(due);
             broken += 1;
         }
         if broken == 0 {
