@@ -152,6 +152,9 @@ mod tests {
             force: 1.0,
             threshold: 1.0,
             stiffness: 1.0,
+            attached: 0,
+            attached_time: 0.0,
+            mean_displacement: 0.0,
         }
     }
 

@@ -19,10 +19,10 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Description, Parameters, Symbol, Value};
 use stickslip::observe::{
-    AttachedMap, ContactLog, Measurements, Observers, Profile, Recording, RecordingKey, SlipObserver, Trace,
+    AttachedMap, ContactLog, Measurements, Observers, Profile, Recording, RecordingKey, Regime, SlipObserver, Trace,
 };
 use stickslip::results::tables;
-use stickslip::results::tables::{DriveAndSeed, SlipRow};
+use stickslip::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
 use stickslip::solver::{self, Observer};
 use stickslip::sweep::{Job, Sweep, SweepError};
 use stickslip::table::file::Footer;
@@ -130,6 +130,7 @@ impl Args for RecordingFlags {
             };
             let value_name = match unit {
                 "s" => "SECONDS",
+                "m" => "METRES",
                 "N" => "NEWTONS",
                 _ => "N",
             };
@@ -180,7 +181,11 @@ struct Report {
     simulated_seconds: f64,
     slips: usize,
     mean_interval_seconds: Option<f64>,
+    outcome: &'static str,
+    regime: Option<&'static str>,
     mean_friction_newtons: Option<f64>,
+    attached_fraction: Option<f64>,
+    slip_share: Option<f64>,
     breaks: u64,
     reattachments: u64,
     ruptures: u64,
@@ -337,7 +342,7 @@ fn as_json(parameters: &Parameters) -> String {
 }
 
 fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
-    let (slips, summary) = (&measured.slips, &measured.summary);
+    let (slips, summary, averages) = (&measured.slips, &measured.summary, measured.averages);
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
     let report = Report {
@@ -346,7 +351,11 @@ fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Resul
         simulated_seconds: summary.end_time,
         slips: slips.len(),
         mean_interval_seconds: mean,
-        mean_friction_newtons: measured.mean_friction,
+        outcome: JobOutcome::of(measured).word(),
+        regime: measured.regime().map(Regime::word),
+        mean_friction_newtons: averages.map(|averages| averages.friction),
+        attached_fraction: averages.map(|averages| averages.attached_fraction),
+        slip_share: averages.map(|averages| averages.slip_share),
         breaks: summary.breaks,
         reattachments: summary.reattachments,
         ruptures: measured.ruptures,
@@ -377,10 +386,18 @@ fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Resul
     }
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
+    let outcome = report.outcome;
+    let share = |share: f64| format!("{:.3} % of the time within slips", 100.0 * share);
+    let regime = report
+        .regime
+        .zip(report.slip_share)
+        .map_or("none".to_owned(), |(regime, of)| format!("{regime}, {}", share(of)));
     output::pairs(&[
         ("job", report.job_id),
         ("simulated time", format!("{:.6} s", report.simulated_seconds)),
         ("slips", report.slips.to_string()),
+        ("outcome", outcome.to_owned()),
+        ("regime", regime),
         ("mean interval", or_none(report.mean_interval_seconds, "s")),
         ("mean friction", or_none(report.mean_friction_newtons, "N")),
         ("contacts", format!("{} breaks, {} reattachments", report.breaks, report.reattachments)),

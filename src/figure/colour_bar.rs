@@ -38,6 +38,13 @@ impl ColourBar {
         Self { label, colours, ticks: ticks.into_iter().map(|(share, number)| (share, number.to_string())).collect() }
     }
 
+    /// A bar of all shades, dark at the upper end, with these ticks.
+    pub(super) fn of_reversed_shades(label: &'static str, ticks: Vec<(f64, String)>) -> Self {
+        let Self { mut colours, .. } = Self::of_shades(label, []);
+        colours.reverse();
+        Self { label, colours, ticks }
+    }
+
     /// Draws the bar right of a frame, and the label above it.
     pub(super) fn draw(&self, sheet: &mut Sheet, frame: &Frame) {
         let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());

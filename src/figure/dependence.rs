@@ -68,7 +68,7 @@ pub(super) fn dependence(sets: &[SetSummary]) -> Option<Picture> {
 }
 
 /// The sets of each modulation, in their order, if there are enough inks.
-fn lines<'a>(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Vec<Vec<&'a SetSummary>>> {
+pub(super) fn lines<'a>(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Vec<Vec<&'a SetSummary>>> {
     let modulation = |set: &SetSummary| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
     let mut lines: Vec<Vec<&SetSummary>> = Vec::new();
     for set in sets {
@@ -81,7 +81,7 @@ fn lines<'a>(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Vec<Vec<&'a S
 }
 
 /// Where a parameter stands on the axis: its value, the spread of thresholds over their mean, the place of a rule.
-fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
+pub(super) fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
     match (symbol, parameters.get(symbol)) {
         (Symbol::Dfs, _) => Some(parameters.threshold_deviation / parameters.mean_threshold),
         (_, Value::Real(real)) => Some(real),
@@ -91,7 +91,7 @@ fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
     }
 }
 
-fn label(symbol: Symbol) -> String {
+pub(super) fn label(symbol: Symbol) -> String {
     let unit = if symbol == Symbol::Dfs { "" } else { symbol.description().unit };
     let name = match symbol {
         Symbol::N => "Blocks N",

@@ -1,7 +1,7 @@
 //! All figures that fit the reduced data of a sweep, written together.
 
 use super::{FigureError, Picture};
-use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, staircase};
+use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, regimes, staircase};
 use crate::reduce::{WRITER, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
@@ -26,7 +26,14 @@ pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
     let sets = read_sets(layout, MAX_SETS)?;
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        for figure in [locking_map::locking_map, staircase::staircase, dependence::dependence, friction::friction] {
+        for figure in [
+            locking_map::locking_map,
+            staircase::staircase,
+            dependence::dependence,
+            friction::friction,
+            regimes::regimes,
+            regimes::regime_map,
+        ] {
             pictures.extend(figure(&sets));
         }
     }

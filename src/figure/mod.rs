@@ -20,6 +20,7 @@ mod histograms;
 mod intervals;
 mod locking_map;
 mod picture;
+mod regimes;
 mod scaling;
 mod scatter;
 mod sets;

@@ -186,6 +186,7 @@ impl Periods {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::observe::Regime;
     use crate::reduce::Statistic;
 
     /// A set at Δ in m and T in s that locks to `periods` of T.
@@ -205,6 +206,8 @@ pub(super) mod tests {
             resultant_length: statistic(0.7).filter(|_| amplitude > 0.0),
             peak_force: Some(480.0),
             mean_friction: statistic(280.0 - 1e7 * amplitude),
+            regime: Some(Regime::StickSlip),
+            slip_share: Some(0.05),
         }
     }
 

@@ -40,6 +40,48 @@ pub struct ContactEvent {
     pub threshold: f64,
     /// Stiffness `k_i` of this life, in N/m.
     pub stiffness: f64,
+    /// Contacts of the whole slider that are attached after it.
+    pub attached: u64,
+    /// Integral of that number over time up to here, in s.
+    pub attached_time: f64,
+    /// Mean displacement of the blocks at a break, in m, which the solver knows; 0 for an attachment.
+    pub mean_displacement: f64,
+}
+
+/// The number of attached contacts, and its integral over time.
+#[derive(Clone, Copy, Debug)]
+struct Attached {
+    count: u64,
+    /// The integral up to the origin of time, if nothing changed from there on, in s.
+    offset: f64,
+}
+
+impl Attached {
+    /// Counts what happens at a time in s.
+    #[inline(always)]
+    fn change(&mut self, change: Change, time: f64) {
+        match change {
+            Change::Attach => {
+                self.count += 1;
+                self.offset -= time;
+            }
+            Change::Break => {
+                self.count -= 1;
+                self.offset += time;
+            }
+        }
+    }
+
+    /// The integral up to a time in s.
+    #[inline(always)]
+    fn integral(&self, time: f64) -> f64 {
+        self.offset + self.count as f64 * time
+    }
+
+    /// Moves the origin of time: subtracts `shift` s.
+    fn shift(&mut self, shift: f64) {
+        self.offset = self.integral(shift);
+    }
 }
 
 /// Eight bytes that are 0 or 1 each, times this, hold their bits in the highest byte, in order.
@@ -82,6 +124,7 @@ pub struct Interface {
     /// The rows of the first block, then of the second, and so on.
     rows: Vec<ContactRow>,
     reattachments: Reattachments,
+    attached: Attached,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
     /// Per block: Σ k_i a_i of the attached contacts, in N.
@@ -113,6 +156,7 @@ impl Interface {
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
             reattachments: Reattachments::new(blocks, parameters.contacts_per_block, parameters.reattachment_time),
+            attached: Attached { count: (blocks * parameters.contacts_per_block) as u64, offset: 0.0 },
             block_stiffness: vec![0.0; blocks],
             block_pull: vec![0.0; blocks],
             block_upper: vec![0.0; blocks],
@@ -190,6 +234,7 @@ impl Interface {
         self.sum(block);
         self.block_upper[block] = self.block_upper[block].min(upper);
         self.block_lower[block] = self.block_lower[block].max(lower);
+        self.attached.change(Change::Attach, due.time());
         self.event(block, contact, due.time(), displacement, Change::Attach)
     }
 
@@ -209,8 +254,7 @@ impl Interface {
                     // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
-                log(self.event(block, contact, time, displacement, Change::Break));
-                self.detach(block, contact, time);
+                log(self.break_contact(block, contact, time, displacement).0);
                 reached &= reached - 1;
             }
         }
@@ -251,6 +295,7 @@ impl Interface {
     /// sums and nearest break positions are left as they are: see [`Self::gather`].
     #[inline(always)]
     pub fn break_contact(&mut self, block: usize, contact: usize, time: f64, displacement: f64) -> (ContactEvent, f64) {
+        self.attached.change(Change::Break, time);
         let event = self.event(block, contact, time, displacement, Change::Break);
         (event, self.detach(block, contact, time))
     }
@@ -270,6 +315,7 @@ impl Interface {
     /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
     pub fn shift_time(&mut self, shift: f64) {
         self.reattachments.shift(shift);
+        self.attached.shift(shift);
     }
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.
@@ -311,6 +357,9 @@ impl Interface {
             force: stiffness * (displacement - anchor[lane]),
             threshold,
             stiffness,
+            attached: self.attached.count,
+            attached_time: self.attached.integral(time),
+            mean_displacement: 0.0,
         }
     }
 

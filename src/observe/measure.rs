@@ -1,6 +1,6 @@
 //! From parameters to measurements: one job, simulated and observed.
 
-use super::{Precursor, Recording, Slip, SlipObserver};
+use super::{Averages, Precursor, Recording, Regime, Slip, SlipObserver};
 use crate::model::Parameters;
 use crate::solver::{Limits, SimulationError, Solver, Summary, simulate};
 use std::sync::atomic::AtomicBool;
@@ -14,8 +14,10 @@ pub struct Measurements {
     pub precursors: Vec<Precursor>,
     /// Ruptures of any size, start-up included.
     pub ruptures: u64,
-    /// Time average of the shear force `F_S` past start-up, in N; `None` if start-up did not end.
-    pub mean_friction: Option<f64>,
+    /// Averages over time; `None` if no cycle was whole.
+    pub averages: Option<Averages>,
+    /// Whether it ended since no slip came for too long.
+    pub has_given_up: bool,
     /// How the solver ended and what it did.
     pub summary: Summary,
 }
@@ -23,9 +25,16 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let (ruptures, mean_friction) = (observer.ruptures(), observer.mean_friction());
+        let averages = observer.averages();
+        let (ruptures, has_given_up) = (observer.ruptures(), observer.has_given_up());
         let (slips, precursors) = observer.into_rows();
-        Self { slips, precursors, ruptures, mean_friction, summary }
+        Self { slips, precursors, ruptures, averages, has_given_up, summary }
+    }
+
+    /// How the slider moved; `None` without averages.
+    #[must_use]
+    pub fn regime(&self) -> Option<Regime> {
+        self.averages.map(|averages| Regime::at(averages.slip_share))
     }
 }
 

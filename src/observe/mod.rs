@@ -16,4 +16,4 @@ pub use phase::{OVERSHOOT, phase};
 pub use recording::{Recording, RecordingKey};
 pub use rupture::{Rupture, advance_speed};
 pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
-pub use slip::{Modulation, Precursor, Slip, SlipObserver};
+pub use slip::{Averages, Modulation, Precursor, Regime, Slip, SlipObserver};

@@ -1,6 +1,8 @@
 //! What a job records: one struct, each field described once.
 
+use crate::model::Parameters;
 use crate::model::fields::fields;
+use crate::model::theory::typical_interval;
 
 fields! {
     /// What a job records: how many slips, from where, and which tables.
@@ -18,10 +20,27 @@ fields! {
             "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
         DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
             "Minimum drop of the shear force to look for; none: drops are not looked for";
+        GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", positive,
+            "Distance `V0 t` of the drive without a slip after which a job ends, with the outcome `no slips`; none: 20 typical intervals between slips and two periods";
     }
 }
 
+/// Intervals between slips, as [`typical_interval`] has them, and periods without a slip after which a job ends by default.
+const GIVE_UP_INTERVALS: f64 = 20.0;
+const GIVE_UP_PERIODS: f64 = 2.0;
+
 impl Recording {
+    /// Time without a slip after which a job ends, in s.
+    #[must_use]
+    pub fn give_up_time(&self, parameters: &Parameters) -> f64 {
+        let Some(distance) = self.give_up_after else {
+            let periods = [parameters.modulation_period, parameters.turning_period];
+            let longest = periods.into_iter().flatten().fold(0.0, f64::max);
+            return GIVE_UP_INTERVALS * typical_interval(parameters) + GIVE_UP_PERIODS * longest;
+        };
+        distance / parameters.drive_velocity
+    }
+
     /// Keys and values that define a job, part of its id. The keys of the first version always are; later ones only where
     /// they differ from their default, so that the ids of other jobs stay as they were.
     pub fn settings(&self) -> impl Iterator<Item = (String, String)> {

@@ -18,6 +18,10 @@ pub struct Rupture {
     /// Blocks with a break, in the order of their first break, and its time in s.
     pub fronts: Vec<(usize, f64)>,
     broken: Vec<bool>,
+    /// Contacts attached before it.
+    pub attached_before: u64,
+    /// Fewest contacts attached so far.
+    pub least_attached: u64,
 }
 
 impl Rupture {
@@ -31,6 +35,8 @@ impl Rupture {
             reach: first.block,
             fronts: Vec::new(),
             broken: vec![false; blocks],
+            attached_before: first.attached + 1,
+            least_attached: first.attached,
         };
         rupture.include(first);
         rupture
@@ -40,6 +46,7 @@ impl Rupture {
     pub fn include(&mut self, event: &ContactEvent) {
         self.last_time = event.time;
         self.size += 1;
+        self.least_attached = self.least_attached.min(event.attached);
         self.reach = self.reach.max(event.block);
         if !std::mem::replace(&mut self.broken[event.block], true) {
             self.fronts.push((event.block, event.time));
@@ -51,9 +58,11 @@ impl Rupture {
         self.fronts.len()
     }
 
-    /// Whether every block broke: the rupture is a slip.
-    pub fn spans_slider(&self) -> bool {
-        self.extent() == self.broken.len()
+    /// Whether it is a slip: it breaks contacts at every block, and lets go of at least half of those that were attached
+    /// before and a tenth of all.
+    pub fn is_slip(&self, contacts: u64) -> bool {
+        let let_go = self.attached_before - self.least_attached;
+        self.extent() == self.broken.len() && 2 * let_go >= self.attached_before && 10 * let_go >= contacts
     }
 
     /// Speed of the front in m/s: slope of the distance from the nucleation against the time of the first break, block by

@@ -250,8 +250,9 @@ fields! {
 
 impl From<&ContactEvent> for ContactRow {
     fn from(event: &ContactEvent) -> Self {
-        let ContactEvent { time, block, contact, generation, change, displacement, force, threshold, stiffness } =
-            *event;
+        let ContactEvent {
+            time, block, contact, generation, change, displacement, force, threshold, stiffness, ..
+        } = *event;
         Self {
             time,
             block: block as u64 + 1,

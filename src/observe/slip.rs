@@ -1,7 +1,7 @@
 //! Slips and precursors: found from the contact events, measured on the shear force.
 //!
-//! Definitions: a slip is a rupture of all blocks; a precursor any other of at least `precursor_size` breaks; smaller ones
-//! are creep. The onset of a slip is the largest shear force between the previous slip's end (its last break) and the
+//! Definitions: a slip is a rupture that breaks contacts at every block and lets go of at least half of those that held, and
+//! a tenth of all; a precursor any other of at least `precursor_size` breaks; smaller ones are creep. The onset of a slip is the largest shear force between the previous slip's end (its last break) and the
 //! instant at which its rupture reaches the leading edge; it lies at an extreme of F_S or at an event, located exactly.
 
 use super::Recording;
@@ -11,7 +11,7 @@ use super::rupture::{Rupture, advance_speed};
 use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
-use crate::table::columns::columns;
+use crate::table::columns::{Cell, Field, Kind, columns, fields};
 use std::f64::consts::TAU;
 
 columns! {
@@ -45,7 +45,8 @@ impl Modulation {
 }
 
 columns! {
-    /// One slip: a rupture that breaks contacts at every block.
+    /// One slip: a rupture that breaks contacts at every block and lets go of at least half of those that held, and a tenth
+    /// of all.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Slip {
         number as "slip": u64 = "", "number of the slip within its job, from 0 past start-up";
@@ -60,8 +61,14 @@ columns! {
         nucleation_block: u64 = "", "block of the first break, from 1 at the trailing edge";
         duration: f64 = "s", "from the first to the last break";
         size: u64 = "", "breaks in the rupture";
+        attached_before: f64 = "", "fraction of the contacts that are attached before the first break";
+        least_attached: f64 = "", "least fraction of the contacts that are attached during the rupture";
+        distance as "slip_distance": f64 = "m", "mean distance that the blocks move, from the first to the last break";
+        edge_distance: f64 = "m", "distance that the driven edge moves in that time";
+        onset_cut: bool = "", "whether the shear force still rose when the rupture reached the leading edge";
         front_speed: Option<f64> = "m/s", "speed of the rupture front";
         precursors: u64 = "", "precursors since the previous slip";
+        largest_precursor: u64 = "", "breaks in the largest of them; 0 if there is none";
         slow_front_speed: Option<f64> = "m/s",
             "advance of the reach through these precursors; null for fewer than two";
         drops: Drops;
@@ -69,7 +76,7 @@ columns! {
 }
 
 columns! {
-    /// One precursor: a rupture of at least the precursor size that does not break contacts at every block.
+    /// One precursor: a rupture of at least the precursor size that is no slip.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Precursor {
         slip: u64 = "", "number of the slip that it precedes";
@@ -82,6 +89,7 @@ columns! {
         duration: f64 = "s", "from the first to the last break";
         size: u64 = "", "breaks in the rupture";
         extent: u64 = "", "distinct blocks with a break";
+        length: f64 = "m", "the same times the length of a block, L/N";
         reach: u64 = "", "the furthest of them, from 1";
         front_speed: Option<f64> = "m/s", "speed of the rupture front";
     }
@@ -102,6 +110,79 @@ impl Peak {
     }
 }
 
+/// An instant, and what has been counted up to it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Instant {
+    /// In s.
+    time: f64,
+    /// Shear force, in N.
+    force: f64,
+    /// Its integral over time, in N s.
+    impulse: f64,
+    /// Integral of the number of attached contacts, in s.
+    attached_time: f64,
+    /// Time within slips, in s.
+    slipping: f64,
+    /// Mean displacement of the blocks, in m.
+    mean_displacement: f64,
+}
+
+/// What a job measures as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Averages {
+    /// Time average of the shear force, in N.
+    pub friction: f64,
+    /// Time average of the fraction of contacts that are attached.
+    pub attached_fraction: f64,
+    /// Share of the time within slips.
+    pub slip_share: f64,
+}
+
+/// How a slider moves, by the share of time within slips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regime {
+    /// It sticks for most of the time.
+    StickSlip,
+    /// It slips for most of the time.
+    Mixed,
+    /// It does not stick.
+    Sliding,
+}
+
+impl Regime {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::StickSlip, Self::Mixed, Self::Sliding];
+    /// Least share of time within slips of the mixed regime, and of sliding.
+    pub const LEAST_SHARES: [f64; 2] = [0.5, 0.95];
+
+    /// Its word in tables.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::StickSlip => "stick-slip",
+            Self::Mixed => "mixed",
+            Self::Sliding => "sliding",
+        }
+    }
+
+    /// The regime at a share of time within slips.
+    #[must_use]
+    pub fn at(slip_share: f64) -> Self {
+        let [mixed, sliding] = Self::LEAST_SHARES;
+        if slip_share < mixed {
+            Self::StickSlip
+        } else if slip_share < sliding {
+            Self::Mixed
+        } else {
+            Self::Sliding
+        }
+    }
+}
+
+fields! {
+    Regime: Text, |regime| regime.word(), |word| Regime::ALL.into_iter().find(|regime| regime.word() == word);
+}
+
 /// An observer that finds slips and precursors.
 #[derive(Clone, Debug)]
 pub struct SlipObserver {
@@ -109,12 +190,20 @@ pub struct SlipObserver {
     /// The drive in its cycle at the last slip's onset, and at the last precursor's.
     at_slip: Drive,
     at_precursor: Drive,
+    /// The same at the first or last break of the last slip.
+    at_break: Drive,
     recording: Recording,
     precursor_size: u64,
+    /// All contacts, attached or not.
+    contacts: u64,
     crossing_time: f64,
-    /// Shear force at the end of the last segment, and the impulse since the start, in N s.
-    now: Peak,
-    impulse: f64,
+    give_up_time: f64,
+    /// The end of the last segment, but for what is counted at events; and the last event.
+    now: Instant,
+    at_event: Instant,
+    attached: u64,
+    /// Time within slips that have ended, in s.
+    slipping: f64,
     /// Peaks since the last slip's end, since the last rupture of precursor size, and since the last break.
     since_slip: Peak,
     since_precursor: Peak,
@@ -126,12 +215,16 @@ pub struct SlipObserver {
     precursors: Vec<Precursor>,
     /// Precursors of the slip to come: onset of the last, and those that advanced the reach (time, position).
     pending: u64,
+    largest_pending: u64,
     last_precursor_onset: Option<f64>,
     advances: Vec<(f64, f64)>,
     furthest: Option<usize>,
-    /// Time and impulse at the end of start-up and of the last slip.
-    first_mark: Option<(f64, f64)>,
-    last_mark: Option<(f64, f64)>,
+    /// The end of start-up and of the last slip.
+    start_up_end: Option<Instant>,
+    last_end: Option<Instant>,
+    /// Halfway from the last slip to where the job gives up, and whether it has.
+    settled: Option<Instant>,
+    has_given_up: bool,
     ruptures: u64,
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
@@ -149,14 +242,17 @@ struct Active {
     /// Least force so far, and up to the last break, in N.
     least: f64,
     least_at_last_break: f64,
-    /// Impulse at the last break, in N s.
-    impulse_at_last_break: f64,
+    /// First and last break.
+    first: Instant,
+    last: Instant,
+    /// Whether the shear force was rising at the onset.
+    onset_cut: bool,
 }
 
 impl Active {
     /// Whether it is a slip or, with at least this many breaks, a precursor.
-    fn is_recorded(&self, precursor_size: u64) -> bool {
-        self.rupture.size >= precursor_size || self.rupture.spans_slider()
+    fn is_recorded(&self, precursor_size: u64, contacts: u64) -> bool {
+        self.rupture.size >= precursor_size || self.rupture.is_slip(contacts)
     }
 }
 
@@ -164,15 +260,21 @@ impl SlipObserver {
     /// An observer for one job.
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
         let start = Peak { time: 0.0, force: 0.0 };
+        let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;
         Self {
             parameters: parameters.clone(),
             at_slip: Drive::new(parameters),
             at_precursor: Drive::new(parameters),
+            at_break: Drive::new(parameters),
             recording: *recording,
             precursor_size: recording.precursor_size.unwrap_or(parameters.contacts_per_block as u64),
+            contacts,
             crossing_time: parameters.wave_crossing_time(),
-            now: start,
-            impulse: 0.0,
+            give_up_time: recording.give_up_time(parameters),
+            now: Instant::default(),
+            at_event: Instant::default(),
+            attached: contacts,
+            slipping: 0.0,
             since_slip: start,
             since_precursor: start,
             since_break: start,
@@ -182,11 +284,14 @@ impl SlipObserver {
             slips: Vec::new(),
             precursors: Vec::new(),
             pending: 0,
+            largest_pending: 0,
             last_precursor_onset: None,
             advances: Vec::new(),
             furthest: None,
-            first_mark: None,
-            last_mark: None,
+            start_up_end: None,
+            last_end: None,
+            settled: None,
+            has_given_up: false,
             ruptures: 0,
             drops: recording.drop_size.map(|size| DropDetector::new(parameters, size)),
             spans: Vec::new(),
@@ -208,11 +313,35 @@ impl SlipObserver {
         self.ruptures
     }
 
-    /// Mean friction: the time mean of F_S over whole cycles, from the end of the last slip of start-up (of the first slip,
-    /// if none is discarded) to the end of the last slip, in N. `None` if no cycle is whole.
-    pub fn mean_friction(&self) -> Option<f64> {
-        let ((start, from), (end, to)) = (self.first_mark?, self.last_mark?);
-        (end > start).then(|| (to - from) / (end - start))
+    /// Whether the job ends since no slip came for too long.
+    pub fn has_given_up(&self) -> bool {
+        self.has_given_up
+    }
+
+    /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has come
+    /// for half the time to give up: the slider then slides, and without a slip past start-up only that second half counts.
+    /// `None` if nothing is left.
+    pub fn averages(&self) -> Option<Averages> {
+        let slips = self.slips.iter().len() > 0;
+        let (start, end) = match self.settled {
+            Some(settled) => (self.start_up_end.filter(|_| slips).unwrap_or(settled), self.sliding()),
+            None => self.start_up_end.zip(self.last_end)?,
+        };
+        let time = end.time - start.time;
+        (time > 0.0).then(|| Averages {
+            friction: (end.impulse - start.impulse) / time,
+            attached_fraction: (end.attached_time - start.attached_time) / (time * self.contacts as f64),
+            slip_share: (end.slipping - start.slipping) / time,
+        })
+    }
+
+    /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.
+    fn sliding(&self) -> Instant {
+        Instant {
+            attached_time: self.at_event.attached_time + self.attached as f64 * (self.now.time - self.at_event.time),
+            slipping: self.slipping + self.now.time - self.last_end.map_or(0.0, |end| end.time),
+            ..self.now
+        }
     }
 
     fn begin_or_extend(&mut self, event: &ContactEvent) {
@@ -220,6 +349,13 @@ impl SlipObserver {
             self.finish_rupture();
         }
         let blocks = self.parameters.blocks;
+        let here = Instant {
+            time: event.time,
+            attached_time: event.attached_time,
+            mean_displacement: event.mean_displacement,
+            ..self.now
+        };
+        (self.at_event, self.attached) = (here, event.attached);
         let active = if let Some(active) = &mut self.rupture {
             active.rupture.include(event);
             active
@@ -230,24 +366,27 @@ impl SlipObserver {
                 precursor_onset: self.since_precursor,
                 least: self.now.force,
                 least_at_last_break: self.now.force,
-                impulse_at_last_break: self.impulse,
+                first: here,
+                last: here,
+                onset_cut: false,
             })
         };
         if event.block + 1 == blocks && active.onset.is_none() {
             active.onset = Some(self.since_slip);
+            active.onset_cut = self.now.force >= self.since_slip.force;
         }
         active.least_at_last_break = active.least;
-        active.impulse_at_last_break = self.impulse;
+        active.last = here;
         self.since_break = Peak { time: event.time, force: self.now.force };
     }
 
     fn finish_rupture(&mut self) {
         let Some(active) = self.rupture.take() else { return };
         self.ruptures += 1;
-        if !active.is_recorded(self.precursor_size) {
+        if !active.is_recorded(self.precursor_size, self.contacts) {
             return;
         }
-        if active.rupture.spans_slider() {
+        if active.rupture.is_slip(self.contacts) {
             self.record_slip(&active);
         } else {
             self.record_precursor(&active);
@@ -256,11 +395,13 @@ impl SlipObserver {
 
     fn record_slip(&mut self, active: &Active) {
         let rupture = &active.rupture;
-        // A rupture of all blocks has reached the leading edge.
+        // A slip has reached the leading edge.
         let onset = active.onset.unwrap_or(self.since_slip);
+        let (first, last) = (active.first, active.last);
         let discard = self.recording.discard;
         self.at_slip.advance_to(onset.time);
         if self.slips_seen >= discard {
+            let edge_distance = -self.edge_displacement(first) + self.edge_displacement(last);
             let drive = &self.at_slip;
             let modulation = Modulation::of(drive);
             let interval = self.last_onset.map(|last| onset.time - last);
@@ -277,8 +418,14 @@ impl SlipObserver {
                 nucleation_block: rupture.first_block as u64 + 1,
                 duration: rupture.last_time - rupture.first_time,
                 size: rupture.size,
+                attached_before: rupture.attached_before as f64 / self.contacts as f64,
+                least_attached: rupture.least_attached as f64 / self.contacts as f64,
+                distance: last.mean_displacement - first.mean_displacement,
+                edge_distance,
+                onset_cut: active.onset_cut,
                 front_speed: rupture.front_speed(&self.parameters),
                 precursors: self.pending,
+                largest_precursor: self.largest_pending,
                 slow_front_speed: advance_speed(self.advances.iter().copied()),
                 drops: Drops::default(),
             });
@@ -287,18 +434,26 @@ impl SlipObserver {
             self.spans.push((rupture.first_time, rupture.last_time));
         }
         self.slips_seen += 1;
-        let mark = (rupture.last_time, active.impulse_at_last_break);
+        self.slipping += rupture.last_time - rupture.first_time;
+        let end = Instant { slipping: self.slipping, ..last };
         if self.slips_seen == discard.max(1) {
-            self.first_mark = Some(mark);
+            self.start_up_end = Some(end);
         }
-        self.last_mark = Some(mark);
+        self.last_end = Some(end);
+        self.settled = None;
         self.last_onset = Some(onset.time);
         self.since_slip = self.since_break;
         self.since_precursor = self.since_break;
-        self.pending = 0;
+        (self.pending, self.largest_pending) = (0, 0);
         self.last_precursor_onset = None;
         self.advances.clear();
         self.furthest = None;
+    }
+
+    /// Displacement of the driven edge at a break of the last slip, from the force and the drive, in m.
+    fn edge_displacement(&mut self, at: Instant) -> f64 {
+        self.at_break.advance_to(at.time);
+        self.at_break.motion(at.time).0 - at.force / self.at_break.stiffness
     }
 
     fn record_precursor(&mut self, active: &Active) {
@@ -317,6 +472,7 @@ impl SlipObserver {
                 duration: rupture.last_time - rupture.first_time,
                 size: rupture.size,
                 extent: rupture.extent() as u64,
+                length: rupture.extent() as f64 * self.parameters.slider_length / self.parameters.blocks as f64,
                 reach: rupture.reach as u64 + 1,
                 front_speed: rupture.front_speed(&self.parameters),
             });
@@ -327,6 +483,7 @@ impl SlipObserver {
             self.furthest = Some(rupture.reach);
         }
         self.pending += 1;
+        self.largest_pending = self.largest_pending.max(rupture.size);
         self.last_precursor_onset = Some(onset);
         self.since_precursor = self.since_break;
     }
@@ -336,7 +493,8 @@ impl Observer for SlipObserver {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Each stretch contains the later ones, so a force that raises none of these peaks raises no other. The peak since the
         // last break counts only once its rupture ends, and if that is recorded.
-        let recordable = self.rupture.as_ref().is_some_and(|active| active.is_recorded(self.precursor_size));
+        let recordable =
+            self.rupture.as_ref().is_some_and(|active| active.is_recorded(self.precursor_size, self.contacts));
         let floor = if recordable { self.since_break.force } else { self.since_precursor.force };
         if let Some((time, force)) = segment.maximum_above(floor) {
             let peak = Peak { time, force };
@@ -352,11 +510,16 @@ impl Observer for SlipObserver {
         if let Some(drops) = &mut self.drops {
             drops.advance(segment);
         }
-        self.impulse += segment.impulse();
-        self.now = Peak { time: segment.end(), force: segment.end_force() };
+        let impulse = self.now.impulse + segment.impulse();
+        self.now = Instant { time: segment.end(), force: segment.end_force(), impulse, ..self.now };
         if self.rupture.as_ref().is_some_and(|active| self.now.time - active.rupture.last_time > self.crossing_time) {
             self.finish_rupture();
         }
+        let since_slip = self.now.time - self.last_end.map_or(0.0, |end| end.time);
+        if self.settled.is_none() && since_slip >= 0.5 * self.give_up_time {
+            self.settled = Some(self.sliding());
+        }
+        self.has_given_up = since_slip >= self.give_up_time;
     }
 
     fn contact(&mut self, event: &ContactEvent) {
@@ -370,6 +533,6 @@ impl Observer for SlipObserver {
     }
 
     fn is_satisfied(&self) -> bool {
-        self.slips.len() as u64 >= self.recording.slips
+        self.slips.len() as u64 >= self.recording.slips || self.has_given_up
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Interval, SetRow};
 use crate::model::Parameters;
+use crate::observe::Regime;
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
 use crate::table::file::{Dataset, DatasetError};
@@ -22,6 +23,8 @@ pub struct SetSummary {
     pub resultant_length: Option<Statistic>,
     pub peak_force: Option<f64>,
     pub mean_friction: Option<Statistic>,
+    pub regime: Option<Regime>,
+    pub slip_share: Option<f64>,
 }
 
 /// A statistic and, where it is known, its confidence interval.
@@ -66,6 +69,8 @@ impl From<SetRow> for SetSummary {
             resultant_length: Statistic::new(row.resultant_length, row.length_interval),
             peak_force: row.peak_force_mean,
             mean_friction: Statistic::new(row.mean_friction, row.mean_friction_interval),
+            regime: row.regime,
+            slip_share: row.slip_share,
         }
     }
 }
@@ -79,14 +84,14 @@ pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, D
     Ok(batches.collect::<Result<Vec<Vec<R>>, _>>()?.into_iter().flatten().collect())
 }
 
-/// The sets with at least one interval, in order, if there are at most `max` of them; else none.
+/// The sets with at least one interval or a regime, in order, if there are at most `max` of them; else none.
 ///
 /// # Errors
 /// When the file is not there or is damaged.
 pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetSummary>, DatasetError> {
     let mut sets = Vec::new();
     for batch in Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>() {
-        sets.extend(batch?.into_iter().filter(|row| row.intervals > 0).map(SetSummary::from));
+        sets.extend(batch?.into_iter().filter(|row| row.intervals > 0 || row.regime.is_some()).map(SetSummary::from));
         if sets.len() > max {
             return Ok(Vec::new());
         }

@@ -4,7 +4,6 @@
 //! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as
 //! much again for those of the set at hand; where the tables hold more, the slips are read again for the next sets.
 
-use super::Moments;
 use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin};
 use super::histogram::{HistogramBin, histogram};
@@ -12,7 +11,7 @@ use super::point::{Point, RampStage, spacing};
 use super::set::{SetJobs, SetRow, SetSlips};
 use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
-use crate::observe::Slip;
+use crate::observe::{Regime, Slip};
 use crate::results::Results;
 use crate::results::commit::{Commit, alone};
 use crate::results::parts::committed_files;
@@ -158,6 +157,9 @@ columns! {
         outcome: JobOutcome;
         slips: Option<u64>;
         mean_friction: Option<f64>;
+        attached_fraction: Option<f64>;
+        slip_share: Option<f64>;
+        regime: Option<Regime>;
     }
 }
 
@@ -173,20 +175,21 @@ fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
     for batch in jobs.rows::<(JobOfSet, Selected<All>)>() {
         for (job, parameters) in batch? {
-            let set = sets.entry(job.set_id).or_insert_with_key(|set_id| SetJobs {
-                set_id: set_id.clone(),
-                parameters: parameters.parameters,
-                finished: 0,
-                failed: 0,
-                slips: 0,
-                friction: Moments::default(),
-            });
+            let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters.parameters);
+            let set = sets.entry(job.set_id).or_insert_with_key(new);
             if job.outcome == JobOutcome::Failed {
                 set.failed += 1;
             } else {
                 set.finished += 1;
                 set.slips += job.slips.unwrap_or(0);
+                set.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
                 set.friction.extend(job.mean_friction);
+                set.attached_fraction.extend(job.attached_fraction);
+                set.slip_share.extend(job.slip_share);
+                set.regime = match (set.regime, job.regime) {
+                    (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
+                    (regime, other) => other.or(regime),
+                };
             }
         }
     }
@@ -273,7 +276,7 @@ mod tests {
     use super::super::read_reduced;
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::{Measurements, Modulation};
+    use crate::observe::{Averages, Measurements, Modulation};
     use crate::results::layout::Layout;
     use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
@@ -319,7 +322,7 @@ mod tests {
         let summary = Summary { satisfied: true, ..Summary::default() };
         Measurements {
             slips: (0..slips).map(slip).collect(),
-            mean_friction: Some(430.0),
+            averages: Some(Averages { friction: 430.0, ..Averages::default() }),
             summary,
             ..Measurements::default()
         }

@@ -8,7 +8,7 @@ use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
 use super::startup::{StartupRow, startup_probability, startup_rows};
 use crate::model::{Parameters, Symbol};
-use crate::observe::Slip;
+use crate::observe::{Regime, Slip};
 use crate::table::columns::{Table, columns};
 use crate::table::selected::{Selected, Selection};
 use std::f64::consts::TAU;
@@ -35,8 +35,36 @@ pub struct SetJobs {
     pub failed: u64,
     /// Slips that the jobs recorded.
     pub slips: u64,
+    /// Jobs that gave up, since no slip came.
+    pub without_slips: u64,
     /// Time-averaged shear force of the jobs, in N.
     pub friction: Moments,
+    /// Time-averaged fraction of contacts that are attached, of the jobs.
+    pub attached_fraction: Moments,
+    /// Share of time within slips, of the jobs.
+    pub slip_share: Moments,
+    /// How the slider moved in the jobs; mixed if they differ.
+    pub regime: Option<Regime>,
+}
+
+impl SetJobs {
+    /// A set without jobs so far.
+    #[must_use]
+    pub fn new(set_id: String, parameters: Parameters) -> Self {
+        let none = Moments::default();
+        Self {
+            set_id,
+            parameters,
+            finished: 0,
+            failed: 0,
+            slips: 0,
+            without_slips: 0,
+            friction: none,
+            attached_fraction: none,
+            slip_share: none,
+            regime: None,
+        }
+    }
 }
 
 /// All parameters but the seed, which a set has not.
@@ -56,6 +84,10 @@ columns! {
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
         finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
         failed_jobs: u64 = "", "jobs that failed";
+        jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
+        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
+        slip_share: Option<f64> = "", "share of time within slips, mean over jobs";
+        attached_fraction: Option<f64> = "", "time-averaged fraction of contacts that are attached, mean over jobs";
         slips: u64 = "", "slips of all seeds";
         intervals: u64 = "", "intervals between slips";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
@@ -91,6 +123,10 @@ columns! {
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
         duration_mean: Option<f64> = "s", "mean duration of slips";
+        distance_mean as "slip_distance_mean": Option<f64> = "m", "mean distance that the blocks move in a slip";
+        edge_distance_mean: Option<f64> = "m", "mean distance that the driven edge moves in a slip";
+        least_attached_mean: Option<f64> = "", "mean of the least fraction of contacts attached during a slip";
+        onset_cut_share: Option<f64> = "", "share of slips that reached the leading edge while the shear force still rose";
         precursors_mean: Option<f64> = "", "mean precursors per slip";
         front_speed_mean: Option<f64> = "m/s", "mean front speed of slips";
         slow_front_speed_mean: Option<f64> = "m/s", "mean speed of slow fronts, where there were any";
@@ -112,6 +148,10 @@ pub(super) struct SetSlips {
     drop: Moments,
     peak_force: Moments,
     duration: Moments,
+    distance: Moments,
+    edge_distance: Moments,
+    least_attached: Moments,
+    onset_cut: Moments,
     precursors: Moments,
     front_speed: Moments,
     slow_front_speed: Moments,
@@ -127,6 +167,10 @@ impl SetSlips {
         self.drop.push(slip.drop);
         self.peak_force.push(slip.peak_force);
         self.duration.push(slip.duration);
+        self.distance.push(slip.distance);
+        self.edge_distance.push(slip.edge_distance);
+        self.least_attached.push(slip.least_attached);
+        self.onset_cut.push(f64::from(u8::from(slip.onset_cut)));
         self.precursors.push(slip.precursors as f64);
         self.front_speed.extend(slip.front_speed);
         self.slow_front_speed.extend(slip.slow_front_speed);
@@ -159,6 +203,10 @@ impl SetSlips {
             eta,
             finished_jobs: jobs.finished,
             failed_jobs: jobs.failed,
+            jobs_without_slips: jobs.without_slips,
+            regime: jobs.regime,
+            slip_share: jobs.slip_share.mean(),
+            attached_fraction: jobs.attached_fraction.mean(),
             slips: self.slips.len() as u64,
             intervals: tau.count(),
             effective_slips: phases.effective(),
@@ -191,6 +239,10 @@ impl SetSlips {
             mean_friction: jobs.friction.mean(),
             mean_friction_interval: jobs.friction.interval(),
             duration_mean: self.duration.mean(),
+            distance_mean: self.distance.mean(),
+            edge_distance_mean: self.edge_distance.mean(),
+            least_attached_mean: self.least_attached.mean(),
+            onset_cut_share: self.onset_cut.mean(),
             precursors_mean: self.precursors.mean(),
             front_speed_mean: self.front_speed.mean(),
             slow_front_speed_mean: self.slow_front_speed.mean(),
@@ -237,14 +289,7 @@ pub(super) mod tests {
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() }
                 .validated()
                 .unwrap();
-        SetJobs {
-            set_id: format!("{amplitude:e} {period}"),
-            parameters,
-            finished: 1,
-            failed: 0,
-            slips: 0,
-            friction: Moments::default(),
-        }
+        SetJobs { finished: 1, ..SetJobs::new(format!("{amplitude:e} {period}"), parameters) }
     }
 
     pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> Slip {

@@ -45,6 +45,8 @@ impl<'a> Results<'a> {
     /// When it is no results directory, belongs to other versions, or is damaged.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let (manifest, sweeps) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout.root()))?;
+        let differences = manifest.difference(&Manifest::new(&sweeps[manifest.current]));
+        manifest::refuse(layout, &differences, "use the program that wrote it")?;
         Ok(Self::new(layout, sweeps, manifest.current))
     }
 
@@ -67,7 +69,7 @@ impl<'a> Results<'a> {
         let last = &sweeps[manifest.current];
         let mut differences = manifest.difference(&Manifest::new(last));
         differences.extend(last.difference(sweep).iter().map(ToString::to_string));
-        manifest::refuse(layout, &differences)?;
+        manifest::refuse(layout, &differences, "choose another directory with --out, or undo the change")?;
         let known = sweeps.iter().position(|known| known.text() == sweep.text());
         if known == Some(manifest.current) {
             return Ok((Self::new(layout, sweeps, manifest.current), None));

@@ -171,15 +171,13 @@ pub(super) fn parse(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Sweep>,
     parsed.collect()
 }
 
-/// Refuses a directory that differs in something.
-pub(super) fn refuse(layout: &Layout<'_>, differences: &[String]) -> Result<(), ResultsError> {
+/// Refuses a directory that differs in something, with the way out.
+pub(super) fn refuse(layout: &Layout<'_>, differences: &[String], way_out: &str) -> Result<(), ResultsError> {
     if differences.is_empty() {
         return Ok(());
     }
-    let problem = format!(
-        "holds other results, nothing was changed:\n  {}\nchoose another directory with --out, or undo the change",
-        differences.join("\n  ")
-    );
+    let differences = differences.join("\n  ");
+    let problem = format!("holds other results, nothing was changed:\n  {differences}\n{way_out}");
     Err(ResultsError::refused(layout.root(), problem))
 }
 

@@ -3,7 +3,7 @@
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Measurements, Precursor, Slip};
+use crate::observe::{Measurements, Precursor, Regime, Slip};
 use crate::sweep::Sweep;
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 use crate::table::selected::{Selected, Selection};
@@ -15,18 +15,40 @@ pub enum JobOutcome {
     Done,
     /// It reached `max_time` before.
     TimeLimit,
+    /// It gave up, since no slip came within `give_up_after`.
+    NoSlips,
     /// It could not be finished.
     Failed,
 }
 
+impl JobOutcome {
+    /// The outcome of a job that did not fail.
+    #[must_use]
+    pub fn of(measured: &Measurements) -> Self {
+        match measured.summary.satisfied {
+            _ if measured.has_given_up => Self::NoSlips,
+            true => Self::Done,
+            false => Self::TimeLimit,
+        }
+    }
+
+    /// Its word in tables.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::TimeLimit => "time limit",
+            Self::NoSlips => "no slips",
+            Self::Failed => "failed",
+        }
+    }
+}
+
 fields! {
-    JobOutcome: Text, |outcome| match outcome {
-        JobOutcome::Done => "done",
-        JobOutcome::TimeLimit => "time limit",
-        JobOutcome::Failed => "failed",
-    }, |word| match word {
+    JobOutcome: Text, |outcome| outcome.word(), |word| match word {
         "done" => Some(JobOutcome::Done),
         "time limit" => Some(JobOutcome::TimeLimit),
+        "no slips" => Some(JobOutcome::NoSlips),
         "failed" => Some(JobOutcome::Failed),
         _ => None,
     };
@@ -115,14 +137,17 @@ columns! {
     /// What a job measured as a whole, or why it failed.
     #[derive(Clone, Debug, PartialEq)]
     pub struct JobRecord {
-        outcome: JobOutcome = "", "`done`; `time limit`: `max_time` came before the last slip; or `failed`";
+        outcome: JobOutcome = "", "`done`; `time limit`: `max_time` came before the last slip; `no slips`: none came within `give_up_after`; or `failed`";
         reason: Option<String> = "", "why it failed; null unless failed";
         slips: Option<u64> = "", "slips recorded; null if failed, as all that follows";
         precursors: Option<u64> = "", "their precursors";
         ruptures: Option<u64> = "", "ruptures of any size, start-up included";
         breaks: Option<u64> = "", "contacts broken";
         reattachments: Option<u64> = "", "contacts reattached";
-        mean_friction: Option<f64> = "N", "time average of the shear force past start-up";
+        mean_friction: Option<f64> = "N", "time average of the shear force: over whole cycles past start-up, and over what was slid after the last slip";
+        attached_fraction: Option<f64> = "", "time average of the fraction of contacts that are attached, over the same time";
+        slip_share: Option<f64> = "", "share of that time within slips, or sliding without one";
+        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, by that share";
         simulated_time: Option<f64> = "s", "model time reached";
         steps: Option<u64> = "", "steps of the solver";
         leaps: Option<u64> = "", "of these, leaps over quiet time";
@@ -136,19 +161,19 @@ impl JobRecord {
     pub fn new(outcome: Result<&Measurements, &str>) -> Self {
         let measured = outcome.ok();
         let summary = measured.map(|measured| measured.summary);
+        let averages = measured.and_then(|measured| measured.averages);
         Self {
-            outcome: match summary {
-                None => JobOutcome::Failed,
-                Some(summary) if summary.satisfied => JobOutcome::Done,
-                Some(_) => JobOutcome::TimeLimit,
-            },
+            outcome: measured.map_or(JobOutcome::Failed, JobOutcome::of),
             reason: outcome.err().map(str::to_owned),
             slips: measured.map(|measured| measured.slips.len() as u64),
             precursors: measured.map(|measured| measured.slips.iter().map(|slip| slip.precursors).sum()),
             ruptures: measured.map(|measured| measured.ruptures),
             breaks: summary.map(|summary| summary.breaks),
             reattachments: summary.map(|summary| summary.reattachments),
-            mean_friction: measured.and_then(|measured| measured.mean_friction),
+            mean_friction: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
+            regime: measured.and_then(Measurements::regime),
             simulated_time: summary.map(|summary| summary.end_time),
             steps: summary.map(|summary| summary.steps),
             leaps: summary.map(|summary| summary.leaps),

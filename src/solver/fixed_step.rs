@@ -201,6 +201,7 @@ fn change_contacts(
     summary: &mut Summary,
     observer: &mut dyn Observer,
 ) {
+    let mean_displacement = displacement.iter().sum::<f64>() / displacement.len() as f64;
     while interface.next_reattachment() <= time
         && let Some(block) = interface.next_reattachment_block()
     {
@@ -212,7 +213,7 @@ fn change_contacts(
         if x >= interface.block_upper[block] || x <= interface.block_lower[block] {
             interface.break_reached(block, time, x, |event| {
                 summary.breaks += 1;
-                observer.contact(&event);
+                observer.contact(&ContactEvent { mean_displacement, ..event });
             });
         }
     }

@@ -25,7 +25,7 @@ mod source;
 #[cfg(test)]
 mod tests;
 
-pub use cost::{predicted_cost, predicted_interval};
+pub use cost::predicted_cost;
 pub use job::{Identity, Job, JobId, SetId};
 pub use parts::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use plan::{Difference, Sweep};

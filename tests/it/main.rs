@@ -20,6 +20,7 @@ mod hard_cases;
 mod kills;
 mod program;
 mod ramp;
+mod regimes;
 mod runs;
 mod shards;
 mod simulate;

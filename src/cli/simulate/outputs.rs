@@ -5,9 +5,10 @@ use super::{Arguments, Panel};
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use stickslip::figure::{self, Picture};
+use stickslip::model::theory::typical_interval;
 use stickslip::model::{ContactEvent, Parameters};
 use stickslip::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
-use stickslip::sweep::{Sweep, predicted_interval};
+use stickslip::sweep::Sweep;
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
 use stickslip::table::storage::{Disk, Storage};
@@ -38,7 +39,7 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     let traces = arguments.trace.is_some() || arguments.draws(Panel::Force);
     let cells = if maps { parameters.blocks } else { usize::from(traces) };
     let slips = recording.slips as f64 + recording.discard as f64;
-    let time = (slips * predicted_interval(parameters)).min(longest);
+    let time = (slips * typical_interval(parameters)).min(longest);
     if time / sample * cells as f64 > MAX_SAMPLES {
         let problem =
             format!("--sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one");

@@ -20,7 +20,7 @@ pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> R
     let sweeps = parse(layout, &texts)?;
     let first = sweeps.first().ok_or_else(|| no_results(layout.root()))?;
     if let Some(manifest) = &manifest {
-        refuse(layout, &manifest.difference(&Manifest::new(first)))?;
+        refuse(layout, &manifest.difference(&Manifest::new(first)), "use the program that wrote it")?;
     }
     let current = manifest.map_or(sweeps.len() - 1, |manifest| manifest.current);
     Ok(Results::new(layout, sweeps, current))

@@ -65,8 +65,8 @@ fn measure(parameters: &Parameters) -> Measurements {
         slips: slips.collect(),
         precursors: precursors.collect(),
         ruptures: 9,
-        mean_friction: Some(300.0),
         summary,
+        ..Measurements::default()
     }
 }
 

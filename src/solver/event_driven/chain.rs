@@ -35,6 +35,8 @@ pub(super) struct Chain {
     pub bare: Vec<Row>,
     /// K_int/m, in 1/s²; 0 in padding.
     pub coupling: Vec<Row>,
+    /// Share of a block in a mean, 1/N; 0 in padding.
+    shares: Vec<Row>,
     /// Diagonal of S/m, in 1/s².
     pub diagonal: Vec<Row>,
     /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
@@ -58,6 +60,7 @@ impl Chain {
             mass: parameters.block_mass(),
             bare: layout.filled(0.0),
             coupling: layout.filled(0.0),
+            shares: layout.filled(0.0),
             diagonal: layout.filled(0.0),
             pull: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
@@ -76,6 +79,7 @@ impl Chain {
             let (row, lane) = layout.slot(block);
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
+            chain.shares[row][lane] = 1.0 / layout.blocks as f64;
             let diagonal = diagonal / chain.mass;
             (chain.diagonal[row][lane], chain.per_block.diagonal[block]) = (diagonal, diagonal);
         }
@@ -99,5 +103,15 @@ impl Chain {
     pub fn at(&self, rows: &[Row], block: usize) -> f64 {
         let (row, lane) = self.layout.slot(block);
         rows[row][lane]
+    }
+
+    /// Mean of the entries of all blocks.
+    #[inline]
+    pub fn mean(&self, rows: &[Row]) -> f64 {
+        let mut sum = Row::filled(0.0);
+        for (row, shares) in rows.iter().zip(&self.shares) {
+            sum.0 = std::array::from_fn(|lane| sum[lane] + row[lane] * shares[lane]);
+        }
+        sum.reduce(|a, b| a + b)
     }
 }

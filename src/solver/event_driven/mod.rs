@@ -38,7 +38,7 @@ use super::harmonic::Harmonic;
 use super::ledger::Audit;
 use super::segment::{ForcePath, Segment};
 use super::{Limits, Observer, Resolve, SimulationError, Summary};
-use crate::model::{Drive, Parameters};
+use crate::model::{ContactEvent, Drive, Parameters};
 use std::sync::atomic::Ordering;
 
 /// A leap is tried only if no reattachment is due within this many longest Taylor steps, or steps of the grid.
@@ -258,7 +258,8 @@ impl<'a> Integration<'a> {
                 match reached {
                     Some(block) => {
                         let (x, trailing) = (self.slider.displacement(block), self.slider.state.displacement[0][0]);
-                        self.break_block(block, x, self.frame.shear_force(trailing), observer);
+                        let mean = self.slider.mean_displacement();
+                        self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
                     }
                     None => self.reattach_due(observer),
                 }
@@ -299,14 +300,15 @@ impl<'a> Integration<'a> {
         self.frame.set_time(if is_due { due } else { reached });
     }
 
-    /// Breaks the contacts of a block that has reached a break position, at displacement `x` m and shear force `force`
-    /// N.
-    fn break_block(&mut self, block: usize, x: f64, force: f64, observer: &mut dyn Observer) {
+    /// Breaks the contacts of a block that has reached a break position, at these displacements of it and of all blocks on
+    /// average in m and shear force `force` N.
+    fn break_block(&mut self, block: usize, [x, mean]: [f64; 2], force: f64, observer: &mut dyn Observer) {
         self.largest_force = force;
         let (frame, summary) = (&self.frame, &mut self.summary);
+        let mean_displacement = frame.absolute_displacement(mean);
         self.slider.break_reached(block, frame.time, x, |event| {
             summary.breaks += 1;
-            observer.contact(&frame.absolute(event));
+            observer.contact(&ContactEvent { mean_displacement, ..frame.absolute(event) });
         });
     }
 

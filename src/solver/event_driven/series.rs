@@ -83,6 +83,12 @@ impl Series {
         }
     }
 
+    /// Mean displacement of the blocks at s, in m, to third order: the slider as a whole moves far more slowly than its blocks.
+    pub fn mean(&self, chain: &Chain, s: f64) -> f64 {
+        let terms = self.terms.chunks(self.rows).take(self.order.min(3) + 1).zip(&INVERSE_FACTORIAL);
+        terms.rev().fold(0.0, |sum, (term, inverse)| sum * s + inverse * chain.mean(term))
+    }
+
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.
     pub fn add(&mut self, row: usize, lane: usize, coefficients: &[f64]) {
         let (mut at, mut factorial, mut order) = (row, 1.0, 0.0);

@@ -35,6 +35,12 @@ impl Slider {
         (0..self.chain.layout.blocks).map(|block| self.displacement(block))
     }
 
+    /// Mean displacement of the blocks, in m.
+    #[inline]
+    pub fn mean_displacement(&self) -> f64 {
+        self.chain.mean(&self.state.displacement)
+    }
+
     /// Breaks the contacts of a block that has reached a break position, at displacement `x` m.
     #[inline]
     pub fn break_reached(&mut self, block: usize, time: f64, x: f64, log: impl FnMut(ContactEvent)) {

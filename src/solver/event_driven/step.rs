@@ -241,7 +241,10 @@ impl Integration<'_> {
         let [x, slope, half_curvature] = self.step.expanded(&self.slider.chain, block, s);
         let (stiffness, pull) = (self.slider.interface.block_stiffness[block], self.slider.interface.block_pull[block]);
         match change {
-            Change::Break => self.break_block(block, x, force, observer),
+            Change::Break => {
+                let mean = self.step.series.mean(&self.slider.chain, s);
+                self.break_block(block, [x, mean], force, observer);
+            }
             Change::Attach => self.attach_next(x, observer),
         }
         if self.step.series.order < MERGED_ORDER {

@@ -19,7 +19,7 @@ use super::simd::Simd;
 use super::slider::Slider;
 use super::taylor::StepInput;
 use crate::model::equation::largest_frequency;
-use crate::model::{Change, Parameters};
+use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
 
@@ -246,10 +246,15 @@ impl Integration<'_> {
     /// Tells what has happened in the last step, and the shear force up to it: event after event to an observer that
     /// follows attachments; else up to the first break, so that a pause before it shows, and then up to the last.
     fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
+        if self.grid.events.events.is_empty() {
+            return;
+        }
         let events = std::mem::take(&mut self.grid.events.events);
         if events.iter().any(|event| event.change == Change::Break) {
             self.largest_force = f64::NEG_INFINITY;
         }
+        let chain = &self.slider.chain;
+        let [mean, rise] = [&self.slider.state.displacement, &self.grid.step.increment].map(|rows| chain.mean(rows));
         let mut rest = &events[..];
         while let [first, ..] = rest {
             let is_alone = self.grid.tells_attachments() || rest.len() == events.len();
@@ -257,7 +262,9 @@ impl Integration<'_> {
             let until = told.last().unwrap_or(first).time;
             self.tell_force(((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0), observer);
             for event in told {
-                observer.contact(&self.frame.absolute(*event));
+                let left = 1.0 - (event.time - start) * self.grid.step.inverse_length;
+                let mean_displacement = self.frame.absolute_displacement(mean - left * rise);
+                observer.contact(&ContactEvent { mean_displacement, ..self.frame.absolute(*event) });
             }
             rest = later;
         }

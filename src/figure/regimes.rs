@@ -1,0 +1,225 @@
+//! Regimes: share of time within slips, mean friction and mean interval, along one parameter or over two.
+
+use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
+use super::dependence::{label, lines, number};
+use super::frame::{Frame, LEGEND, Layout, LegendPlace, Mark, ROW_GAP, entry};
+use super::picture::{BLACK, Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
+use super::sets::{Grid, distinct, modulation, swept};
+use crate::model::Symbol;
+use crate::observe::Regime;
+use crate::reduce::{SetSummary, Statistic};
+
+const LINES: Layout = Layout::column(470.0, &[220.0; 3], ROW_GAP, LEGEND);
+const MAP: Layout = Layout::column(470.0, &[250.0; 3], ROW_GAP, COLOUR_BAR);
+/// Least values of the parameter along which lines are drawn, and of each parameter of a map.
+const MIN_VALUES: usize = 4;
+/// Ratio of the largest to the least value above which a scale is logarithmic.
+const LOGARITHMIC: f64 = 20.0;
+const RADIUS: f64 = 4.5;
+const WHITE: Ink = "#ffffff";
+const BOUND: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
+const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
+
+type Getter = fn(&SetSummary) -> Option<Statistic>;
+
+const SHARE: (&str, Getter) =
+    ("Share of time within slips", |set| set.slip_share.map(|value| Statistic { value, interval: None }));
+const FRICTION: (&str, Getter) = ("Mean friction (N)", |set| set.mean_friction);
+const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| set.tau_mean);
+
+/// Draws sets in which, besides the modulation, only V0 or the reattachment delay differs, or any one parameter if not
+/// all sets are stick-slip; `None` for others.
+pub(super) fn regimes(sets: &[SetSummary]) -> Option<Picture> {
+    let all: Vec<&SetSummary> = sets.iter().collect();
+    let [symbol] = swept(&all)[..] else { return None };
+    let is_plain = sets.iter().all(|set| set.regime == Some(Regime::StickSlip));
+    let values = distinct(&all, |parameters| number(parameters, symbol));
+    if values.len() < MIN_VALUES || (is_plain && !matches!(symbol, Symbol::V0 | Symbol::TauR)) {
+        return None;
+    }
+    let lines = lines(all.iter().copied())?;
+    let x = Grid::of(values).wider_axis(&label(symbol));
+    let mut sheet = LINES.sheet("regimes");
+    for (row, (y_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
+        let y = match row {
+            0 => Axis::linear(y_label, -0.03, 1.03),
+            _ => scale(y_label, sets.iter().filter_map(statistic).flat_map(Statistic::ends))?,
+        };
+        let frame = LINES.frame(row, 0, x.clone(), y);
+        if row == 0 {
+            for share in Regime::LEAST_SHARES {
+                frame.level(&mut sheet, share, BOUND);
+            }
+        }
+        for (line, ink) in lines.iter().zip(INKS) {
+            let known = |set: &&&SetSummary| statistic(set).is_some();
+            let point = |set: &&SetSummary| Some((number(&set.parameters, symbol)?, statistic(set)?));
+            let points: Vec<(f64, Statistic)> = line.iter().filter_map(point).collect();
+            frame.statistics(&mut sheet, &points, Stroke::solid(ink, 1.6), RADIUS);
+            let sliding = line.iter().filter(known).filter(|set| set.regime == Some(Regime::Sliding));
+            let centres: Vec<(f64, f64)> = sliding.filter_map(point_value(symbol, statistic)).collect();
+            frame.points(&mut sheet, centres, Dot::solid(WHITE, RADIUS - 1.6));
+        }
+        frame.axes(&mut sheet);
+        frame.y_label(&mut sheet);
+        frame.x_label(&mut sheet);
+        if row == 0 {
+            let names = lines.iter().map(|line| modulation(&line[0].parameters));
+            let mut entries: Vec<_> =
+                names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(Dot::solid(ink, RADIUS)), name)).collect();
+            entries.push(entry(Mark::Line(BOUND), "mixed, sliding above"));
+            frame.legend(&mut sheet, LegendPlace::Beside, &entries);
+        }
+    }
+    Some(sheet.finish())
+}
+
+/// Where a set lies in a panel.
+fn point_value(symbol: Symbol, statistic: Getter) -> impl Fn(&&SetSummary) -> Option<(f64, f64)> {
+    move |set| Some((number(&set.parameters, symbol)?, statistic(set)?.value))
+}
+
+/// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
+/// 4 values or more; `None` for others.
+pub(super) fn regime_map(sets: &[SetSummary]) -> Option<Picture> {
+    let all: Vec<&SetSummary> = sets.iter().collect();
+    let swept = swept(&all);
+    // The drive velocity is the x axis wherever it is one.
+    let [horizontal, vertical] = match swept[..] {
+        [first, Symbol::V0] => [Symbol::V0, first],
+        [first, second] => [first, second],
+        _ => return None,
+    };
+    let grids = [horizontal, vertical].map(|symbol| distinct(&all, |parameters| number(parameters, symbol)));
+    let is_grid = grids.iter().all(|values| values.len() >= MIN_VALUES)
+        && 2 * sets.len() >= grids[0].len() * grids[1].len()
+        && lines(all.iter().copied()).is_some_and(|lines| lines.len() == 1);
+    if !is_grid {
+        return None;
+    }
+    let [columns, rows] = grids.map(Grid::of);
+    let cell = |set: &SetSummary| {
+        let place = |symbol, grid: &Grid| Some(grid.cell_of(number(&set.parameters, symbol)?));
+        Some((place(horizontal, &columns)?, place(vertical, &rows)?))
+    };
+    let mut sheet = MAP.sheet("regime-map");
+    for (row, (bar_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
+        let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
+        let shades = if row == 0 { Axis::linear(bar_label, 0.0, 1.0) } else { scale(bar_label, values)? };
+        let frame = MAP.frame(row, 0, columns.axis(&label(horizontal)), rows.axis(&label(vertical)));
+        frame.clipped(&mut sheet, |sheet| {
+            sheet.rectangles(sets.iter().filter_map(|set| {
+                let (x, y) = cell(set)?;
+                let [left, top, width, height] = frame.box_of(x, y);
+                let colour = shade(1.0 - shades.place(statistic(set)?.value));
+                Some(([left, top, width + OVERLAP, height + OVERLAP], colour))
+            }));
+            borders(sheet, &frame, sets, cell);
+        });
+        frame.axes(&mut sheet);
+        frame.y_label(&mut sheet);
+        frame.x_label(&mut sheet);
+        let ticks = shades.ticks.iter().map(|(value, number)| (shades.place(*value), number.clone())).collect();
+        ColourBar::of_reversed_shades(bar_label, ticks).draw(&mut sheet, &frame);
+        if row == 0 {
+            frame.legend(&mut sheet, LegendPlace::LowerRight, &[entry(Mark::Line(BORDER), "between regimes")]);
+        }
+    }
+    Some(sheet.finish())
+}
+
+/// A cell as its ends along x and along y.
+type Cell = ((f64, f64), (f64, f64));
+
+/// Lines between neighbouring cells of different regimes.
+fn borders(sheet: &mut Sheet, frame: &Frame, sets: &[SetSummary], cell: impl Fn(&SetSummary) -> Option<Cell>) {
+    let cells: Vec<(Cell, Option<Regime>)> = sets.iter().filter_map(|set| Some((cell(set)?, set.regime))).collect();
+    for (index, &((x, y), regime)) in cells.iter().enumerate() {
+        for &((other_x, other_y), _) in cells[index + 1..].iter().filter(|(_, other)| *other != regime) {
+            let meets = |a: (f64, f64), b: (f64, f64)| {
+                [(a.1, b.0), (b.1, a.0)].into_iter().find(|(end, start)| (end / start - 1.0).abs() < 1e-9)
+            };
+            if x == other_x
+                && let Some((edge, _)) = meets(y, other_y)
+            {
+                frame.curve(sheet, [(x.0, edge), (x.1, edge)], BORDER);
+            } else if y == other_y
+                && let Some((edge, _)) = meets(x, other_x)
+            {
+                frame.curve(sheet, [(edge, y.0), (edge, y.1)], BORDER);
+            }
+        }
+    }
+}
+
+/// A scale for data: logarithmic if they span much; `None` without any.
+fn scale(label: &str, values: impl Iterator<Item = f64>) -> Option<Axis> {
+    let values: Vec<f64> = values.collect();
+    let (low, high) = bounds(values.iter().copied())?;
+    if low > 0.0 && high / low > LOGARITHMIC {
+        let (low, high) = logarithmic_bounds(values.into_iter())?;
+        return Some(Axis::logarithmic(label, low, high));
+    }
+    Some(Axis::rounded(label, low.min(0.0), high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sets::tests::set;
+    use super::*;
+    use crate::model::Parameters;
+
+    fn at(velocity: f64, delay: f64, share: f64) -> SetSummary {
+        let plain = set(0.0, 1.0, 1e-5 / velocity);
+        let parameters = Parameters { drive_velocity: velocity, reattachment_time: delay, ..plain.parameters.clone() };
+        let regime = Some(Regime::at(share));
+        let is_sliding = regime == Some(Regime::Sliding);
+        let tau_mean = plain.tau_mean.filter(|_| !is_sliding);
+        SetSummary { parameters, slip_share: Some(share), regime, tau_mean, ..plain }
+    }
+
+    #[test]
+    fn a_sweep_of_the_velocity_shows_its_regimes_with_sliding_as_open_circles() {
+        let sets: Vec<SetSummary> = [0.05, 0.1, 0.3, 0.7, 1.0]
+            .iter()
+            .zip(1..)
+            .map(|(&share, step)| at(1e-5 * f64::from(1 << step), 0.005, share))
+            .collect();
+        let svg = regimes(&sets).unwrap().svg();
+        for text in
+            ["Drive velocity V₀ (m/s)", "Share of time within slips", "Mean friction (N)", "Mean interval τ (s)"]
+        {
+            assert!(svg.contains(&format!(">{text}<")), "{text}");
+        }
+        assert_eq!(
+            svg.matches(&format!("fill=\"{WHITE}\"")).count(),
+            regimes(&sets[..4]).unwrap().svg().matches(&format!("fill=\"{WHITE}\"")).count() + 2
+        );
+        assert!(regimes(&sets[..3]).is_none(), "three values");
+        let sizes: Vec<SetSummary> = (1..=5)
+            .map(|blocks| {
+                let plain = set(0.0, 1.0, 1.0);
+                SetSummary { parameters: Parameters { blocks, ..plain.parameters.clone() }, ..plain }
+            })
+            .collect();
+        assert!(regimes(&sizes).is_none(), "nothing but stick-slip, and the drive is one");
+    }
+
+    #[test]
+    fn two_parameters_make_a_map_with_lines_between_regimes() {
+        let grid = |shares: fn(u32, u32) -> f64| -> Vec<SetSummary> {
+            (0..4)
+                .flat_map(|row| {
+                    (0..5).map(move |column| {
+                        at(1e-5 * f64::from(1 << column), 1e-3 * f64::from(1 << row), shares(row, column))
+                    })
+                })
+                .collect()
+        };
+        let map = |sets: &[SetSummary]| regime_map(sets).unwrap().svg().matches("stroke-width=\"1.6\"").count();
+        let without = map(&grid(|_, _| 0.05));
+        assert_eq!(map(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
+        assert!(regime_map(&grid(|_, _| 0.05)[..9]).is_none(), "two rows");
+    }
+}
