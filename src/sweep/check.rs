@@ -5,7 +5,7 @@
 //! where one of them is invalid, all are walked through, since a condition may drop it.
 
 use super::axes::Axis;
-use super::plan::Sweep;
+use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
 use super::read_axes::PlacedAxis;
 use super::source::{Section, Source, SweepError};

@@ -1,7 +1,7 @@
 //! A job as a command line, so that one that fails can be looked at alone.
 
+use super::grid::Sweep;
 use super::job::Job;
-use super::plan::Sweep;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver};

@@ -5,8 +5,8 @@
 
 use super::check::{self, Places};
 use super::filter::Condition;
+use super::grid::Sweep;
 use super::job::Identity;
-use super::plan::Sweep;
 use super::quantity::Quantity;
 use super::read_axes;
 use super::source::{Entry, Section, Source, SweepError};

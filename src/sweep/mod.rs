@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! sweep file -> axes, filter -> points -> jobs -> parts
-//!   file.rs     axes.rs filter.rs  plan.rs  job.rs   parts.rs
+//!   file.rs     axes.rs filter.rs  grid.rs  job.rs   plan.rs
 //! ```
 //!
 //! Nothing here runs or writes anything. A plan is a function of the file's text alone: the same jobs in the same order,
@@ -15,8 +15,8 @@ mod command;
 mod cost;
 mod file;
 mod filter;
+mod grid;
 mod job;
-mod parts;
 mod plan;
 mod quantity;
 mod read_axes;
@@ -26,7 +26,7 @@ mod source;
 mod tests;
 
 pub use cost::predicted_cost;
+pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
-pub use parts::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use plan::{Difference, Sweep};
+pub use plan::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use source::SweepError;

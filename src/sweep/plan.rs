@@ -1,190 +1,91 @@
-//! A sweep: the points of its axes in grid order, those that are jobs, and the look-up of a job without walking.
+//! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
-//! Grid order: axes as in the file, the last moves fastest. A point is a job if the conditions hold and no earlier point
-//! has the same parameters; that happens without modulation only, where T, η and the frequency mean nothing: there the
-//! first row of the axis that fixes the period counts (see [`Axis`]). Conditions see canonical values, so they judge such
-//! points alike. Memory does not grow with the number of points.
+//! Each sweep that is run in a directory opens an *extension*, which owns the jobs that are in no earlier sweep. A *part* is a
+//! run of consecutive jobs of an extension, committed together: it ends with the job that brings its predicted cost to
+//! [`PART_COST`], or its jobs to [`PART_JOBS`]. Contract: parts are a function of the texts of the sweeps and of
+//! [`PLAN_VERSION`] alone. Memory: one part.
 
-use super::axes::Axis;
-use super::cost::predicted_cost;
-use super::filter::Condition;
-use super::job::{Identity, Job, JobId, SetId, settings};
-use super::quantity::{Point, Quantity};
-use crate::model::{Parameters, Symbol};
-use crate::observe::Recording;
-use crate::solver::Solver;
-use std::fmt;
+use super::grid::Sweep;
+use super::job::Job;
 
-/// A sweep file, parsed.
-#[derive(Clone, Debug)]
-pub struct Sweep {
-    pub(super) name: String,
-    pub(super) text: String,
-    /// `[model]` over the defaults; what an axis sets is not used.
-    pub(super) base: Parameters,
-    pub(super) axes: Vec<Axis>,
-    /// All must hold.
-    pub(super) conditions: Vec<Condition>,
-    pub(super) recording: Recording,
-    pub(super) solver: Solver,
-    pub(super) identity: Identity,
+/// Predicted CPU time after which a part is full, in s: little is lost with an unfinished part, and files stay few.
+pub const PART_COST: f64 = 5.0;
+/// Most jobs of a part, so that a part of cheap jobs fits in memory.
+pub const PART_JOBS: usize = 4096;
+/// Version of how sweeps become parts: order, cost and limits. A directory keeps the one that it was started with.
+pub const PLAN_VERSION: u32 = 3;
+
+/// The sweeps of a directory in the order in which they were run.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan<'a> {
+    extensions: &'a [Sweep],
 }
 
-/// Something besides axes and conditions in which two sweeps differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
-    /// Section and key, such as `model.K`.
-    pub key: String,
-    /// The value in the first sweep.
-    pub before: String,
-    /// The value in the other.
-    pub after: String,
+/// Consecutive jobs of an extension.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Number of the extension, from 0.
+    pub extension: usize,
+    /// Number of the part within its extension, from 0.
+    pub index: u64,
+    /// Its jobs, in plan order. At least one.
+    pub jobs: Vec<Job>,
+    /// Sum of their predicted CPU times, in s.
+    pub cost: f64,
 }
 
-impl fmt::Display for Difference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} -> {}", self.key, self.before, self.after)
-    }
+/// What a plan adds up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Number of jobs.
+    pub jobs: u64,
+    /// Number of parts.
+    pub parts: u64,
+    /// Predicted CPU time, in s.
+    pub cost: f64,
 }
 
-impl Sweep {
-    /// The name: letters, digits, `_` and `-`.
+impl<'a> Plan<'a> {
+    /// The plan of these sweeps. Sweeps of one directory differ in axes and conditions only, see [`Sweep::difference`].
     #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
+    pub const fn new(extensions: &'a [Sweep]) -> Self {
+        Self { extensions }
     }
 
-    /// The text of the file.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        &self.text
+    /// The jobs that an extension owns, those that are in no earlier sweep, in grid order.
+    pub(super) fn jobs(self, extension: usize) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
+        let (earlier, sweep) = (&self.extensions[..extension], &self.extensions[extension]);
+        sweep.jobs().filter(move |job| !earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
     }
 
-    /// What every job records.
-    #[must_use]
-    pub const fn recording(&self) -> &Recording {
-        &self.recording
-    }
-
-    /// The solver of every job.
-    #[must_use]
-    pub const fn solver(&self) -> Solver {
-        self.solver
-    }
-
-    /// Each axis in grid order: the keys that it moves, joined by commas, and its number of rows.
-    pub fn axes(&self) -> impl Iterator<Item = (String, u64)> {
-        self.axes.iter().map(|axis| {
-            let keys: Vec<&str> = axis.quantities().into_iter().map(Quantity::key).collect();
-            (keys.join(", "), axis.len())
-        })
-    }
-
-    /// Number of points of the grid, before the conditions drop some. Fits, as the file was refused otherwise.
-    #[must_use]
-    pub fn point_count(&self) -> u64 {
-        self.axes.iter().map(Axis::len).product()
-    }
-
-    /// The jobs in grid order.
-    pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
-        self.admitted().map(|Point { parameters, .. }| {
-            let cost = predicted_cost(&parameters, &self.recording, self.solver);
-            Job { parameters, cost }
-        })
-    }
-
-    /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
-    #[must_use]
-    pub fn contains(&self, parameters: &Parameters) -> bool {
-        let rows: Option<Vec<u64>> = self.axes.iter().map(|axis| axis.find(parameters)).collect();
-        let point = rows.map(|rows| self.point(&rows).canonical());
-        point.is_some_and(|point| point.parameters == *parameters && self.admits(&point))
-    }
-
-    /// The id of a job.
-    #[must_use]
-    pub fn job_id(&self, parameters: &Parameters) -> JobId {
-        self.identity.job(parameters)
-    }
-
-    /// The id of the set of a job.
-    #[must_use]
-    pub fn set_id(&self, parameters: &Parameters) -> SetId {
-        self.identity.set(parameters)
-    }
-
-    /// In what another sweep differs besides axes and conditions: name, model, recording, solver. Parameters that an axis
-    /// of either sets are left out, as an axis may be added, changed or dropped.
-    #[must_use]
-    pub fn difference(&self, other: &Self) -> Vec<Difference> {
-        let moved = |symbol| self.moves(symbol) || other.moves(symbol);
-        let values = |sweep: &Self| {
-            let model = Symbol::ALL
-                .into_iter()
-                .filter(|symbol| !moved(*symbol))
-                .map(|symbol| (format!("model.{}", symbol.key()), sweep.base.get(symbol).to_string()));
-            let name = std::iter::once(("name".to_owned(), sweep.name.clone()));
-            name.chain(model).chain(settings(sweep.solver, &sweep.recording)).collect::<Vec<_>>()
-        };
-        let (before, after) = (values(self), values(other));
-        let value = |values: &[(String, String)], key: &str| {
-            values.iter().find(|(other, _)| other == key).map_or_else(|| "none".to_owned(), |(_, value)| value.clone())
-        };
-        let added = after.iter().filter(|(key, _)| before.iter().all(|(other, _)| other != key));
-        before
-            .iter()
-            .chain(added)
-            .map(|(key, _)| Difference { key: key.clone(), before: value(&before, key), after: value(&after, key) })
-            .filter(|difference| difference.before != difference.after)
-            .collect()
-    }
-
-    /// Whether an axis sets a parameter; T also through η or the frequency.
-    fn moves(&self, symbol: Symbol) -> bool {
-        self.axes
-            .iter()
-            .flat_map(Axis::quantities)
-            .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
-    }
-
-    /// The points that are jobs, in canonical form.
-    pub(super) fn admitted(&self) -> impl Iterator<Item = Point> + Clone + Send + '_ {
-        self.walk(self.axes.iter().map(Axis::len).collect()).filter(|point| self.admits(point))
-    }
-
-    /// The points of one seed that are jobs if the conditions hold, in canonical form.
-    pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
-        let is_seed = |axis: &Axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)];
-        self.walk(self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect())
-    }
-
-    /// Walks through this many rows of each axis, past points that repeat an earlier one. Yields canonical points.
-    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Clone + Send + '_ {
-        let mut rows = vec![0; counts.len()];
-        (0..counts.iter().product()).filter_map(move |number: u64| {
-            let mut rest = number;
-            for (row, count) in rows.iter_mut().zip(&counts).rev() {
-                *row = rest % count;
-                rest /= count;
+    /// The parts of an extension, in order.
+    pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
+        let mut source = self.jobs(extension);
+        (0..).map_while(move |index| {
+            let (mut jobs, mut cost) = (Vec::new(), 0.0);
+            while cost < PART_COST
+                && jobs.len() < PART_JOBS
+                && let Some(job) = source.next()
+            {
+                cost += job.cost;
+                jobs.push(job);
             }
-            let point = self.point(&rows);
-            let is_first = || self.axes.iter().zip(&rows).all(|(axis, &row)| axis.is_first(row));
-            (point.is_modulated() || is_first()).then(|| point.canonical())
+            (!jobs.is_empty()).then_some(Part { extension, index, jobs, cost })
         })
     }
 
-    /// The point of these rows, as the axes set it.
-    fn point(&self, rows: &[u64]) -> Point {
-        let mut point = Point { parameters: self.base.clone(), fixes_period: None };
-        for (axis, &row) in self.axes.iter().zip(rows) {
-            axis.apply(row, &mut point);
-        }
-        point
+    /// The parts of all extensions, in order.
+    pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
+        (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }
 
-    /// Whether a canonical point fulfils the conditions.
-    fn admits(&self, point: &Point) -> bool {
-        self.conditions.iter().all(|condition| condition.holds(point))
+    /// Walks through the plan and adds up.
+    #[must_use]
+    pub fn totals(self) -> Totals {
+        self.parts().fold(Totals::default(), |totals, part| Totals {
+            jobs: totals.jobs + part.jobs.len() as u64,
+            parts: totals.parts + 1,
+            cost: totals.cost + part.cost,
+        })
     }
 }
