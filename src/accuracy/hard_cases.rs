@@ -5,11 +5,11 @@
 //! balances, bad values are refused by name, or it stops and gives the cause. A run as a job must break about as many
 //! contacts as the audited one; where single runs say nothing, the means over many seeds must agree.
 
-use super::cpu;
 use crate::model::equation::{StiffnessMatrix, stability_limit};
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
 use crate::reduce::Moments;
+use crate::run::cpu;
 use crate::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
 use crate::table::columns::{Table, columns};
 use std::f64::consts::TAU;

@@ -6,12 +6,12 @@
 //! study.rs      every solver under every drive, timed on one thread
 //! scaling.rs    what a slip costs as the slider grows
 //! hard_cases.rs parameters that break a naive code, each audited
-//! cpu.rs        what a computation costs
+//! cost.rs       what a computation costs
 //! tables.rs -> report.rs: tables as Parquet and JSON, figures
 //! ```
 
 pub mod breaks;
-pub mod cpu;
+pub mod cost;
 pub mod distance;
 mod hard_cases;
 mod report;
@@ -19,7 +19,7 @@ mod scaling;
 mod study;
 mod tables;
 
-pub use cpu::Cost;
+pub use cost::Cost;
 pub use distance::{Bias, Distance, Distances};
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use report::{Report, scaling_report, stability_report, study_report};
@@ -29,6 +29,7 @@ pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 use crate::figure::FigureError;
 use crate::model::Parameters;
 use crate::observe::{Measurements, Recording, measure};
+use crate::run::cpu;
 use crate::solver::{Ledger, Limits, Observer, Resolve, SimulationError, Solver, simulate, simulate_audited};
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;

@@ -3,7 +3,7 @@
 use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{Findings, MethodRow, Quantity, Study};
-use super::{AccuracyError, Stability, cpu, method_in_words};
+use super::{AccuracyError, Stability, cost, method_in_words};
 use crate::figure::{ErrorPanel, Growth, Line, MethodLine, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
 use crate::results::commit::Commit;
@@ -72,7 +72,7 @@ impl<'a> Report<'a> {
     fn new(name: &'static str, mut json: Value) -> Self {
         json["format"] = FORMAT.into();
         json["program"] = PROGRAM.into();
-        json["processor"] = cpu::processor().into();
+        json["processor"] = cost::processor().into();
         Self { name, json, tables: Vec::new(), pictures: Vec::new() }
     }
 
@@ -103,7 +103,7 @@ impl<'a> Report<'a> {
         let staging = folder.join("staging");
         let mut commit = Commit::begin(&Disk, &staging)?;
         let mut files = Vec::new();
-        let footer = Footer::default().with("processor", &cpu::processor());
+        let footer = Footer::default().with("processor", &cost::processor());
         for (name, write) in &self.tables {
             let file = folder.join(format!("{name}.parquet"));
             write(commit.stage(&file)?, &footer)?;
@@ -205,7 +205,7 @@ mod tests {
             together_seconds: Some(0.06),
             together_throughout: false,
         };
-        let cost = cpu::Cost {
+        let cost = cost::Cost {
             per_simulated_second: 0.2,
             per_slip: 0.02,
             steps_per_slip: 1e5,
@@ -242,7 +242,7 @@ mod tests {
         let row = |blocks, tolerance| SizeRow {
             parameters: Selected::new(Parameters { blocks, ..Parameters::default() }),
             tolerance,
-            cost: cpu::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cpu::Cost::default() },
+            cost: cost::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cost::Cost::default() },
             leaps_per_slip: 100.0,
             breaks_per_slip: 3e3,
             reattachments_per_slip: 3e3,

@@ -4,7 +4,7 @@
 //! and its cost subtracted, which leaves that of the slips past start-up. Exponents are slopes of straight lines
 //! through the logarithms.
 
-use super::cpu::Cost;
+use super::cost::Cost;
 use super::{AccuracyError, Realisation};
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;

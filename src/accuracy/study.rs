@@ -8,7 +8,7 @@
 //! follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
-use super::cpu::Cost;
+use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
 use super::{AccuracyError, Realisation, drive_in_words};
 use crate::model::{Parameters, Symbol};

@@ -103,7 +103,7 @@ fn or_dash(value: Option<f64>) -> String {
 
 /// The table of the README, and how far the distributions of slips are from those of the reference.
 fn study_text(study: &Study, findings: &Findings) -> String {
-    let mut lines = vec![format!("{}; one thread; first {} breaks", accuracy::cpu::processor(), study.breaks)];
+    let mut lines = vec![format!("{}; one thread; first {} breaks", accuracy::cost::processor(), study.breaks)];
     for is_modulated in [false, true] {
         let such = |row: &&MethodRow| row.parameters.modulation_period.is_some() == is_modulated;
         let rows: Vec<&MethodRow> = findings.methods.iter().filter(such).collect();
@@ -196,7 +196,7 @@ fn distance_table(findings: &Findings) -> Vec<String> {
 }
 
 fn scaling_text(findings: &ScalingFindings) -> String {
-    let mut lines = vec![format!("{}; one thread; per slip past start-up", accuracy::cpu::processor())];
+    let mut lines = vec![format!("{}; one thread; per slip past start-up", accuracy::cost::processor())];
     lines.push(format!(
         "\n{:>6} {:>6} {:>9} {:>6} {:>10} {:>10} {:>9} {:>9} {:>9} {:>7} {:>8}",
         "N", "Ns", "tolerance", "slips", "CPU s", "CPU/sim. s", "steps", "breaks", "reattach.", "leaps", "ns/step"

@@ -25,12 +25,10 @@ pub struct Progress {
 
 impl Progress {
     pub fn new() -> Self {
-        let is_terminal = std::io::stderr().is_terminal();
-        let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let now = Instant::now();
         Self {
-            bar: ProgressBar::with_draw_target(Some(0), target),
-            is_terminal,
+            bar: ProgressBar::hidden(),
+            is_terminal: std::io::stderr().is_terminal(),
             begin: now,
             last_line: now,
             jobs: 0,
@@ -51,12 +49,20 @@ impl Progress {
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),
                 ));
-                self.bar.set_length(u64::from(RESOLUTION));
+                if self.is_terminal {
+                    self.bar = ProgressBar::with_draw_target(Some(u64::from(RESOLUTION)), ProgressDrawTarget::stderr());
+                }
                 if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} [{bar:30}] {msg}") {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
             }
             RunEvent::JobDone { predicted_cost, .. } => self.advance(*predicted_cost),
+            RunEvent::Tick => self.draw(),
+            RunEvent::JobTakesLong { command, predicted_cost, wall } => self.say(&format!(
+                "1 job has run {}, {:.0} times its prediction: {command}",
+                output::duration(*wall),
+                wall / predicted_cost
+            )),
             RunEvent::JobFailed { job_id, reason, command, predicted_cost, .. } => {
                 self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
                 self.advance(*predicted_cost);
@@ -80,16 +86,25 @@ impl Progress {
     fn advance(&mut self, predicted_cost: f64) {
         self.jobs_done += 1;
         self.predicted_done += predicted_cost;
+        self.draw();
+    }
+
+    /// Draws the bar, or says a line if the last is long ago.
+    fn draw(&mut self) {
         let share = if self.predicted > 0.0 { (self.predicted_done / self.predicted).min(1.0) } else { 1.0 };
         let elapsed = self.begin.elapsed().as_secs_f64();
-        let left = if share > 0.0 { elapsed * (1.0 - share) / share } else { f64::INFINITY };
-        let text = format!("{} of {} jobs, {} left", self.jobs_done, self.jobs, output::duration(left));
+        let left = if share > 0.0 {
+            output::duration(elapsed * (1.0 - share) / share) + " left"
+        } else {
+            "time left unknown".to_owned()
+        };
+        let text = format!("{} of {} jobs, {left}", self.jobs_done, self.jobs);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
         self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
         self.bar.set_message(text.clone());
         if !self.is_terminal && self.last_line.elapsed() >= PLAIN_SPACING {
             self.last_line = Instant::now();
-            output::report(&format!("{:.0} %: {text}", 100.0 * share));
+            output::report(&format!("{}, {:.0} %: {text}", output::duration(elapsed), 100.0 * share));
         }
     }
 }

@@ -179,7 +179,7 @@ fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     ];
     if report.jobs_run > 0 {
         let measured = output::duration(report.measured_cost);
-        pairs.push(("time in jobs", format!("{measured}, predicted {}", output::duration(report.predicted_cost))));
+        pairs.push(("CPU time", format!("{measured}, predicted {}", output::duration(report.predicted_cost))));
         pairs.push(("wall time", output::duration(report.wall)));
     }
     pairs

@@ -41,9 +41,18 @@ pub enum RunEvent {
         slips: usize,
         /// Predicted cost.
         predicted_cost: f64,
-        /// Its wall time.
+    },
+    /// A job takes long.
+    JobTakesLong {
+        /// The command that does the same, to look at it alone.
+        command: String,
+        /// Predicted cost.
+        predicted_cost: f64,
+        /// Wall time so far.
         wall: f64,
     },
+    /// Time passes.
+    Tick,
     /// A job failed; the others continue.
     JobFailed {
         /// Its id.
@@ -54,8 +63,6 @@ pub enum RunEvent {
         command: String,
         /// Predicted cost.
         predicted_cost: f64,
-        /// Its wall time.
-        wall: f64,
     },
     /// A part is committed.
     PartCommitted {
@@ -67,8 +74,10 @@ pub enum RunEvent {
         failed: usize,
         /// Predicted cost of these jobs.
         predicted_cost: f64,
-        /// Sum of their wall times.
+        /// Their measured cost.
         measured_cost: f64,
+        /// Sum of their wall times.
+        wall: f64,
     },
     /// The run was asked to stop, or its time is over; jobs in flight are interrupted.
     Stopping,
@@ -110,7 +119,7 @@ pub struct RunReport {
     pub time_wanted: Option<f64>,
     /// Predicted CPU time of the jobs run, in s.
     pub predicted_cost: f64,
-    /// Sum of their wall times, in s.
+    /// Their measured CPU time, in s.
     pub measured_cost: f64,
     /// Wall time of the run, in s.
     pub wall: f64,
@@ -124,9 +133,9 @@ impl RunEvent {
         Self::Started { host: host(), process, program, shard, threads, jobs, jobs_there, predicted_cost }
     }
 
-    /// Whether the log keeps it: a line for each job would be millions.
+    /// Whether the log keeps it: a line for each job, or each second, would be millions.
     const fn is_logged(&self) -> bool {
-        !matches!(self, Self::JobDone { .. })
+        !matches!(self, Self::JobDone { .. } | Self::Tick)
     }
 }
 
@@ -213,16 +222,16 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// Measured over predicted cost of all parts in the logs; `None` before the first.
+    /// Wall time over predicted cost of all parts in the logs; `None` before the first.
     ///
     /// # Errors
     /// When a log cannot be read.
     pub fn pace(&self) -> Result<Option<f64>, StorageError> {
         let (mut predicted, mut measured) = (0.0, 0.0);
         self.events(|event| {
-            if let RunEvent::PartCommitted { predicted_cost, measured_cost, .. } = event {
+            if let RunEvent::PartCommitted { predicted_cost, wall, .. } = event {
                 predicted += predicted_cost;
-                measured += measured_cost;
+                measured += wall;
             }
         })?;
         Ok((predicted > 0.0).then(|| measured / predicted))
@@ -271,7 +280,7 @@ mod tests {
         for event in &events {
             log.write(event).unwrap();
         }
-        log.write(&RunEvent::JobDone { slips: 3, predicted_cost: 1.0, wall: 1.0 }).unwrap();
+        log.write(&RunEvent::JobDone { slips: 3, predicted_cost: 1.0 }).unwrap();
         log.0.write(b"{\"time\": 1, \"ev").unwrap();
         let mut read_back = Vec::new();
         results.events(|event| read_back.push(event)).unwrap();

@@ -3,6 +3,7 @@
 use crate::results::ResultsError;
 use crate::results::layout::part_name;
 use crate::results::parts::Outcome;
+use crate::run::cpu;
 use crate::run::share::{PartJob, Share};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Kernel, RunEvent, RunReport};
@@ -13,13 +14,18 @@ use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often the collector looks at the stop flag.
 const STOP_POLL: Duration = Duration::from_millis(20);
+/// How often it lets the display know that time passes.
+const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
+/// A job takes long from this time on, if that is also so many times its predicted cost; told again whenever it has doubled.
+const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(20) };
+const LONG_BY_PREDICTION: f64 = 20.0;
 /// Outcomes that may wait for the collector, for each thread.
 const WAITING_PER_THREAD: usize = 4;
 
@@ -28,11 +34,29 @@ enum Message {
     Ended {
         job: PartJob,
         outcome: Outcome,
-        wall: f64,
+        time: JobTime,
     },
     /// The plan could not be continued, since a part could not be looked up.
     Broken(ResultsError),
 }
+
+/// What a job took, in s.
+#[derive(Clone, Copy, Debug, Default)]
+struct JobTime {
+    cpu: f64,
+    wall: f64,
+}
+
+/// A job that a worker is at.
+struct UnderWay {
+    job: PartJob,
+    begin: Instant,
+    /// When it counts as long.
+    long_after: Duration,
+}
+
+/// The jobs under way, by extension, part and position.
+type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
 
 /// A part of which some jobs are still out.
 struct OpenPart {
@@ -40,7 +64,7 @@ struct OpenPart {
     outcomes: BTreeMap<usize, Outcome>,
     again: bool,
     predicted_cost: f64,
-    measured_cost: f64,
+    measured: JobTime,
 }
 
 pub(super) struct Collector<'a, 'e> {
@@ -72,11 +96,12 @@ impl<'a, 'e> Collector<'a, 'e> {
         })?;
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
+        let under_way = &AllUnderWay::default();
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
         let jobs = self.share.jobs(self.walltime).take_while(|_| !interrupt.load(Ordering::Relaxed));
         pool.in_place_scope(|workers| {
-            workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, &sender)));
-            let collected = self.collect(&receiver, stop, interrupt);
+            workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, under_way, &sender)));
+            let collected = self.collect(&receiver, under_way, stop, interrupt);
             interrupt.store(true, Ordering::Relaxed);
             // Frees workers that wait to send.
             drop(receiver);
@@ -87,11 +112,18 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn collect(
         &mut self,
         receiver: &Receiver<Message>,
+        under_way: &AllUnderWay,
         stop: &AtomicBool,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
         let mut is_out_of_time = false;
+        let mut last_tick = Instant::now();
         loop {
+            if last_tick.elapsed() >= TICK {
+                last_tick = Instant::now();
+                self.report_long_jobs(under_way)?;
+                self.events.send(&RunEvent::Tick)?;
+            }
             let must_end = stop.load(Ordering::Relaxed) || self.walltime.is_over();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
@@ -101,7 +133,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.events.send(&RunEvent::OutOfTime)?;
             }
             match receiver.recv_timeout(STOP_POLL) {
-                Ok(Message::Ended { job, outcome, wall }) => self.take(&job, outcome, wall)?,
+                Ok(Message::Ended { job, outcome, time }) => self.take(&job, outcome, time)?,
                 Ok(Message::Broken(error)) => return Err(error),
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => {
@@ -111,18 +143,34 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    fn take(&mut self, of: &PartJob, outcome: Outcome, wall: f64) -> Result<(), ResultsError> {
+    /// Tells of jobs that take long.
+    fn report_long_jobs(&mut self, under_way: &AllUnderWay) -> Result<(), ResultsError> {
+        for UnderWay { job, begin, long_after } in locked(under_way).values_mut() {
+            let elapsed = begin.elapsed();
+            if elapsed >= *long_after {
+                *long_after = 2 * elapsed;
+                let part = &job.part;
+                self.events.send(&RunEvent::JobTakesLong {
+                    command: self.share.results.sweeps()[part.extension].command(&part.jobs[job.position]),
+                    predicted_cost: part.jobs[job.position].cost,
+                    wall: elapsed.as_secs_f64(),
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
         let job = &of.part.jobs[of.position];
         let predicted_cost = job.cost;
-        self.walltime.ended(predicted_cost, wall);
+        self.walltime.ended(predicted_cost, time.wall);
         let event = match &outcome {
-            Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost, wall },
+            Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
             Err(reason) => RunEvent::JobFailed {
                 job_id: self.share.results.job_id(&of.part, of.position),
                 reason: reason.clone(),
                 command: self.share.results.sweeps()[of.part.extension].command(job),
                 predicted_cost,
-                wall,
             },
         };
         self.events.send(&event)?;
@@ -132,11 +180,12 @@ impl<'a, 'e> Collector<'a, 'e> {
             outcomes: BTreeMap::new(),
             again: of.again,
             predicted_cost: 0.0,
-            measured_cost: 0.0,
+            measured: JobTime::default(),
         });
         open.outcomes.insert(of.position, outcome);
         open.predicted_cost += predicted_cost;
-        open.measured_cost += wall;
+        open.measured.cpu += time.cpu;
+        open.measured.wall += time.wall;
         if open.outcomes.len() == of.together
             && let Some(whole) = self.open.remove(&key)
         {
@@ -151,7 +200,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         self.walltime.committed(begin.elapsed().as_secs_f64());
         let (part, jobs) = (part_name(&whole.part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
-        let OpenPart { predicted_cost, measured_cost, .. } = *whole;
+        let OpenPart { predicted_cost, measured: JobTime { cpu: measured_cost, wall }, .. } = *whole;
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
@@ -163,18 +212,36 @@ impl<'a, 'e> Collector<'a, 'e> {
         report.jobs_failed += failed as u64;
         report.predicted_cost += predicted_cost;
         report.measured_cost += measured_cost;
-        Ok(self.events.send(&RunEvent::PartCommitted { part, jobs, failed, predicted_cost, measured_cost })?)
+        Ok(self.events.send(&RunEvent::PartCommitted { part, jobs, failed, predicted_cost, measured_cost, wall })?)
     }
 }
 
+fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize), UnderWay>> {
+    // Nothing panics while it is held.
+    under_way.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Runs one job and sends its outcome. That nobody listens any more means that the run has ended.
-fn work(job: Result<PartJob, ResultsError>, kernel: &Kernel<'_>, interrupt: &AtomicBool, sender: &SyncSender<Message>) {
+fn work(
+    job: Result<PartJob, ResultsError>,
+    kernel: &Kernel<'_>,
+    interrupt: &AtomicBool,
+    under_way: &AllUnderWay,
+    sender: &SyncSender<Message>,
+) {
     let message = match job {
         Err(error) => Message::Broken(error),
         Ok(job) => {
-            let begin = Instant::now();
-            let Some(outcome) = outcome(&job.part.jobs[job.position], kernel, interrupt) else { return };
-            Message::Ended { job, outcome, wall: begin.elapsed().as_secs_f64() }
+            let (begin, task) = (Instant::now(), &job.part.jobs[job.position]);
+            let long_after =
+                Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
+            let key = (job.part.extension, job.part.index, job.position);
+            locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
+            let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
+            locked(under_way).remove(&key);
+            let Some(outcome) = outcome else { return };
+            let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
+            Message::Ended { job, outcome, time }
         }
     };
     let _ = sender.send(message);

@@ -12,6 +12,7 @@
 //! job in flight.
 
 mod collect;
+pub mod cpu;
 mod shard;
 mod share;
 mod status;

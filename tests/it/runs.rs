@@ -45,7 +45,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
 
     let first = folder.ends(0, "run tiny.toml");
-    let expected = ["jobs run", "parts committed", "time in jobs", "wall time", "jobs", "parameter sets", "slips"];
+    let expected = ["jobs run", "parts committed", "CPU time", "wall time", "jobs", "parameter sets", "slips"];
     assert_eq!(labels(&first.stdout)[..7], expected);
     let after = &labels(&first.stdout)[7..];
     assert!(after.iter().all(|label| ["reduced data", "figure"].contains(label)), "{}", first.stdout);

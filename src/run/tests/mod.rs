@@ -334,11 +334,40 @@ fn events_account_for_every_job() {
         }
         RunEvent::PartCommitted { jobs, .. } => committed += *jobs as u64,
         RunEvent::Finished(report) => finished += report.jobs_run,
+        RunEvent::Tick => {}
         event => panic!("nobody asked for {event:?}"),
     })
     .unwrap();
     assert_eq!((started, done, failed), (2 * SEEDS, 2 * SEEDS - 4, 4));
     assert_eq!((committed, finished), (2 * SEEDS, 2 * SEEDS));
+}
+
+#[test]
+fn a_job_that_takes_long_is_told_while_it_runs() {
+    let root = tempfile::tempdir().unwrap();
+    let text = "name = \"test\"\n[axes]\nseed = [7]\n[record]\nslips = 1\ndiscard = 0\n";
+    let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();
+    let done = AtomicBool::new(false);
+    let slow = |job: &Job, _: &AtomicBool| {
+        while !done.load(Ordering::Relaxed) {
+            std::thread::yield_now();
+        }
+        Ok(measure(&job.parameters))
+    };
+    let (mut ticks, mut told) = (0, Vec::new());
+    let stop = AtomicBool::new(false);
+    run(&Layout::new(&Disk, root.path()), &sweep, options(&stop, 1), &slow, &mut |event| match event {
+        RunEvent::Tick => ticks += 1,
+        RunEvent::JobTakesLong { command, predicted_cost, wall } => {
+            assert!(*wall > 20.0 * predicted_cost, "{event:?}");
+            told.push(command.clone());
+            done.store(told.len() == 2, Ordering::Relaxed);
+        }
+        _ => {}
+    })
+    .unwrap();
+    assert!(ticks >= 2, "{ticks}");
+    assert_eq!(told, vec!["stickslip simulate --set seed=7 --slips 1 --discard 0"; 2], "again when it has doubled");
 }
 
 #[test]

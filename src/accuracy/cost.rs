@@ -1,29 +1,7 @@
-//! CPU time of the calling thread, costs in it, and the processor.
+//! Costs in CPU time, and the processor.
 
 use crate::solver::Summary;
 use crate::table::columns::columns;
-
-/// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
-#[must_use]
-pub fn thread_seconds() -> f64 {
-    #[cfg(unix)]
-    {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-    }
-    #[cfg(not(unix))]
-    {
-        static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
-    }
-}
-
-/// CPU seconds of the calling thread that a computation takes, and its result.
-pub fn timed<T>(compute: impl FnOnce() -> T) -> (f64, T) {
-    let start = thread_seconds();
-    let result = compute();
-    (thread_seconds() - start, result)
-}
 
 columns! {
     /// What a solver costs, on one thread.
@@ -70,17 +48,4 @@ pub fn processor() -> String {
     let name = field("model name").unwrap_or_else(|| "unknown processor".to_owned());
     let clock = field("cpu MHz").map_or_else(String::new, |clock| format!(", {clock} MHz"));
     format!("{name} ({}{clock})", std::env::consts::ARCH)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thread_that_sleeps_uses_no_processor_time() {
-        let (asleep, ()) = timed(|| std::thread::sleep(std::time::Duration::from_millis(30)));
-        let (busy, sum) = timed(|| (0..3_000_000).fold(0.0_f64, |sum, i| (sum + f64::from(i)).sqrt()));
-        assert!(asleep < 0.02, "{asleep}");
-        assert!(busy > 0.0 && sum > 0.0);
-    }
 }
