@@ -300,6 +300,9 @@ impl SlipObserver {
 
     /// Slips past start-up, and their precursors if they are recorded.
     pub fn into_rows(mut self) -> (Vec<Slip>, Vec<Precursor>) {
+        // Precursors of a slip that the job does not have belong to none.
+        let slips = self.slips.len() as u64;
+        self.precursors.retain(|precursor| precursor.slip < slips);
         if let Some(drops) = self.drops {
             let discarded = self.spans.len() - self.slips.len();
             let of_slips = drops.of_slips(&self.spans).into_iter().skip(discarded);
@@ -322,9 +325,11 @@ impl SlipObserver {
     /// for half the time to give up: the slider then slides, and without a slip past start-up only that second half counts.
     /// `None` if nothing is left.
     pub fn averages(&self) -> Option<Averages> {
-        let slips = self.slips.iter().len() > 0;
         let (start, end) = match self.settled {
-            Some(settled) => (self.start_up_end.filter(|_| slips).unwrap_or(settled), self.sliding()),
+            Some(settled) => {
+                let start_up_end = self.start_up_end.filter(|_| !self.slips.is_empty());
+                (start_up_end.unwrap_or(settled), self.sliding())
+            }
             None => self.start_up_end.zip(self.last_end)?,
         };
         let time = end.time - start.time;

@@ -24,7 +24,7 @@ const STOP_POLL: Duration = Duration::from_millis(20);
 /// How often it lets the display know that time passes.
 const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
 /// A job takes long from this time on, if that is also so many times its predicted cost; told again whenever it has doubled.
-const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(20) };
+const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
 const LONG_BY_PREDICTION: f64 = 20.0;
 /// Outcomes that may wait for the collector, for each thread.
 const WAITING_PER_THREAD: usize = 4;
