@@ -17,6 +17,13 @@ pub fn report(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// Writes warnings to standard error.
+pub fn warn(warnings: &[String]) {
+    for warning in warnings {
+        report(&format!("warning: {warning}"));
+    }
+}
+
 /// Prints a value as JSON.
 pub fn json(value: &impl Serialize) -> Result<()> {
     print(&format!("{}\n", serde_json::to_string_pretty(value)?))

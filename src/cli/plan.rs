@@ -45,6 +45,7 @@ struct Axis {
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::from_file(&arguments.sweep)?;
+    output::warn(&sweep.warnings());
     let totals = Plan::new(std::slice::from_ref(&sweep)).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {

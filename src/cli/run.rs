@@ -25,15 +25,16 @@ use stickslip::table::storage::Disk;
 Examples:
   stickslip run sweeps/fig3.toml
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
+  stickslip run results/fig3                     resume, without the sweep file
   stickslip run sweeps/fig3.toml --shard 2/8     the second of eight processes on one directory
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
 Ctrl-C and SIGTERM keep what is done; the same command resumes from there.")]
 pub struct Arguments {
-    /// Sweep file
-    #[arg(value_name = "SWEEP.toml")]
+    /// Sweep file, or results directory to resume
+    #[arg(value_name = "SWEEP.toml|DIR")]
     sweep: PathBuf,
-    /// Results directory [default: results/<name of the sweep>]
+    /// Results directory [default: results/<name of the sweep>, or the one to resume]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: all cores]
@@ -91,8 +92,16 @@ struct Report {
 static STOP: AtomicBool = AtomicBool::new(false);
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
-    let sweep = Sweep::from_file(&arguments.sweep)?;
-    let root = arguments.out.clone().unwrap_or_else(|| PathBuf::from("results").join(sweep.name()));
+    let (sweep, default_root) = if arguments.sweep.is_dir() {
+        let sweep = Results::read(&Layout::new(&Disk, &arguments.sweep))?.sweep().clone();
+        (sweep, arguments.sweep.clone())
+    } else {
+        let sweep = Sweep::from_file(&arguments.sweep)?;
+        let root = PathBuf::from("results").join(sweep.name());
+        (sweep, root)
+    };
+    let root = arguments.out.clone().unwrap_or(default_root);
+    output::warn(&sweep.warnings());
     ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(Exit::Stopped as u8));

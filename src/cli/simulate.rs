@@ -233,6 +233,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     if arguments.contacts.is_some() {
         others.push(&mut log);
     }
+    output::warn(&sweep.warnings());
     let never = AtomicBool::new(false);
     let begin = Instant::now();
     let mut observer = Observers { lead: &mut slips, others };
@@ -269,7 +270,7 @@ fn only_job(sweep: &Sweep) -> Result<Job> {
 
 /// The flags as the text of a sweep with one point.
 fn as_sweep(arguments: &Arguments) -> Result<String> {
-    let (mut model, mut axes) = (String::new(), String::new());
+    let mut model = String::new();
     let mut keys = Vec::new();
     for setting in &arguments.settings {
         let (key, value) = setting
@@ -280,17 +281,12 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
             return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")).into());
         }
         keys.push(key);
+        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            return Err(UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")).into());
+        }
         // A word such as tension needs quotes in a sweep file.
         let written = number(value).unwrap_or_else(|_| format!("{value:?}"));
-        if matches!(key, "eta" | "frequency") {
-            writeln!(axes, "{key} = [{written}]")?;
-        } else if Symbol::from_key(key).is_some() {
-            writeln!(model, "{key} = {written}")?;
-        } else {
-            let known: Vec<&str> = Symbol::ALL.iter().map(|symbol| symbol.key()).collect();
-            let known = known.join(" ");
-            return Err(UsageError(format!("--set {key}: no such key; there are {known}, eta, frequency")).into());
-        }
+        writeln!(model, "{key} = {written}")?;
     }
     let mut record = String::new();
     for key in RecordingKey::ALL {
@@ -324,13 +320,19 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
             format!("method = \"fixed-step\"\ndt = {}\n", dt.as_deref().unwrap_or("1e-6"))
         }
     };
-    Ok(format!("name = \"simulate\"\n[model]\n{model}[axes]\n{axes}[record]\n{record}[solver]\n{solver}"))
+    Ok(format!("name = \"simulate\"\n[model]\n{model}[record]\n{record}[solver]\n{solver}"))
 }
 
 /// A message about the sweep text, as one about the flags.
 fn as_flags(error: SweepError) -> anyhow::Error {
     match error {
-        SweepError::Invalid { problem, .. } => UsageError(format!("in the flags: {problem}")).into(),
+        SweepError::Invalid { problem, .. } => {
+            // Flags have neither sections nor lines.
+            let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((&problem, ""));
+            let end = end.split_once(')').map_or("", |(_, rest)| rest);
+            let problem = format!("{start}{end}").replace(" in [model]", "");
+            UsageError(format!("in the flags: {problem}")).into()
+        }
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     }
 }

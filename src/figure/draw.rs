@@ -18,6 +18,9 @@ const MAX_SETS: usize = 100_000;
 /// When the reduced data are not there, are damaged, or a figure cannot be written.
 pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
     let _alone = alone(layout, WRITER)?;
+    if !layout.storage.exists(&layout.reduced())? {
+        return Err(FigureError::NotReduced { directory: layout.root().to_owned() });
+    }
     let points = read_reduced(layout)?;
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(backbone::backbone(&points, &read_reduced(layout)?));

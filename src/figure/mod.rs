@@ -36,6 +36,7 @@ pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
+use std::path::PathBuf;
 
 /// A figure that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +56,12 @@ pub enum FigureError {
         figure: &'static str,
         /// The reason.
         reason: String,
+    },
+    /// There are no reduced data.
+    #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", .directory.display())]
+    NotReduced {
+        /// The results directory.
+        directory: PathBuf,
     },
     /// The reduced data cannot be read.
     #[error("{0}; if it is missing or damaged, reduce the tables again")]

@@ -10,6 +10,7 @@ use super::quantity::{Point, Quantity};
 use super::read_axes::PlacedAxis;
 use super::source::{Section, Source, SweepError};
 use crate::model::{Shortest, Symbol};
+use std::ops::RangeInclusive;
 
 /// Where each quantity is set.
 pub(super) struct Places<'a> {
@@ -29,20 +30,22 @@ impl<'a> Places<'a> {
         Self { source, set: Vec::new() }
     }
 
-    /// A parameter is set in `[model]`.
-    pub fn model(&mut self, symbol: Symbol, at: usize) {
-        self.set.push(Place { quantity: Quantity::Parameter(symbol), at, in_model: true });
+    /// A quantity is set in `[model]`; refused if another fixes the period already.
+    pub fn model(&mut self, quantity: Quantity, at: usize) -> Result<(), SweepError> {
+        self.set(Place { quantity, at, in_model: true })
     }
 
     /// Quantities are set on axes; refused if something else sets them, or the period, already.
     pub fn axes(&mut self, axes: Vec<PlacedAxis>) -> Result<Vec<Axis>, SweepError> {
         for PlacedAxis { axis, places } in &axes {
-            axis.quantities().into_iter().zip(places).try_for_each(|(quantity, &at)| self.axis(quantity, at))?;
+            let set = axis.quantities().into_iter().zip(places);
+            set.map(|(quantity, &at)| Place { quantity, at, in_model: false }).try_for_each(|place| self.set(place))?;
         }
         Ok(axes.into_iter().map(|placed| placed.axis).collect())
     }
 
-    fn axis(&mut self, quantity: Quantity, at: usize) -> Result<(), SweepError> {
+    fn set(&mut self, new: Place) -> Result<(), SweepError> {
+        let Place { quantity, at, .. } = new;
         let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
         if let Some(place) = self.set.iter().find(clash) {
             let (key, other) = (quantity.key(), place.quantity.key());
@@ -55,7 +58,7 @@ impl<'a> Places<'a> {
             };
             return Err(self.source.error(at, problem));
         }
-        self.set.push(Place { quantity, at, in_model: false });
+        self.set.push(new);
         Ok(())
     }
 
@@ -93,19 +96,51 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     sweep.solver.check(&first.parameters).map_err(|error| file.source.error(time_step, error.to_string()))
 }
 
+/// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
+const FAST: f64 = 0.1;
+/// η where there is something to see: far below, the load hardly swings; far above, a cycle gains less than a slip's inertia
+/// hides.
+const USUAL_ETA: RangeInclusive<f64> = 1e-3..=1e5;
+/// Most points that are looked at for warnings.
+const MAX_LOOKED_AT: usize = 100_000;
+
+impl Sweep {
+    /// What is allowed but hardly meant.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let points: Vec<Point> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
+        let worst = |quantity: Quantity, is_odd: &dyn Fn(f64) -> bool| {
+            points.iter().map(|point| point.number(quantity)).find(|number| is_odd(*number))
+        };
+        let fast = worst(Quantity::Parameter(Symbol::V0), &|velocity| velocity >= FAST);
+        let odd = worst(Quantity::Eta, &|eta| eta != 0.0 && !USUAL_ETA.contains(&eta));
+        let fast = fast.map(|velocity| {
+            format!(
+                "V0 = {} m/s is no drive for stick-slip; 100 micrometres per second are V0 = 1e-4",
+                Shortest(velocity)
+            )
+        });
+        let odd = odd.map(|eta| {
+            let (low, high) = (USUAL_ETA.start(), USUAL_ETA.end());
+            format!(
+                "eta = {eta:.3e} at a point; from {low:e} to {high:e} there is locking to see: check Delta, T and V0"
+            )
+        });
+        fast.into_iter().chain(odd).collect()
+    }
+}
+
 /// A period without modulation has no effect, and a modulation without period no meaning.
 fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), SweepError> {
     let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
     match places.set.iter().find(|place| place.quantity.is_period()) {
         Some(place) if !is_modulated => {
             let key = place.quantity.key();
-            let problem = format!(
-                "{key}: has no effect while Delta = 0; set Delta > 0 in [model] or on an axis, or remove {key}"
-            );
+            let problem = format!("{key}: has no effect while Delta = 0; set Delta > 0 (m), or remove {key}");
             Err(places.source.error(place.at, problem))
         }
         None if is_modulated => {
-            let problem = "Delta > 0: needs a period; set T in [model], or T, eta or frequency on an axis";
+            let problem = "Delta > 0: needs a period; set T (s), frequency (Hz) or eta";
             Err(places.error(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
         }
         _ => Ok(()),

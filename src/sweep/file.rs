@@ -3,6 +3,7 @@
 //! Whatever is unknown, impossible, contradictory or without effect is refused with file, line, key, value and the way
 //! out. Contract: every job of a sweep that was read has valid parameters (see `check.rs`), and there is at least one.
 
+use super::axes::{Axis, Column};
 use super::check::{self, Places};
 use super::filter::Condition;
 use super::grid::Sweep;
@@ -10,7 +11,7 @@ use super::job::Identity;
 use super::quantity::Quantity;
 use super::read_axes;
 use super::source::{Entry, Section, Source, SweepError};
-use crate::model::{Parameters, Symbol, Value};
+use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use std::path::Path;
@@ -40,8 +41,9 @@ impl Sweep {
         file.only(&["name", "where", "model", "axes", "record", "solver"])?;
         let name = read_name(&file.required("name", "it becomes a folder, such as name = \"fig3\"")?)?;
         let mut places = Places::new(source);
-        let base = read_section(&file, "model", "[model]", |model| read_model(model, &mut places))?;
+        let (base, period) = read_section(&file, "model", "[model]", |model| read_model(model, &mut places))?;
         let axes = places.axes(read_section(&file, "axes", "[axes]", read_axes::read)?)?;
+        let axes = period.into_iter().chain(axes).collect();
         let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry))?;
         let recording = read_section(&file, "record", "[record]", read_recording)?;
         let solver = read_section(&file, "solver", "[solver]", read_solver)?;
@@ -76,16 +78,24 @@ fn read_name(entry: &Entry<'_>) -> Result<String, SweepError> {
     })
 }
 
-fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<Parameters, SweepError> {
-    let keys = Symbol::ALL.map(Symbol::key);
-    let mut parameters = Parameters::default();
+/// Reads the parameters, and η or the frequency as an axis of one value.
+fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameters, Option<Axis>), SweepError> {
+    let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
+    let (mut parameters, mut period) = (Parameters::default(), None);
     for entry in model.entries() {
-        let symbol = Symbol::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
-        let value = read_axes::read_value(&entry, Quantity::Parameter(symbol))?;
-        parameters.put(symbol, value).ok_or_else(|| entry.must_be(symbol.description().allowed))?;
-        places.model(symbol, entry.at);
+        let quantity = Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
+        let value = read_axes::read_value(&entry, quantity)?;
+        places.model(quantity, entry.at)?;
+        match quantity {
+            Quantity::Parameter(symbol) => {
+                parameters.put(symbol, value).ok_or_else(|| entry.must_be(symbol.description().allowed))?;
+            }
+            Quantity::Eta | Quantity::Frequency => {
+                period = Axis::table(vec![Column { quantity, values: vec![value] }]).ok();
+            }
+        }
     }
-    Ok(parameters)
+    Ok((parameters, period))
 }
 
 fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, SweepError> {

@@ -5,6 +5,7 @@
 //! value as written nor the way out.
 
 use crate::model::Value;
+use crate::model::value::FieldType;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -153,9 +154,6 @@ impl<'a> Entry<'a> {
     pub fn unknown(&self, title: &str, allowed: &[&str]) -> SweepError {
         let hint = match self.key {
             "name" | "where" => format!("{} must stand above the first [section]", self.key),
-            "eta" | "frequency" if title == "[model]" => {
-                format!("{0} is not a parameter; write {0} = [..] in [axes], or set T", self.key)
-            }
             key if title == "the file" && super::quantity::Quantity::from_key(key).is_some() => {
                 "parameters belong in [model] or [axes]".to_owned()
             }
@@ -202,8 +200,8 @@ impl<'a> Entry<'a> {
 
     /// A whole number within bounds.
     pub fn count(&self, min: u64, max: u64) -> Result<u64, SweepError> {
-        match self.value() {
-            Some(Value::Count(count)) if (min..=max).contains(&count) => Ok(count),
+        match self.value().and_then(u64::from_value) {
+            Some(count) if (min..=max).contains(&count) => Ok(count),
             _ => Err(self.must_be(&format!("a whole number from {min} to {max}"))),
         }
     }

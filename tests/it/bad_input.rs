@@ -108,7 +108,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("plan empty", &["empty: cannot be read", "check the path"]),
         ("plan binary.toml", &["binary.toml: cannot be read", "UTF-8"]),
         ("plan good.toml --out x", &["--out"]),
-        ("run", &["<SWEEP.toml>"]),
+        ("run", &["<SWEEP.toml|DIR>"]),
         ("run missing.toml", &["missing.toml: cannot be read", "check the path"]),
         ("run plain.txt", &["plain.txt:1: ", "TOML"]),
         // Flags of a run.
@@ -153,7 +153,10 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
     let table: &[(&str, &[&str])] = &[
         // Parameters of a simulation.
         ("simulate --set V0", &["--set V0: must be KEY=VALUE, such as --set V0=1e-5"]),
-        ("simulate --set velocity=3", &["--set velocity: no such key", "V0", "eta"]),
+        ("simulate --set velocity=3", &["velocity = 3: unknown key; allowed are", "V0", "eta"]),
+        ("simulate --set delta=1e-6", &["delta = 1e-6: unknown key; did you mean Delta"]),
+        ("simulate --set Delta=1e-6 --set eta=3 --set T=1", &["T: fixes the period, as does eta; keep one"]),
+        ("simulate --set =3", &["--set =3: must be KEY=VALUE"]),
         ("simulate --set V0=fast", &["V0 = \"fast\"", "must be a finite number > 0"]),
         ("simulate --set V0=", &["V0", "must be a finite number > 0"]),
         ("simulate --set V0=infinity", &["V0 = inf", "must be a finite number > 0"]),

@@ -198,7 +198,11 @@ fn reduced_data_and_figures_can_be_made_again() {
     }
     let refused = folder.run("plot r");
     assert_ne!(refused.code, Some(0), "there is nothing to plot");
-    assert!(refused.stderr.contains("reduced"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("r: has no reduced data to draw; run `stickslip reduce r` first"),
+        "{}",
+        refused.stderr
+    );
     let summary = json(&folder.ends(0, "reduce r --json").stdout);
     assert_eq!((summary["jobs"].as_u64(), summary["slips"].as_u64()), (Some(TINY_JOBS), Some(4 * TINY_JOBS)));
     let drawn = folder.ends(0, "plot r").stdout;
@@ -300,4 +304,17 @@ fn the_help_of_every_command_holds_an_example() {
         let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
         assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");
     }
+}
+
+#[test]
+fn a_directory_resumes_without_its_sweep_file() {
+    let folder = Folder::new();
+    folder.write("tiny.toml", TINY);
+    folder.ends(0, "run tiny.toml --no-reduce");
+    let whole = folder.contents("results/tiny/tables");
+    fs::remove_file(folder.path("results/tiny/tables/jobs/part-000-000000.parquet")).unwrap();
+    fs::remove_file(folder.path("tiny.toml")).unwrap();
+    let resumed = folder.ends(0, "run results/tiny --no-reduce");
+    assert!(resumed.stdout.contains("jobs run         12, 0 failed\n"), "{}", resumed.stdout);
+    assert_eq!(folder.contents("results/tiny/tables"), whole);
 }

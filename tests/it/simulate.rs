@@ -1,7 +1,7 @@
 //! One simulation on the command line: the first break of the model, the same slips as in a sweep, and records that agree
 //! with each other.
 
-use crate::program::{Folder, Rows};
+use crate::program::{Folder, Rows, json};
 use std::collections::BTreeMap;
 
 /// Fig. 1's driving spring, in N/m, and velocity, in m/s.
@@ -197,4 +197,31 @@ fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
     folder.ends(0, "simulate --set N=9 --slips 4 --panel map --plot map.svg");
     let map = std::fs::read_to_string(folder.path("map.svg")).unwrap();
     assert!(map.contains("Position x") && map.contains("detached contacts (%)") && !map.contains("Shear force"));
+}
+
+#[test]
+fn what_is_hardly_meant_is_warned_of_and_a_plot_after_the_end_is_refused() {
+    let folder = Folder::new();
+    let fast = folder.ends(0, "simulate --set V0=100 --set N=2 --slips 1 --discard 0");
+    assert!(fast.stderr.contains("warning: V0 = 100 m/s is no drive for stick-slip"), "{}", fast.stderr);
+    folder.write("slow.toml", "name = \"slow\"\n[model]\nDelta = 1e-6\neta = 1e-4\n");
+    assert!(folder.ends(0, "plan slow.toml").stderr.contains("warning: eta = 1.000e-4"));
+    let late = folder.ends(2, "simulate --set N=9 --slips 1 --from 9 --plot late.svg");
+    assert!(late.stderr.contains("--from 9: the simulation ended at 0."), "{}", late.stderr);
+    assert!(!folder.path("late.svg").exists());
+    let plain = folder.ends(0, "simulate --set N=9 --slips 1");
+    assert_eq!(plain.stderr, "");
+}
+
+#[test]
+fn the_frequency_is_a_setting_of_the_model() {
+    let folder = Folder::new();
+    folder.write("f.toml", "name = \"f\"\n[model]\nN = 9\nDelta = 1e-6\nfrequency = 58\n[record]\nslips = 2\n");
+    let id = |arguments: &str| {
+        let report = json(&folder.ends(0, arguments).stdout);
+        (report["job_id"].clone(), report["regime"].clone())
+    };
+    let of_file = id("simulate f.toml --json");
+    assert_eq!(of_file, id("simulate --set N=9 --set Delta=1e-6 --set frequency=58 --slips 2 --json"));
+    assert_eq!(of_file.1, "stick-slip");
 }

@@ -122,6 +122,13 @@ pub(super) fn write_pictures(
     if arguments.plot.is_empty() {
         return Ok(());
     }
+    let last = trace.last().map(|row| row.time).or(map.last().map(|row| row.time)).unwrap_or(0.0);
+    if arguments.from >= last {
+        let from = arguments.from;
+        let problem =
+            format!("--from {from}: the simulation ended at {last} s; take an earlier instant, or a longer --time");
+        return Err(UsageError(problem).into());
+    }
     let picture = draw(arguments, parameters, trace, map)?;
     for path in &arguments.plot {
         let bytes = if extension(path) == Some("svg") { picture.svg().into_bytes() } else { picture.png()? };
