@@ -55,6 +55,19 @@ pub fn minimum_phase_asymptote(eta: f64) -> f64 {
     -2.0 * (PI / eta).sqrt()
 }
 
+/// Mean of exp(iφ), as its real and imaginary part, of slips that come at a random load among those that exceed all before:
+/// the null model of locking. The load φ + η cos φ grows with the rate 1 - η sin φ, which so is the density of φ: for
+/// η >= 1 from φ_min to `Φ_max`, where the load exceeds its preceding maximum, and else on the whole circle.
+#[must_use]
+pub fn random_load_mean(eta: f64) -> [f64; 2] {
+    let Some((low, high)) = minimum_phase(eta).zip(load_maximum_phase(eta)) else { return [0.0, -0.5 * eta] };
+    let between = |integral: &dyn Fn(f64) -> f64| integral(high) - integral(low);
+    let load = between(&|phase| phase + eta * libm::cos(phase));
+    let real = between(&|phase| libm::sin(phase) * (1.0 - 0.5 * eta * libm::sin(phase)));
+    let imaginary = between(&|phase| -libm::cos(phase) - 0.25 * eta * (2.0 * phase - libm::sin(2.0 * phase)));
+    [real / load, imaginary / load]
+}
+
 /// Total strength `N N_s f_s` of the interface, in N.
 #[must_use]
 pub fn total_strength(parameters: &Parameters) -> f64 {
@@ -89,6 +102,32 @@ pub fn rigid_block_friction(parameters: &Parameters, velocity: f64) -> f64 {
 mod tests {
     use super::super::equation::StiffnessMatrix;
     use super::*;
+
+    #[test]
+    fn slips_at_random_loads_have_the_mean_of_their_density() {
+        // Known: 0.581, 0.816 and 0.918.
+        for eta in [0.3, 0.9, 1.18, 2.4, 4.9, 60.0] {
+            let (low, high) = minimum_phase(eta).zip(load_maximum_phase(eta)).unwrap_or((-PI, PI));
+            let steps = 100_000;
+            let (mut weight, mut sum) = (0.0, [0.0; 2]);
+            for step in 0..steps {
+                let phase = low + (f64::from(step) + 0.5) / f64::from(steps) * (high - low);
+                let density = 1.0 - eta * libm::sin(phase);
+                weight += density;
+                sum = [sum[0] + density * libm::cos(phase), sum[1] + density * libm::sin(phase)];
+            }
+            let [real, imaginary] = random_load_mean(eta);
+            let apart = (real - sum[0] / weight).hypot(imaginary - sum[1] / weight);
+            assert!(apart < 1e-6, "{eta}: {apart:e}");
+        }
+        let length = |eta| {
+            let [real, imaginary] = random_load_mean(eta);
+            real.hypot(imaginary)
+        };
+        for (eta, known) in [(1.18, 0.581), (2.4, 0.816), (4.9, 0.918)] {
+            assert!((length(eta) - known).abs() < 1e-3, "{}", length(eta));
+        }
+    }
 
     #[test]
     fn intervals_at_the_defaults_are_those_seen() {

@@ -4,7 +4,7 @@ use super::PhaseLimits;
 use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use super::set::FinishedSet;
-use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
+use crate::model::theory::{minimum_phase, minimum_phase_asymptote, random_load_mean};
 use crate::table::columns::{Table, columns};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ columns! {
         phase_mean_high: Option<f64> = "rad", "upper end";
         resultant_length: Option<f64> = "", "|<exp(i phi)>| of all slips";
         expected_resultant: Option<f64> = "",
-            "the same of slips at random loads, eta/2 averaged over the slips; null for eta >= 1";
+            "the same of slips at random loads that exceed all before, which is no locking";
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test of all slips, with effective_slips";
         load_rayleigh_p: Option<f64> = "",
             "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1";
@@ -59,8 +59,8 @@ struct Bin {
     phases: Estimate<2>,
     loads: Estimate<2>,
     below: u64,
-    /// Sum of η over the slips.
-    etas: f64,
+    /// Sum over the slips of the mean unit vector that slips at random loads have.
+    expected: [f64; 2],
     /// Mean phases of locked sets, as unit vectors.
     locked: Vec<[f64; 2]>,
 }
@@ -95,7 +95,9 @@ impl Backbone {
         bin.phases.add(&pooled(&set.phases));
         bin.loads.add(&pooled(&set.loads));
         bin.below += set.below;
-        bin.etas += set.row.eta * set.phases.count() as f64;
+        let count = set.phases.count() as f64;
+        let expected = random_load_mean(set.row.eta);
+        bin.expected = [bin.expected[0] + count * expected[0], bin.expected[1] + count * expected[1]];
         if set.row.is_locked {
             bin.locked.push(unit(phase));
         }
@@ -122,7 +124,7 @@ impl Backbone {
                 phase_mean_low: interval.map(|interval| interval.low),
                 phase_mean_high: interval.map(|interval| interval.high),
                 resultant_length: bin.phases.resultant_length(),
-                expected_resultant: limits.minimum.is_none().then(|| 0.5 * bin.etas / bin.phases.count() as f64),
+                expected_resultant: Some(bin.expected[0].hypot(bin.expected[1]) / bin.phases.count() as f64),
                 rayleigh_p: bin.phases.rayleigh(),
                 load_rayleigh_p: bin.loads.rayleigh(),
                 share_below: limits.minimum.map(|_| bin.below as f64 / bin.phases.count() as f64),

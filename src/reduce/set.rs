@@ -7,6 +7,7 @@ use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
 use super::startup::{StartupRow, startup_probability, startup_rows};
+use crate::model::theory::random_load_mean;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Regime, Slip};
 use crate::table::columns::{Table, columns};
@@ -105,11 +106,15 @@ columns! {
         periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
         locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        expected_locking_index: Option<f64> = "",
+            "the same of slips at random loads that exceed all before, which is no locking: expected_resultant squared; null without modulation";
         phase_mean: Option<f64> = "rad", "circular mean of the phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        expected_resultant: Option<f64> = "",
+            "the same of slips at random loads that exceed all before; null without modulation";
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
         load_rayleigh_p: Option<f64> = "",
             "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
@@ -196,6 +201,10 @@ impl SetSlips {
 
         let has_limit = limits.minimum.is_some() && phases.count() > 0;
         let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
+        let expected = (phases.count() > 0).then(|| {
+            let [real, imaginary] = random_load_mean(eta);
+            real.hypot(imaginary)
+        });
         let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| quantile(&sorted, share));
         let row = SetRow {
             set_id: jobs.set_id,
@@ -223,10 +232,12 @@ impl SetSlips {
             periods_mean: periods.mean(),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
+            expected_locking_index: expected.map(|length| length * length),
             phase_mean: phases.direction(limits.top),
             phase_interval: phases.direction_interval(limits.top),
             resultant_length,
             length_interval: phases.length_interval(),
+            expected_resultant: expected,
             rayleigh_p,
             load_rayleigh_p: loads.rayleigh(),
             share_below: has_limit.then(|| self.below as f64 / phases.count() as f64),

@@ -1,11 +1,13 @@
 """The example that redraws figures shows all reduced data, on what the program wrote."""
 
+import re
 import subprocess
 import sys
 
 import pandas as pd
 import pytest
 import redraw
+from conftest import ROOT
 
 
 def drawn(axes):
@@ -35,3 +37,14 @@ def test_the_example_writes_its_figures(results, tmp_path):
     assert done.stdout.split() == ["phase-eta.png", "staircase.png"]
     for name in done.stdout.split():
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["fig1d", "fig4b", "fig4d"])
+def test_the_pictures_of_one_simulation_are_those_that_its_file_draws(stickslip, tmp_path, name):
+    text = (ROOT / "sweeps" / f"{name}.toml").read_text()
+    written = re.search(r"^#   stickslip (simulate[^\\\n]*(?:\\\n#[^\\\n]*)*)", text, re.M)
+    command = written[1].replace("\\\n#", " ").split()
+    command = [ROOT / word if word.startswith("sweeps/") else word for word in command]
+    drawn = [tmp_path / word if str(word).endswith((".svg", ".png")) else word for word in command]
+    stickslip(*drawn)
+    assert (tmp_path / f"{name}.png").read_bytes() == (ROOT / "results" / f"{name}.png").read_bytes()

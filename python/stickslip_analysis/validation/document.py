@@ -22,6 +22,14 @@ class Check:
         return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "agrees": agrees}
 
 
+@dataclass(frozen=True)
+class Verdict:
+    """What is to be said of a statement: "holds", "holds for ...", "follows from kinematics", "does not hold"; and why."""
+
+    word: str
+    reason: str = ""
+
+
 @dataclass
 class Section:
     """A statement of the paper, or a question beyond it."""
@@ -35,6 +43,19 @@ class Section:
     #: Of a table: the cells of each row by the heads of their columns.
     rows: list[dict] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    #: Where the checks alone do not say it.
+    verdict: Verdict | None = None
+
+    def summary(self) -> dict:
+        """Its row of the table of verdicts."""
+        agree = sum(check.agrees for check in self.checks)
+        verdict = self.verdict or Verdict("holds" if agree == len(self.checks) else "does not hold")
+        return {
+            "statement": self.title,
+            "verdict": verdict.word,
+            "why": verdict.reason,
+            "checks that agree": f"{agree} of {len(self.checks)}",
+        }
 
     def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
         """Adds a check."""
