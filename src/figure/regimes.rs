@@ -122,8 +122,9 @@ pub(super) fn regime_map(sets: &[SetSummary]) -> Option<Picture> {
         frame.x_label(&mut sheet);
         let ticks = shades.ticks.iter().map(|(value, number)| (shades.place(*value), number.clone())).collect();
         ColourBar::of_reversed_shades(bar_label, ticks).draw(&mut sheet, &frame);
-        if row == 0 {
-            frame.legend(&mut sheet, LegendPlace::LowerRight, &[entry(Mark::Line(BORDER), "between regimes")]);
+        if row == 2 {
+            // Where sets slide there are no intervals.
+            frame.legend(&mut sheet, LegendPlace::UpperRight, &[entry(Mark::Line(BORDER), "between regimes")]);
         }
     }
     Some(sheet.finish())
