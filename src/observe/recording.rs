@@ -13,7 +13,7 @@ fields! {
         MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
             "Model time at which a job ends even without its slips; its outcome is then `time limit`";
         MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", count,
-            "Contact events after which a job counts as failed";
+            "Contact events after which a job counts as failed; may be raised for `--retry-failed` in the same directory";
         PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", count,
             "Minimum number of breaks of a precursor; none: `Ns` of the job";
         Precursors("precursors") precursors: bool = false, "", flag,
@@ -42,13 +42,15 @@ impl Recording {
     }
 
     /// Keys and values that define a job, part of its id. The keys of the first version always are; later ones only where
-    /// they differ from their default, so that the ids of other jobs stay as they were.
+    /// they differ from their default, so that the ids of other jobs stay as they were. The budget of events always counts
+    /// as the default: it changes no job that ends.
     pub fn settings(&self) -> impl Iterator<Item = (String, String)> {
         let default = Self::default();
+        let recording = Self { max_events: default.max_events, ..*self };
         RecordingKey::ALL
             .into_iter()
-            .filter(move |&key| key <= RecordingKey::Precursors || self.get(key) != default.get(key))
-            .map(|key| (format!("record.{}", key.key()), self.get(key).to_string()))
+            .filter(move |&key| key <= RecordingKey::Precursors || recording.get(key) != default.get(key))
+            .map(move |key| (format!("record.{}", key.key()), recording.get(key).to_string()))
     }
 }
 

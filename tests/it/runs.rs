@@ -318,3 +318,24 @@ fn a_directory_resumes_without_its_sweep_file() {
     assert!(resumed.stdout.contains("jobs run         12, 0 failed\n"), "{}", resumed.stdout);
     assert_eq!(folder.contents("results/tiny/tables"), whole);
 }
+
+#[test]
+fn a_budget_of_events_can_be_raised_for_the_jobs_that_it_failed() {
+    let folder = Folder::new();
+    let with =
+        |events: &str| format!("name = \"b\"\n[model]\nN = 9\n[axes]\nseed = [0, 1]\n[record]\nslips = 2\n{events}");
+    folder.write("b.toml", &with(""));
+    folder.ends(0, "run b.toml --out whole --no-reduce");
+    folder.write("b.toml", &with("max_events = 300"));
+    let failed = folder.ends(1, "run b.toml --out r --no-reduce");
+    assert!(failed.stderr.contains("record.max_events"), "{}", failed.stderr);
+    folder.write("b.toml", &with("max_events = 100000"));
+    assert!(folder.ends(1, "run b.toml --out r --no-reduce").stdout.contains("jobs run         0"));
+    assert!(
+        folder.ends(0, "run b.toml --out r --no-reduce --retry-failed").stdout.contains("jobs run         2, 0 failed")
+    );
+    for table in ["slips", "jobs"] {
+        let rows = |directory| folder.table(directory, table).sorted_by(&["job_id"]);
+        assert_eq!(rows("r"), rows("whole"), "{table}");
+    }
+}
