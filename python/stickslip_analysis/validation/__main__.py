@@ -21,6 +21,7 @@ STATEMENTS = (
     friction.slow_fronts,
     friction.loading_profile,
     intervals.stress_drops,
+    intervals.stochasticity,
 )
 QUESTIONS = (
     *beyond.DRAGS,

@@ -10,7 +10,7 @@ import numpy
 import pandas
 from scipy import signal, stats
 
-from ..statistics import difference, jackknife, locking_index, mean, near_whole, share
+from ..statistics import bootstrap, difference, jackknife, locking_index, mean, near_whole, share
 from ..tables import Sweep, select
 from .document import Section, Verdict
 from .phase import random_load_share
@@ -261,4 +261,47 @@ def stress_drops(results: Path) -> Section:
             f" s.d. {rows['drop'].std():.1f} N, within one n {within.text(1)} N",
             locked.low > chance.high,
         )
+    return section
+
+
+def stochasticity(results: Path) -> Section:
+    """Identical contacts on sliders of different stiffness."""
+    section = Section(
+        "10. Stochasticity needs a slider much longer than √(K_int/K_s) blocks",
+        "`sweeps/stochasticity.toml`, identical contacts",
+    )
+    slips = Sweep(results / "stochasticity").slips().dropna(subset="interval")
+
+    def spread(rows: pandas.DataFrame) -> float:
+        """Interquartile range over the median."""
+        low, middle, high = rows["interval"].quantile([0.25, 0.5, 0.75])
+        return (high - low) / middle
+
+    spreads = {}
+    for (blocks, stiffness), rows in slips.groupby(["N", "K"]):
+        length = ((blocks - 1) * stiffness / (rows["k"] * rows["Ns"]).iloc[0]) ** 0.5
+        spreads[blocks, length] = bootstrap(spread, rows, "seed")
+        section.rows.append(
+            {
+                "N": blocks,
+                "K (N/m)": f"{stiffness:g}",
+                "√(K_int/K_s), blocks": f"{length:.1f}",
+                "in units of N": f"{length / blocks:.2f}",
+                "interquartile range of τ over its median": spreads[blocks, length].text(),
+                "s.d. of τ over its mean": f"{rows['interval'].std() / rows['interval'].mean():.3f}",
+            }
+        )
+    long = [one for (blocks, length), one in spreads.items() if length < blocks / 8]
+    stiff = [one for (blocks, length), one in spreads.items() if length > blocks / 2]
+    section.check(
+        "stochasticity occurs only for N ≫ √(K_int/K_s)",
+        "interquartile range of τ over its median above 0.05 wherever √(K_int/K_s) < N/8, below 0.02 wherever it is"
+        " above N/2",
+        f"{min(one.value for one in long):.3f} to {max(one.value for one in long):.3f};"
+        f" {min(one.value for one in stiff):.3f} to {max(one.value for one in stiff):.3f}",
+        min(one.value for one in long) > 0.05 and max(one.value for one in stiff) < 0.02,
+    )
+    section.remark(
+        "The standard deviation hides it: rare late slips keep it large on stiff sliders, too.",
+    )
     return section
