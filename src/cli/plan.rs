@@ -6,15 +6,25 @@ use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
+use stickslip::results::layout::Layout;
+use stickslip::results::{ErrorKind, Results};
+use stickslip::run::{Overview, status};
 use stickslip::sweep::{Plan, Sweep};
+use stickslip::table::storage::Disk;
 
-/// Show what a sweep would run: jobs, parts, predicted cost. Nothing is written
+/// Show what a sweep would run, and what of it is done: jobs, parts, predicted cost. Nothing is written
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  stickslip plan sweeps/fig3.toml --json")]
+#[command(after_help = "\
+Examples:
+  stickslip plan sweeps/fig3.toml --json
+  stickslip plan sweeps/fig3.toml --out /scratch/fig3")]
 pub struct Arguments {
     /// Sweep file
     #[arg(value_name = "SWEEP.toml")]
     sweep: PathBuf,
+    /// Results directory to compare with, if it is there [default: results/<name of the sweep>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -35,6 +45,44 @@ struct Report {
     predicted_cpu_seconds: f64,
     predicted_wall_seconds: f64,
     threads: usize,
+    directory: Option<Directory>,
+}
+
+/// What of the sweep is in its results directory, or why it cannot be run there.
+#[derive(Serialize)]
+struct Directory {
+    path: PathBuf,
+    refused: Option<String>,
+    #[serde(flatten)]
+    overview: Option<Overview>,
+}
+
+impl Directory {
+    /// `None` if there is none yet.
+    fn of(sweep: &Sweep, root: PathBuf) -> Result<Option<Self>> {
+        if !root.exists() {
+            return Ok(None);
+        }
+        let layout = Layout::new(&Disk, &root);
+        let found = Results::preview(&layout, sweep).and_then(|results| status(&results));
+        let (refused, overview) = match found {
+            Ok(status) => (None, Some(status.overview)),
+            Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None),
+            Err(error) => return Err(error.into()),
+        };
+        Ok(Some(Self { path: root, refused, overview }))
+    }
+
+    fn in_words(&self) -> String {
+        let path = self.path.display();
+        match (&self.overview, &self.refused) {
+            (Some(overview), _) => format!(
+                "{path}: {} done, {} failed, {} to run; {} kept that the sweep no longer has",
+                overview.jobs_done, overview.jobs_failed, overview.jobs_missing, overview.jobs_kept
+            ),
+            (None, refused) => format!("refused: {}", refused.as_deref().unwrap_or_default()),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -46,6 +94,7 @@ struct Axis {
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::from_file(&arguments.sweep)?;
     output::warn(&sweep.warnings());
+    let root = arguments.out.clone().unwrap_or_else(|| PathBuf::from("results").join(sweep.name()));
     let totals = Plan::new(std::slice::from_ref(&sweep)).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {
@@ -59,11 +108,14 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         predicted_cpu_seconds: totals.cost,
         predicted_wall_seconds: totals.cost / threads as f64,
         threads,
+        directory: Directory::of(&sweep, root)?,
     };
     if arguments.json {
         output::json(&report)?;
     } else {
         let axes: Vec<String> = report.axes.iter().map(|axis| format!("{} ({})", axis.keys, axis.points)).collect();
+        let directory =
+            report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
         output::pairs(&[
             ("sweep", report.name),
             ("axes", if axes.is_empty() { "none: a single point".to_owned() } else { axes.join(" x ") }),
@@ -73,6 +125,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ("slips to record", report.slips.to_string()),
             ("predicted CPU time", output::duration(totals.cost)),
             ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
+            ("directory", directory),
         ])?;
     }
     Ok(Exit::Done)

@@ -39,6 +39,14 @@ impl<'a> Results<'a> {
         Ok(results)
     }
 
+    /// The directory of a sweep as a run would find it; nothing is written.
+    ///
+    /// # Errors
+    /// When the directory holds something else, or cannot be read.
+    pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        Ok(Self::compare(layout, sweep)?.0)
+    }
+
     /// Reads a directory as it is.
     ///
     /// # Errors

@@ -339,3 +339,24 @@ fn a_budget_of_events_can_be_raised_for_the_jobs_that_it_failed() {
         assert_eq!(rows("r"), rows("whole"), "{table}");
     }
 }
+
+#[test]
+fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
+    let folder = Folder::new();
+    let text = |seeds: u32, model: &str| {
+        format!("name = \"p\"\n[model]\nN = 9\n{model}\n[axes]\nseed = {{ count = {seeds} }}\n[record]\nslips = 2\n")
+    };
+    let directory = |folder: &Folder| json(&folder.ends(0, "plan p.toml --json").stdout)["directory"].clone();
+    folder.write("p.toml", &text(3, ""));
+    assert!(directory(&folder).is_null());
+    folder.ends(0, "run p.toml --no-reduce");
+    let before = folder.contents("results");
+    folder.write("p.toml", &text(5, ""));
+    let extended = directory(&folder);
+    assert_eq!((extended["jobs_done"].as_u64(), extended["jobs_missing"].as_u64()), (Some(3), Some(2)));
+    folder.write("p.toml", &text(1, ""));
+    assert_eq!(directory(&folder)["jobs_kept"].as_u64(), Some(2));
+    folder.write("p.toml", &text(3, "Ns = 10"));
+    assert!(directory(&folder)["refused"].as_str().unwrap().contains("model.Ns: 20 -> 10"));
+    assert!(folder.contents("results") == before, "a plan writes nothing");
+}
