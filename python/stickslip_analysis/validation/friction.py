@@ -9,12 +9,10 @@ from scipy import stats
 from ..statistics import difference, jackknife
 from ..tables import Sweep, parameters, read, select
 from .document import Section, Verdict
-from .intervals import of_same_jobs
+from .intervals import LARGE, of_same_jobs
 
 #: Frequencies in Hz at which friction is compared.
 FREQUENCIES = (29, 58, 200)
-#: Breaks from which a precursor is large: ten blocks' worth.
-LARGE = 200
 #: A slow front: this many small precursors within this time before a slip, in s, spread over more than a fifth of it.
 FRONT_STEPS, FRONT_TIME = 3, 0.05
 
@@ -151,6 +149,21 @@ def slow_fronts(results: Path) -> Section:
         f" {1e3 * FRONT_TIME / 5:.0f} ms: the detached region then grows in small steps.",
         "This cut was chosen on other seeds than those counted here.",
         "At 200 Hz a period is shorter than such a front.",
+    )
+    still = select(slips, Delta=0.0)
+    slow_speed, fast_speed = (still[column].median() for column in ("slow_front_speed", "front_speed"))
+    section.check(
+        "slow fronts are some two orders of magnitude slower than fast ones",
+        "ratio of the median speeds without modulation from 30 to 300",
+        f"{slow_speed:.1f} m/s, {fast_speed:.0f} m/s",
+        30 <= fast_speed / slow_speed <= 300,
+    )
+    first = still["nucleation_block"]
+    section.check(
+        "ruptures start at the loaded edge",
+        "more than half of the slips begin in a tenth of the blocks there, 1 to 7",
+        f"{(first <= 7).mean():.2f} of {len(first)}; in blocks 1 to 10 {(first <= 10).mean():.2f}",
+        (first <= 7).mean() > 0.5,
     )
     gone = [f for f in (29, 58, 116, 200) if slow[f].high < 0.5 * slow[None].low]
     section.verdict = Verdict(
