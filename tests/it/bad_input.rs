@@ -107,7 +107,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("plan missing.toml", &["missing.toml: cannot be read", "check the path"]),
         ("plan empty", &["empty: cannot be read", "check the path"]),
         ("plan binary.toml", &["binary.toml: cannot be read", "UTF-8"]),
-        ("plan good.toml --out x", &["--out"]),
+        ("plan good.toml --threads 2", &["--threads"]),
         ("run", &["<SWEEP.toml|DIR>"]),
         ("run missing.toml", &["missing.toml: cannot be read", "check the path"]),
         ("run plain.txt", &["plain.txt:1: ", "TOML"]),
