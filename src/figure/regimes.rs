@@ -48,7 +48,7 @@ pub(super) fn regimes(sets: &[SetSummary]) -> Option<Picture> {
         };
         let frame = LINES.frame(row, 0, x.clone(), y);
         if row == 0 {
-            for share in Regime::LEAST_SHARES {
+            for share in Regime::MIN_SHARES {
                 frame.level(&mut sheet, share, BOUND);
             }
         }

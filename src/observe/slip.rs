@@ -7,11 +7,12 @@
 use super::Recording;
 use super::drops::{DropDetector, Drops};
 use super::phase::phase;
+use super::regime::Averages;
 use super::rupture::{Rupture, advance_speed};
 use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment};
-use crate::table::columns::{Cell, Field, Kind, columns, fields};
+use crate::table::columns::columns;
 use std::f64::consts::TAU;
 
 columns! {
@@ -125,62 +126,6 @@ struct Instant {
     slipping: f64,
     /// Mean displacement of the blocks, in m.
     mean_displacement: f64,
-}
-
-/// What a job measures as a whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Averages {
-    /// Time average of the shear force, in N.
-    pub friction: f64,
-    /// Time average of the fraction of contacts that are attached.
-    pub attached_fraction: f64,
-    /// Share of the time within slips.
-    pub slip_share: f64,
-}
-
-/// How a slider moves, by the share of time within slips.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Regime {
-    /// It sticks for most of the time.
-    StickSlip,
-    /// It slips for most of the time.
-    Mixed,
-    /// It does not stick.
-    Sliding,
-}
-
-impl Regime {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::StickSlip, Self::Mixed, Self::Sliding];
-    /// Least share of time within slips of the mixed regime, and of sliding.
-    pub const LEAST_SHARES: [f64; 2] = [0.5, 0.95];
-
-    /// Its word in tables.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::StickSlip => "stick-slip",
-            Self::Mixed => "mixed",
-            Self::Sliding => "sliding",
-        }
-    }
-
-    /// The regime at a share of time within slips.
-    #[must_use]
-    pub fn at(slip_share: f64) -> Self {
-        let [mixed, sliding] = Self::LEAST_SHARES;
-        if slip_share < mixed {
-            Self::StickSlip
-        } else if slip_share < sliding {
-            Self::Mixed
-        } else {
-            Self::Sliding
-        }
-    }
-}
-
-fields! {
-    Regime: Text, |regime| regime.word(), |word| Regime::ALL.into_iter().find(|regime| regime.word() == word);
 }
 
 /// An observer that finds slips and precursors.

@@ -23,7 +23,8 @@ use std::time::{Duration, Instant};
 const STOP_POLL: Duration = Duration::from_millis(20);
 /// How often it lets the display know that time passes.
 const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
-/// A job takes long from this time on, if that is also so many times its predicted cost; told again whenever it has doubled.
+/// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
+/// that its time has doubled.
 const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
 const LONG_BY_PREDICTION: f64 = 20.0;
 /// Outcomes that may wait for the collector, for each thread.

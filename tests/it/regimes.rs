@@ -50,7 +50,7 @@ fn stick_slip_is_told_from_intervals_made_of_one_long_slip() {
     }
 }
 
-/// With the extent alone half of these "slips" break less than half of the contacts, some with drops under 1 N.
+/// By the extent alone a quarter of these "slips" would break at most 13 % of the contacts.
 #[test]
 fn slips_of_a_few_blocks_let_go_of_most_contacts() {
     let job =
