@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use stickslip::results::layout::Layout;
 use stickslip::results::{ErrorKind, Results};
 use stickslip::run::{Overview, status};
-use stickslip::sweep::{Plan, Sweep};
+use stickslip::sweep::{Extension, Plan, Sweep};
 use stickslip::table::storage::Disk;
 
 /// Show what a sweep would run, and what of it is done: jobs, parts, predicted cost. Nothing is written
@@ -95,7 +95,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::from_file(&arguments.sweep)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| PathBuf::from("results").join(sweep.name()));
-    let totals = Plan::new(std::slice::from_ref(&sweep)).totals();
+    let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {
         format: FORMAT,

@@ -63,8 +63,8 @@ fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool)
     if with_repair && verification.wants_repair() {
         commands.push(format!("stickslip verify {} --repair", quoted(root)));
     }
-    for &extension in &verification.extensions {
-        commands.push(format!("stickslip run {} --out {}", quoted(&layout.sweep(extension)), quoted(root)));
+    if verification.wants_run {
+        commands.push(format!("stickslip run {}", quoted(root)));
     }
     if verification.wants_compaction() {
         commands.push(format!("stickslip compact {}", quoted(root)));

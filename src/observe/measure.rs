@@ -2,7 +2,7 @@
 
 use super::{Averages, Precursor, Recording, Regime, Slip, SlipObserver};
 use crate::model::Parameters;
-use crate::solver::{Limits, SimulationError, Solver, Summary, simulate};
+use crate::solver::{Limits, SimulationError, Solver, Summary, simulate, simulate_audited};
 use std::sync::atomic::AtomicBool;
 
 /// What a job measured.
@@ -49,7 +49,12 @@ pub fn measure(
     interrupt: &AtomicBool,
 ) -> Result<Measurements, SimulationError> {
     let mut observer = SlipObserver::new(parameters, recording);
-    let summary = simulate(parameters, solver, recording.limits(interrupt), &mut observer)?;
+    let limits = recording.limits(interrupt);
+    let summary = if recording.energies {
+        simulate_audited(parameters, solver, limits, &mut observer)?.0
+    } else {
+        simulate(parameters, solver, limits, &mut observer)?
+    };
     Ok(Measurements::new(observer, summary))
 }
 

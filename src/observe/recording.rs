@@ -11,7 +11,7 @@ fields! {
         Slips("slips") slips: u64 = 40, "", count, "Slips to record after start-up; then the job ends";
         Discard("discard") discard: u64 = 5, "", count_or_zero, "Slips of start-up, not recorded";
         MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
-            "Model time at which a job ends even without its slips; its outcome is then `time limit`";
+            "Model time at which a job ends even without its slips; its outcome is then `time limit`, and a longer one in the same directory runs it again";
         MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", count,
             "Contact events after which a job counts as failed; may be raised for `--retry-failed` in the same directory";
         PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", count,
@@ -20,6 +20,8 @@ fields! {
             "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
         DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
             "Minimum drop of the shear force to look for; none: drops are not looked for";
+        Energies("energies") energies: bool = false, "", flag,
+            "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at several times the cost";
         GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", positive,
             "Distance `V0 t` of the drive without a slip after which a job ends, with the outcome `no slips`; none: 20 typical intervals between slips and two periods";
     }
@@ -42,11 +44,11 @@ impl Recording {
     }
 
     /// Keys and values that define a job, part of its id. The keys of the first version always are; later ones only where
-    /// they differ from their default, so that the ids of other jobs stay as they were. The budget of events always counts
-    /// as the default: it changes no job that ends.
+    /// they differ from their default, so that the ids of other jobs stay as they were. The longest time and the budget of
+    /// events always count as the default: they change no job that ends by itself.
     pub fn settings(&self) -> impl Iterator<Item = (String, String)> {
         let default = Self::default();
-        let recording = Self { max_events: default.max_events, ..*self };
+        let recording = Self { max_time: default.max_time, max_events: default.max_events, ..*self };
         RecordingKey::ALL
             .into_iter()
             .filter(move |&key| key <= RecordingKey::Precursors || recording.get(key) != default.get(key))

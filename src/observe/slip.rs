@@ -11,7 +11,7 @@ use super::regime::Averages;
 use super::rupture::{Rupture, advance_speed};
 use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use crate::solver::{Observer, Segment};
+use crate::solver::{Observer, Segment, Spent};
 use crate::table::columns::columns;
 use std::f64::consts::TAU;
 
@@ -46,6 +46,27 @@ impl Modulation {
 }
 
 columns! {
+    /// What the drive put in from the previous slip's last break to the slip's own, and where it was lost; null unless
+    /// recorded.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Energies {
+        work as "drive_work": Option<f64> = "J", "work of the drive since the last break of the previous slip";
+        damping as "damping_loss": Option<f64> = "J", "loss in damping in that time";
+        broken as "break_loss": Option<f64> = "J", "energy of the contacts that broke in that time";
+    }
+}
+
+impl Energies {
+    fn between(start: Spent, end: Spent) -> Self {
+        Self {
+            work: Some(end.work - start.work),
+            damping: Some(end.damping - start.damping),
+            broken: Some(end.broken - start.broken),
+        }
+    }
+}
+
+columns! {
     /// One slip: a rupture that breaks contacts at every block and lets go of at least half of those that held, and a tenth
     /// of all.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,6 +93,7 @@ columns! {
         largest_precursor: u64 = "", "breaks in the largest of them; 0 if there is none";
         slow_front_speed: Option<f64> = "m/s",
             "advance of the reach through these precursors; null for fewer than two";
+        energies: Energies;
         drops: Drops;
     }
 }
@@ -126,6 +148,8 @@ struct Instant {
     slipping: f64,
     /// Mean displacement of the blocks, in m.
     mean_displacement: f64,
+    /// Zero unless energies are recorded.
+    spent: Spent,
 }
 
 /// An observer that finds slips and precursors.
@@ -377,6 +401,11 @@ impl SlipObserver {
                 precursors: self.pending,
                 largest_precursor: self.largest_pending,
                 slow_front_speed: advance_speed(self.advances.iter().copied()),
+                energies: if self.recording.energies {
+                    Energies::between(self.last_end.map_or(Spent::default(), |end| end.spent), last.spent)
+                } else {
+                    Energies::default()
+                },
                 drops: Drops::default(),
             });
         }
@@ -476,6 +505,10 @@ impl Observer for SlipObserver {
         if event.change == Change::Break {
             self.begin_or_extend(event);
         }
+    }
+
+    fn spent(&mut self, spent: Spent) {
+        self.now.spent = spent;
     }
 
     fn follows_attachments(&self) -> bool {

@@ -104,7 +104,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
     layout.storage.ensure_folder(&layout.reduced())?;
     let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let footer = &results.footer(results.current());
+    let footer = &results.footer(results.extensions().len() - 1);
     let mut set_writer = TableWriter::<SetRow>::new(stage(SetRow::NAME)?, footer)?;
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
     let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;

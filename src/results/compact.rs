@@ -117,10 +117,10 @@ impl Results<'_> {
         let done = self.done_parts()?;
         let mut plan = CompactionPlan::default();
         for part in self.plan().parts() {
-            let Some(failures) = self.failures(&done, &part)? else { continue };
+            let Some(unfinished) = self.unfinished(&done, &part)? else { continue };
             let jobs = part.jobs.len() as u64;
             match plan.chunks.last_mut() {
-                _ if !failures.is_empty() => plan.failed.push((part.extension, part.index)),
+                _ if !unfinished.is_empty() => plan.failed.push((part.extension, part.index)),
                 Some(chunk) if chunk.goes_on_with(&part) && !part.index.is_multiple_of(parts_per_file) => {
                     chunk.parts = *chunk.parts.start()..=part.index;
                     chunk.jobs += jobs;

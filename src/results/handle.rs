@@ -5,7 +5,7 @@ use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
 use crate::results::manifest::{self, Manifest};
 use crate::results::tables;
-use crate::sweep::{Job, Part, Plan, Sweep};
+use crate::sweep::{Extension, Job, Part, Plan, Sweep};
 use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::io::ErrorKind;
@@ -16,9 +16,8 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct Results<'a> {
     layout: Layout<'a>,
-    /// At least one.
-    sweeps: Vec<Sweep>,
-    current: usize,
+    /// At least one; the last is that of the sweep that was asked for last.
+    extensions: Vec<Extension>,
 }
 
 impl<'a> Results<'a> {
@@ -52,42 +51,46 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When it is no results directory, belongs to other versions, or is damaged.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
-        let (manifest, sweeps) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout.root()))?;
-        let differences = manifest.difference(&Manifest::new(&sweeps[manifest.current]));
-        manifest::refuse(layout, &differences, "use the program that wrote it")?;
-        Ok(Self::new(layout, sweeps, manifest.current))
+        let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout.root()))?;
+        manifest::refuse(layout, &manifest.difference(&Manifest::new(&extensions)), "use the program that wrote it")?;
+        Ok(Self::new(layout, extensions))
     }
 
-    pub(super) fn new(layout: &Layout<'a>, sweeps: Vec<Sweep>, current: usize) -> Self {
-        Self { layout: layout.clone(), sweeps, current }
+    pub(super) fn new(layout: &Layout<'a>, extensions: Vec<Extension>) -> Self {
+        Self { layout: layout.clone(), extensions }
     }
 
     /// The directory as it will be once it is opened with a sweep, and the manifest that is to be written for that.
     fn compare(layout: &Layout<'a>, sweep: &Sweep) -> Result<(Self, Option<Manifest>), ResultsError> {
         // In this order: another run may write the manifest in between, and none removes it.
         let is_fresh = is_fresh(layout)?;
-        let Some((mut manifest, mut sweeps)) = manifest::read_with_sweeps(layout)? else {
+        let Some((manifest, mut extensions)) = manifest::read_with_sweeps(layout)? else {
             if is_fresh {
-                return Ok((Self::new(layout, vec![sweep.clone()], 0), Some(Manifest::new(sweep))));
+                let extensions = vec![Extension::new(sweep, &[])];
+                let manifest = Manifest::new(&extensions);
+                return Ok((Self::new(layout, extensions), Some(manifest)));
             }
             let problem =
                 "is not empty and no results directory (there is no run/manifest.json); choose another with --out";
             return Err(ResultsError::refused(layout.root(), problem));
         };
-        let last = &sweeps[manifest.current];
-        let mut differences = manifest.difference(&Manifest::new(last));
-        differences.extend(last.difference(sweep).iter().map(ToString::to_string));
-        manifest::refuse(layout, &differences, "choose another directory with --out, or undo the change")?;
-        let known = sweeps.iter().position(|known| known.text() == sweep.text());
-        if known == Some(manifest.current) {
-            return Ok((Self::new(layout, sweeps, manifest.current), None));
+        let before = Self::new(layout, extensions.clone());
+        let done = before.done_parts()?;
+        let mut differences = manifest.difference(&Manifest::new(&extensions));
+        differences.extend(before.sweep().difference(sweep).iter().map(ToString::to_string));
+        if before.sweep().recording().max_time != sweep.recording().max_time && done.any_is_compacted() {
+            differences.push("record.max_time: jobs that it ended cannot run again once they are compacted".to_owned());
         }
-        manifest.current = known.unwrap_or_else(|| {
-            sweeps.push(sweep.clone());
-            manifest.sweeps.push(sweep.text().to_owned());
-            sweeps.len() - 1
-        });
-        Ok((Self::new(layout, sweeps, manifest.current), Some(manifest)))
+        manifest::refuse(layout, &differences, "choose another directory with --out, or undo the change")?;
+        if before.sweep().text() == sweep.text() {
+            return Ok((before, None));
+        }
+        // What is done stays where it is; what is not belongs to the new sweep, or to none.
+        let last = extensions.len() - 1;
+        extensions[last].kept = Some(before.plan().ranges(last, |part| done.has(part)));
+        extensions.push(Extension::new(sweep, &extensions));
+        let manifest = Manifest::new(&extensions);
+        Ok((Self::new(layout, extensions), Some(manifest)))
     }
 
     /// Where it and everything in it lie.
@@ -96,34 +99,29 @@ impl<'a> Results<'a> {
         &self.layout
     }
 
-    /// The sweeps that were run here, one for each extension.
+    /// What was run here, one sweep after the other.
     #[must_use]
-    pub fn sweeps(&self) -> &[Sweep] {
-        &self.sweeps
-    }
-
-    /// The extension whose sweep was asked for last.
-    #[must_use]
-    pub const fn current(&self) -> usize {
-        self.current
+    pub fn extensions(&self) -> &[Extension] {
+        &self.extensions
     }
 
     /// The sweep that was asked for last.
     #[must_use]
     pub fn sweep(&self) -> &Sweep {
-        &self.sweeps[self.current]
+        &self.extensions[self.extensions.len() - 1].sweep
     }
 
     /// All jobs in their parts.
     #[must_use]
     pub fn plan(&self) -> Plan<'_> {
-        Plan::new(&self.sweeps)
+        Plan::new(&self.extensions)
     }
 
     /// What the footers of table files with rows of an extension hold.
     #[must_use]
     pub fn footer(&self, extension: usize) -> Footer {
-        Footer::default().with_sweep(self.sweeps[extension].name(), self.sweeps[extension].text())
+        let sweep = &self.extensions[extension].sweep;
+        Footer::default().with_sweep(sweep.name(), sweep.text())
     }
 
     /// Names of the tables, that of the jobs last.
@@ -132,23 +130,16 @@ impl<'a> Results<'a> {
         [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
     }
 
-    /// Whether a part is to be there: it holds a job of the sweep that was asked for last.
+    /// Whether a job of a part is one of the sweep that was asked for last; results of others are kept.
     #[must_use]
-    pub fn wants(&self, part: &Part) -> bool {
-        part.extension == self.current || part.jobs.iter().any(|job| self.sweep().contains(&job.parameters))
-    }
-
-    /// How many jobs of a part are not of the sweep that was asked for last.
-    #[must_use]
-    pub fn unwanted_jobs(&self, part: &Part) -> u64 {
-        let is_wanted = |job: &&Job| part.extension == self.current || self.sweep().contains(&job.parameters);
-        (part.jobs.len() - part.jobs.iter().filter(is_wanted).count()) as u64
+    pub fn wants(&self, part: &Part, job: &Job) -> bool {
+        part.extension + 1 == self.extensions.len() || self.sweep().contains(&job.parameters)
     }
 
     /// The id of a job of a part.
     #[must_use]
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.sweeps[part.extension].job_id(&part.jobs[position].parameters).to_string()
+        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters).to_string()
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a

@@ -2,7 +2,8 @@
 //!
 //! Opening a directory with a sweep is where mismatches are refused, before anything is written: a directory of
 //! something else, another model, solver or recording, other versions. A sweep that differs in its axes or conditions
-//! alone is added as a further *extension*; results of values that it no longer has are kept.
+//! alone is added as a further *extension*; results of values that it no longer has are kept, and what of them is missing is
+//! not run.
 
 #[cfg(test)]
 mod tests;
@@ -12,17 +13,18 @@ use crate::results::commit::Commit;
 use crate::results::error::ResultsError;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
-use crate::sweep::{PLAN_VERSION, Sweep};
+use crate::sweep::{Extension, PLAN_VERSION, Sweep};
 use crate::table::checksum;
 use crate::table::columns::Table;
 use crate::table::file::PROGRAM;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Version of the manifest and of the layout around it. 4: the names of compacted files say which parts they hold.
-const FORMAT: u32 = 4;
+/// Version of the manifest and of the layout around it. 5: it says what of each sweep is kept.
+const FORMAT: u32 = 5;
 /// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
 pub(super) const WRITER: &str = "manifest";
 
@@ -42,10 +44,18 @@ pub(super) struct Manifest {
     identity: String,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,
-    /// Texts of the sweep files, one for each extension.
-    pub(super) sweeps: Vec<String>,
-    /// The extension whose sweep was asked for last.
-    pub(super) current: usize,
+    /// The extensions; the last is that of the sweep that was asked for last.
+    pub(super) extensions: Vec<Record>,
+}
+
+/// What the manifest says of an [`Extension`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Record {
+    /// The text of the sweep file.
+    pub sweep: String,
+    part_cost: f64,
+    kept: Option<Vec<RangeInclusive<u64>>>,
 }
 
 /// The format alone, read first: a newer manifest may have keys that are not known here.
@@ -55,10 +65,12 @@ struct Format {
 }
 
 impl Manifest {
-    pub(super) fn new(sweep: &Sweep) -> Self {
+    /// That of this program for these extensions, one at least.
+    pub(super) fn new(extensions: &[Extension]) -> Self {
         fn columns<T: Table>() -> (String, Vec<String>) {
             (T::NAME.to_owned(), T::columns().into_iter().map(|column| column.name.into_owned()).collect())
         }
+        let sweep = &extensions[extensions.len() - 1].sweep;
         let mut tables = BTreeMap::from([columns::<SlipRow<'_>>(), columns::<JobRow>()]);
         if sweep.recording().precursors {
             tables.extend([columns::<PrecursorRow<'_>>()]);
@@ -72,8 +84,7 @@ impl Manifest {
             plan_version: PLAN_VERSION,
             identity: sweep.job_id(&Parameters::default()).to_string(),
             tables,
-            sweeps: vec![sweep.text().to_owned()],
-            current: 0,
+            extensions: extensions.iter().map(Record::new).collect(),
         }
     }
 
@@ -115,14 +126,22 @@ impl Manifest {
     /// Writes the manifest, and copies of the sweep files beside it.
     pub(super) fn write(&self, layout: &Layout<'_>) -> Result<(), ResultsError> {
         let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
-        for (extension, text) in self.sweeps.iter().enumerate() {
-            commit.stage_bytes(&layout.sweep(extension), text.as_bytes())?;
+        for (extension, record) in self.extensions.iter().enumerate() {
+            commit.stage_bytes(&layout.sweep(extension), record.sweep.as_bytes())?;
         }
         let path = layout.manifest();
         let text = checksum::to_json(self).map_err(|error| ResultsError::damaged(&path, error.to_string()))?;
         // Last, so that a manifest never names a sweep that is not there.
         commit.stage_bytes(&path, text.as_bytes())?;
         Ok(commit.publish()?)
+    }
+
+    /// Its extensions, with their sweeps parsed.
+    pub(super) fn extensions(&self, layout: &Layout<'_>) -> Result<Vec<Extension>, ResultsError> {
+        let extension = |(number, Record { sweep, part_cost, kept }): (usize, &Record)| {
+            Ok(Extension { sweep: parse(layout, number, sweep)?, part_cost: *part_cost, kept: kept.clone() })
+        };
+        self.extensions.iter().enumerate().map(extension).collect()
     }
 
     /// Reads the manifest alone; `None` if there is none.
@@ -142,33 +161,36 @@ impl Manifest {
             return Err(ResultsError::refused(&path, problem));
         }
         let manifest: Self = checksum::from_json(&text).map_err(damaged)?;
-        if manifest.current >= manifest.sweeps.len() {
-            return Err(damaged(format!("there is no sweep {}", manifest.current)));
+        if manifest.extensions.is_empty() {
+            return Err(damaged("there is no sweep".to_owned()));
         }
         Ok(Some(manifest))
     }
 }
 
-/// The manifest and its sweeps, verified; `None` if there is no manifest.
-pub(super) fn read_with_sweeps(layout: &Layout<'_>) -> Result<Option<(Manifest, Vec<Sweep>)>, ResultsError> {
+impl Record {
+    fn new(Extension { sweep, part_cost, kept }: &Extension) -> Self {
+        Self { sweep: sweep.text().to_owned(), part_cost: *part_cost, kept: kept.clone() }
+    }
+}
+
+/// The manifest and its extensions, verified; `None` if there is no manifest.
+pub(super) fn read_with_sweeps(layout: &Layout<'_>) -> Result<Option<(Manifest, Vec<Extension>)>, ResultsError> {
     let Some(manifest) = Manifest::read(layout)? else { return Ok(None) };
-    for (extension, expected) in manifest.sweeps.iter().enumerate() {
+    for (extension, record) in manifest.extensions.iter().enumerate() {
         let path = layout.sweep(extension);
-        if read_text(layout, &path)? != *expected {
+        if read_text(layout, &path)? != record.sweep {
             return Err(ResultsError::damaged(&path, "it was changed; edit the original sweep file instead"));
         }
     }
-    let sweeps = parse(layout, &manifest.sweeps)?;
-    Ok(Some((manifest, sweeps)))
+    let extensions = manifest.extensions(layout)?;
+    Ok(Some((manifest, extensions)))
 }
 
-/// Parses the texts of sweep files.
-pub(super) fn parse(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Sweep>, ResultsError> {
-    let parsed = texts.iter().enumerate().map(|(extension, text)| {
-        let path = layout.sweep(extension);
-        Sweep::parse(text, &path).map_err(|error| ResultsError::damaged(&path, error.to_string()))
-    });
-    parsed.collect()
+/// Parses the text of a sweep file of a directory.
+pub(super) fn parse(layout: &Layout<'_>, extension: usize, text: &str) -> Result<Sweep, ResultsError> {
+    let path = layout.sweep(extension);
+    Sweep::parse(text, &path).map_err(|error| ResultsError::damaged(&path, error.to_string()))
 }
 
 /// Refuses a directory that differs in something, with the way out.

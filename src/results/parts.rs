@@ -38,6 +38,12 @@ impl DoneParts {
         self.is_compacted(part) || self.own.contains(&(part.extension, part.index))
     }
 
+    /// Whether any part is in a compacted file.
+    #[must_use]
+    pub fn any_is_compacted(&self) -> bool {
+        !self.compacted.is_empty()
+    }
+
     /// Whether the rows of a part are in a compacted file.
     #[must_use]
     pub fn is_compacted(&self, part: &Part) -> bool {
@@ -45,6 +51,18 @@ impl DoneParts {
         before.is_some_and(|(_, &last)| part.index <= last)
     }
 }
+
+/// Why a job of a part that is done may run again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unfinished {
+    /// It failed, for this reason.
+    Failed(String),
+    /// It was ended by a shorter `max_time` than the present one.
+    Cut,
+}
+
+/// Times within this share of each other are the same bound.
+const SAME_TIME: f64 = 1e-9;
 
 impl Results<'_> {
     /// Looks up which parts are done.
@@ -69,30 +87,38 @@ impl Results<'_> {
         self.layout().table(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 
-    /// Positions of the jobs of a part that failed, with their reasons; `None` if the part is not done. Parts with
-    /// failed jobs are never compacted.
+    /// Positions of the jobs of a part that may run again; `None` if the part is not done. Such parts are never compacted.
     ///
     /// # Errors
     /// When its file in `jobs` cannot be read, or has other jobs than the part.
-    pub fn failures(&self, done: &DoneParts, part: &Part) -> Result<Option<BTreeMap<usize, String>>, ResultsError> {
+    pub fn unfinished(
+        &self,
+        done: &DoneParts,
+        part: &Part,
+    ) -> Result<Option<BTreeMap<usize, Unfinished>>, ResultsError> {
         if !done.has(part) {
             return Ok(None);
         }
-        let (mut failed, mut rows) = (BTreeMap::new(), 0);
+        let (mut unfinished, mut rows) = (BTreeMap::new(), 0);
         if done.is_compacted(part) {
-            return Ok(Some(failed));
+            return Ok(Some(unfinished));
         }
+        let max_time = self.sweep().recording().max_time.unwrap_or(f64::INFINITY);
+        let is_cut = |time: Option<f64>| time.is_some_and(|time| time < max_time * (1.0 - SAME_TIME));
         let path = self.part_file(tables::JOBS, part);
         for batch in Dataset::new(self.layout().storage, vec![path.clone()]).rows::<OutcomeRow>() {
             for row in batch? {
-                if row.outcome == JobOutcome::Failed {
-                    failed.insert(rows, row.reason.unwrap_or_default());
-                }
+                let why = match row.outcome {
+                    JobOutcome::Failed => Some(Unfinished::Failed(row.reason.unwrap_or_default())),
+                    JobOutcome::TimeLimit if is_cut(row.simulated_time) => Some(Unfinished::Cut),
+                    _ => None,
+                };
+                unfinished.extend(why.map(|why| (rows, why)));
                 rows += 1;
             }
         }
         if rows == part.jobs.len() {
-            Ok(Some(failed))
+            Ok(Some(unfinished))
         } else {
             Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.jobs.len())))
         }
@@ -104,7 +130,7 @@ impl Results<'_> {
     /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
     /// counts as before, or as done, but never as half done.
     pub fn commit(&self, staging: &Path, part: &Part, outcomes: &BTreeMap<usize, Outcome>) -> Result<(), ResultsError> {
-        let sweep = &self.sweeps()[part.extension];
+        let sweep = &self.extensions()[part.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let jobs: Jobs<'_> = (0..part.jobs.len()).map(|position| (label(position), outcomes.get(&position))).collect();
         let mut commit = Commit::begin(self.layout().storage, staging)?;
@@ -156,6 +182,7 @@ columns! {
     struct OutcomeRow {
         outcome: JobOutcome;
         reason: Option<String>;
+        simulated_time: Option<f64>;
     }
 }
 

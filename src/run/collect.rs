@@ -63,7 +63,7 @@ type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
 struct OpenPart {
     part: Arc<Part>,
     outcomes: BTreeMap<usize, Outcome>,
-    again: bool,
+    failed_before: u64,
     predicted_cost: f64,
     measured: JobTime,
 }
@@ -152,7 +152,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 *long_after = 2 * elapsed;
                 let part = &job.part;
                 self.events.send(&RunEvent::JobTakesLong {
-                    command: self.share.results.sweeps()[part.extension].command(&part.jobs[job.position]),
+                    command: self.share.results.sweep().command(&part.jobs[job.position]),
                     predicted_cost: part.jobs[job.position].cost,
                     wall: elapsed.as_secs_f64(),
                 })?;
@@ -170,7 +170,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             Err(reason) => RunEvent::JobFailed {
                 job_id: self.share.results.job_id(&of.part, of.position),
                 reason: reason.clone(),
-                command: self.share.results.sweeps()[of.part.extension].command(job),
+                command: self.share.results.sweep().command(job),
                 predicted_cost,
             },
         };
@@ -179,11 +179,12 @@ impl<'a, 'e> Collector<'a, 'e> {
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             part: Arc::clone(&of.part),
             outcomes: BTreeMap::new(),
-            again: of.again,
+            failed_before: 0,
             predicted_cost: 0.0,
             measured: JobTime::default(),
         });
         open.outcomes.insert(of.position, outcome);
+        open.failed_before += u64::from(of.failed_before);
         open.predicted_cost += predicted_cost;
         open.measured.cpu += time.cpu;
         open.measured.wall += time.wall;
@@ -207,10 +208,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         report.jobs_run += jobs as u64;
         // A part that others committed since the overview is not in the count.
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
-        if whole.again {
-            report.jobs_failed = report.jobs_failed.saturating_sub(jobs as u64);
-        }
-        report.jobs_failed += failed as u64;
+        report.jobs_failed = (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
         report.predicted_cost += predicted_cost;
         report.measured_cost += measured_cost;
         Ok(self.events.send(&RunEvent::PartCommitted { part, jobs, failed, predicted_cost, measured_cost, wall })?)

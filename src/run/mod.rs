@@ -108,7 +108,7 @@ fn run_locked(
     results.layout().storage.clear_folder(&staging)?;
     results.clear_abandoned_staging()?;
     let share = Share::look_up(results, options.shard, options.retry_failed)?;
-    let overview = share.overview(|_, _| ())?;
+    let overview = share.overview(|_, _, _| ())?;
     let (jobs_again, cost_again) =
         if options.retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
     let jobs_left = overview.jobs_missing + jobs_again;

@@ -50,11 +50,14 @@ pub struct Failure {
 /// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
-    let overview = Share::look_up(results, Shard::default(), false)?.overview(|part, failed| {
-        let command = |position: usize| results.sweeps()[part.extension].command(&part.jobs[position]);
-        let failure =
-            |(position, reason)| Failure { job_id: results.job_id(part, position), reason, command: command(position) };
-        failures.extend(failed.into_iter().take(MAX_FAILURES - failures.len()).map(failure));
+    let overview = Share::look_up(results, Shard::default(), false)?.overview(|part, position, reason| {
+        if failures.len() < MAX_FAILURES {
+            failures.push(Failure {
+                job_id: results.job_id(part, position),
+                reason: reason.to_owned(),
+                command: results.sweep().command(&part.jobs[position]),
+            });
+        }
     })?;
     let mut threads = BTreeMap::new();
     let mut last_threads = None;

@@ -52,7 +52,7 @@ impl Motion {
     /// Enters the energies at the end into an audit.
     fn record_final_energy(
         &self,
-        audit: &mut Audit,
+        audit: &Audit,
         interface: &Interface,
         drive: &Drive,
         time: f64,
@@ -62,8 +62,10 @@ impl Motion {
         let x = &self.displacement[..];
         let stretched: f64 = x.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
         let pulled = drive.motion(time).0 - x[0];
-        audit.kinetic = 0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>();
-        audit.elastic = 0.5 * (coupling * stretched + drive.stiffness * pulled * pulled) + interface.elastic_energy(x);
+        audit.kinetic.set(0.5 * mass * self.velocity.iter().map(|v| v * v).sum::<f64>());
+        audit
+            .elastic
+            .set(0.5 * (coupling * stretched + drive.stiffness * pulled * pulled) + interface.elastic_energy(x));
     }
 
     /// Whether any block is at or past a break position.
@@ -83,7 +85,7 @@ pub(super) fn run(
     time_step: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
-    audit: Option<&mut Audit>,
+    audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     run_compiled_for(Arch::new(), parameters, time_step, limits, observer, audit)
 }
@@ -95,7 +97,7 @@ fn run_compiled_for(
     time_step: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
-    audit: Option<&mut Audit>,
+    audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     features.dispatch(
         #[inline(always)]
@@ -110,7 +112,7 @@ fn integrate(
     time_step: f64,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
-    mut audit: Option<&mut Audit>,
+    audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     let blocks = parameters.blocks;
     let (mass, coupling) = (parameters.block_mass(), parameters.coupling_stiffness());
@@ -141,10 +143,10 @@ fn integrate(
             *v = *v * damp_before + half * a;
             *x += time_step * *v;
         }
-        if let Some(audit) = &mut audit {
+        if let Some(audit) = audit {
             // These velocities are those of the middle of the step.
             let squares = motion.velocity.iter().map(|v| v * v).sum::<f64>();
-            audit.damping += mass * parameters.damping_rate * time_step * squares;
+            Audit::add(&audit.damping, mass * parameters.damping_rate * time_step * squares);
         }
         drive.advance_to(time);
         let (driven, drive_velocity) = drive.motion(time);

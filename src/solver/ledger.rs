@@ -14,6 +14,7 @@ use super::quadrature::Quadrature;
 use super::segment::{ForcePath, Segment};
 use super::{Observer, SimulationError, Summary};
 use crate::model::{Change, ContactEvent, Drive, Parameters};
+use std::cell::Cell;
 
 /// Nodes beyond those that a polynomial needs: exact to 1e-13 for a modulation that turns by four radians in a segment.
 const NODES_FOR_DRIVE: usize = 8;
@@ -44,45 +45,71 @@ impl Ledger {
     }
 }
 
-/// The entries that a solver makes.
+/// What the drive has put in since the start, and where it was lost. All in J; the rest is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spent {
+    /// Work of the drive.
+    pub work: f64,
+    /// Loss in damping.
+    pub damping: f64,
+    /// Loss in breaking contacts.
+    pub broken: f64,
+}
+
+/// The entries that a solver makes; cells, since the meter reads them while it makes them.
 #[derive(Clone, Debug)]
 pub(super) struct Audit {
     pub quadrature: Quadrature,
-    pub damping: f64,
-    pub left_out: f64,
+    pub damping: Cell<f64>,
+    pub left_out: Cell<f64>,
     /// Work of the drive on motion that the segments do not show.
-    pub unseen_work: f64,
-    pub elastic: f64,
-    pub kinetic: f64,
+    pub unseen_work: Cell<f64>,
+    pub elastic: Cell<f64>,
+    pub kinetic: Cell<f64>,
 }
 
 impl Audit {
     fn new() -> Self {
+        let zero = || Cell::new(0.0);
         let quadrature = Quadrature::new();
-        Self { quadrature, damping: 0.0, left_out: 0.0, unseen_work: 0.0, elastic: 0.0, kinetic: 0.0 }
+        Self { quadrature, damping: zero(), left_out: zero(), unseen_work: zero(), elastic: zero(), kinetic: zero() }
+    }
+
+    /// Adds to an entry, in J.
+    pub fn add(entry: &Cell<f64>, energy: f64) {
+        entry.set(entry.get() + energy);
     }
 }
 
 /// An observer that keeps the work of the drive and the loss in breaks, and passes on all that it sees.
 struct Meter<'a> {
     observer: &'a mut dyn Observer,
+    audit: &'a Audit,
     drive: Drive,
-    quadrature: Quadrature,
     work: f64,
     broken: f64,
+}
+
+impl Meter<'_> {
+    fn so_far(&self) -> Spent {
+        let Self { audit, work, broken, .. } = self;
+        let damping = audit.damping.get() + audit.left_out.get();
+        Spent { work: work + audit.unseen_work.get(), damping, broken: *broken }
+    }
 }
 
 impl Observer for Meter<'_> {
     fn advance(&mut self, segment: &Segment<'_>) {
         // Rounding may put the ends of a segment beyond those of its cycle, but not its middle.
         self.drive.advance_to(segment.start + 0.5 * segment.duration);
-        self.work += work(&self.drive, &self.quadrature, segment);
+        self.work += work(&self.drive, &self.audit.quadrature, segment);
         self.observer.advance(segment);
     }
 
     fn contact(&mut self, event: &ContactEvent) {
         if event.change == Change::Break {
             self.broken += 0.5 * event.threshold * event.threshold / event.stiffness;
+            self.observer.spent(self.so_far());
         }
         self.observer.contact(event);
     }
@@ -100,21 +127,14 @@ impl Observer for Meter<'_> {
 pub(super) fn audited(
     parameters: &Parameters,
     observer: &mut dyn Observer,
-    run: impl FnOnce(&mut dyn Observer, &mut Audit) -> Result<Summary, SimulationError>,
+    run: impl FnOnce(&mut dyn Observer, &Audit) -> Result<Summary, SimulationError>,
 ) -> Result<(Summary, Ledger), SimulationError> {
-    let mut audit = Audit::new();
-    let mut meter =
-        Meter { observer, drive: Drive::new(parameters), quadrature: audit.quadrature.clone(), work: 0.0, broken: 0.0 };
-    let summary = run(&mut meter, &mut audit)?;
-    let ledger = Ledger {
-        work: meter.work + audit.unseen_work,
-        elastic: audit.elastic,
-        kinetic: audit.kinetic,
-        damping: audit.damping + audit.left_out,
-        left_out: audit.left_out,
-        broken: meter.broken,
-    };
-    Ok((summary, ledger))
+    let audit = Audit::new();
+    let mut meter = Meter { observer, audit: &audit, drive: Drive::new(parameters), work: 0.0, broken: 0.0 };
+    let summary = run(&mut meter, &audit)?;
+    let Spent { work, damping, broken } = meter.so_far();
+    let [elastic, kinetic, left_out] = [&audit.elastic, &audit.kinetic, &audit.left_out].map(Cell::get);
+    Ok((summary, Ledger { work, elastic, kinetic, damping, left_out, broken }))
 }
 
 /// Work of the drive along a segment, in J.

@@ -12,7 +12,7 @@ mod quadrature;
 mod segment;
 
 pub use harmonic::Harmonic;
-pub use ledger::Ledger;
+pub use ledger::{Ledger, Spent};
 pub use segment::{CubicStep, Extremes, ForcePath, Segment};
 
 use self::ledger::Audit;
@@ -123,6 +123,11 @@ pub trait Observer {
 
     /// A contact breaks or attaches, at the end of the segment before.
     fn contact(&mut self, event: &ContactEvent);
+
+    /// What is spent up to the break that comes next, if a ledger is kept.
+    fn spent(&mut self, spent: Spent) {
+        let _ = spent;
+    }
 
     /// Whether it wants to be told of attachments. Those that do not need none of the segments that end there.
     fn follows_attachments(&self) -> bool {
@@ -263,7 +268,7 @@ fn run(
     solver: Solver,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
-    audit: Option<&mut Audit>,
+    audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     solver.check(parameters)?;
     match solver {

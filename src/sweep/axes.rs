@@ -88,7 +88,7 @@ impl Axis {
         }
     }
 
-    /// The only row that can lead to these parameters; without modulation one of those that differ in the period alone.
+    /// The only row that can lead to these parameters; without modulation the first of those that differ in the period alone.
     pub fn find(&self, wanted: &Parameters) -> Option<u64> {
         match self {
             Self::Counted { symbol, first, count } => match wanted.get(*symbol) {
@@ -96,8 +96,10 @@ impl Axis {
                 _ => None,
             },
             Self::Table(table) => {
-                let found = table.sorted.binary_search_by(|&row| table.compare(row, wanted)).ok()?;
-                Some(u64::from(table.sorted[found]))
+                let begin = table.sorted.partition_point(|&row| table.compare(row, wanted).is_lt());
+                let mut found = table.sorted[begin..].iter().take_while(|&&row| table.compare(row, wanted).is_eq());
+                let is_counted = |row: u32| wanted.modulation_period.is_some() || table.is_first[row as usize];
+                found.find(|&&row| is_counted(row)).map(|&row| u64::from(row))
             }
         }
     }

@@ -10,6 +10,7 @@ use super::quantity::{Point, Quantity};
 use super::read_axes::PlacedAxis;
 use super::source::{Section, Source, SweepError};
 use crate::model::{Shortest, Symbol};
+use crate::solver::{Resolve, Solver};
 use std::ops::RangeInclusive;
 
 /// Where each quantity is set.
@@ -83,13 +84,18 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     }
     period(sweep, places)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
-        && let Some(((quantity, problem), point)) = sweep.admitted().find_map(|point| Some((invalid(&point)?, point)))
+        && let Some(((quantity, problem), point)) =
+            sweep.admitted().find_map(|(_, point)| Some((invalid(&point)?, point)))
     {
         return Err(places.error(quantity, problem + &place(sweep, &point)));
     }
-    let Some(first) = sweep.admitted().next() else {
+    let Some((_, first)) = sweep.admitted().next() else {
         return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
+    if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {
+        let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
+        return Err(file.source.error(place_of("record"), problem));
+    }
     // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
     let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
     let time_step = solver.and_then(|solver| solver.entry("dt")).map_or(0, |entry| entry.at);

@@ -88,18 +88,24 @@ impl Sweep {
 
     /// The jobs in grid order.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
-        self.admitted().map(|Point { parameters, .. }| {
+        self.admitted().map(|(point, Point { parameters, .. })| {
             let cost = predicted_cost(&parameters, &self.recording, self.solver);
-            Job { parameters, cost }
+            Job { point, parameters, cost }
         })
     }
 
     /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
     #[must_use]
     pub fn contains(&self, parameters: &Parameters) -> bool {
-        let rows: Option<Vec<u64>> = self.axes.iter().map(|axis| axis.find(parameters)).collect();
-        let point = rows.map(|rows| self.point(&rows).canonical());
-        point.is_some_and(|point| point.parameters == *parameters && self.admits(&point))
+        self.find(parameters).is_some()
+    }
+
+    /// Number of the point that is the job with these canonical parameters.
+    pub(super) fn find(&self, parameters: &Parameters) -> Option<u64> {
+        let rows: Vec<u64> = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<_>>()?;
+        let point = self.point(&rows).canonical();
+        let is_job = point.parameters == *parameters && self.admits(&point);
+        is_job.then(|| self.axes.iter().zip(rows).fold(0, |number, (axis, row)| number * axis.len() + row))
     }
 
     /// The id of a job.
@@ -148,19 +154,21 @@ impl Sweep {
             .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
     }
 
-    /// The points that are jobs, in canonical form.
-    pub(super) fn admitted(&self) -> impl Iterator<Item = Point> + Clone + Send + '_ {
-        self.walk(self.axes.iter().map(Axis::len).collect()).filter(|point| self.admits(point))
+    /// The points that are jobs, with their numbers, in canonical form.
+    pub(super) fn admitted(&self) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+        self.walk(self.axes.iter().map(Axis::len).collect()).filter(|(_, point)| self.admits(point))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
     pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
         let is_seed = |axis: &Axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)];
-        self.walk(self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect())
+        let counts = self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() });
+        self.walk(counts.collect()).map(|(_, point)| point)
     }
 
-    /// Walks through this many rows of each axis, past points that repeat an earlier one. Yields canonical points.
-    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = Point> + Clone + Send + '_ {
+    /// Walks through this many rows of each axis, past points that repeat an earlier one. Yields canonical points, numbered
+    /// in this walk.
+    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         (0..counts.iter().product()).filter_map(move |number: u64| {
             let mut rest = number;
@@ -170,7 +178,7 @@ impl Sweep {
             }
             let point = self.point(&rows);
             let is_first = || self.axes.iter().zip(&rows).all(|(axis, &row)| axis.is_first(row));
-            (point.is_modulated() || is_first()).then(|| point.canonical())
+            (point.is_modulated() || is_first()).then(|| (number, point.canonical()))
         })
     }
 

@@ -13,6 +13,8 @@ use std::fmt;
 /// One point of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
+    /// Number of the point in grid order, before conditions and duplicates.
+    pub point: u64,
     /// Canonical parameters, seed included.
     pub parameters: Parameters,
     /// Predicted CPU time, in s.
@@ -155,13 +157,15 @@ mod tests {
     }
 
     #[test]
-    fn solver_and_recording_but_for_the_budget_of_events_change_every_id() {
+    fn solver_and_recording_but_for_bounds_change_every_id() {
         let mut recordings = vec![Recording::default()];
-        let generous = Recording { max_events: 7, ..Recording::default() };
+        let bounded = Recording { max_time: Some(7.0), max_events: 7, ..Recording::default() };
         let solver = Solver::FixedStep { time_step: 1e-6 };
         let id = |recording| Identity::new(solver, recording).job(&Parameters::default());
-        assert_eq!(id(&generous), id(&Recording::default()));
-        for key in RecordingKey::ALL.into_iter().filter(|key| *key != RecordingKey::MaxEvents) {
+        assert_eq!(id(&bounded), id(&Recording::default()));
+        for key in
+            RecordingKey::ALL.into_iter().filter(|key| !matches!(key, RecordingKey::MaxTime | RecordingKey::MaxEvents))
+        {
             let before = recordings.len();
             for value in [Value::Real(7.0), Value::Real(7.0_f64.next_up()), Value::Flag(true)] {
                 let mut other = Recording::default();

@@ -5,8 +5,8 @@
 //!   file.rs     axes.rs filter.rs  grid.rs  job.rs   plan.rs
 //! ```
 //!
-//! Nothing here runs or writes anything. A plan is a function of the file's text alone: the same jobs in the same order,
-//! the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks one up
+//! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
+//! the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks one up
 //! without walking.
 
 mod axes;
@@ -28,5 +28,5 @@ mod tests;
 pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
-pub use plan::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use plan::{Extension, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use source::SweepError;

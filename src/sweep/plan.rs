@@ -1,24 +1,44 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
-//! Each sweep that is run in a directory opens an *extension*, which owns the jobs that are in no earlier sweep. A *part* is a
-//! run of consecutive jobs of an extension, committed together: it ends with the job that brings its predicted cost to
-//! [`PART_COST`], or its jobs to [`PART_JOBS`]. Contract: parts are a function of the texts of the sweeps and of
-//! [`PLAN_VERSION`] alone. Memory: one part.
+//! Each sweep that is run in a directory opens an *extension*, which owns its jobs but for those that earlier extensions
+//! keep: what they had done by then. A *part* is a run of consecutive jobs of an extension, committed together. Parts are
+//! small, so that many workers can share them and little is lost with one, but not many: see [`Extension::new`].
+//! Contract: parts are a function of the texts of the sweeps, of what was done when each began, and of [`PLAN_VERSION`].
+//! Memory: one part.
 
 use super::grid::Sweep;
 use super::job::Job;
+use std::ops::RangeInclusive;
 
-/// Predicted CPU time after which a part is full, in s: little is lost with an unfinished part, and files stay few.
+/// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
 pub const PART_COST: f64 = 5.0;
+/// A sweep has at least so many parts, if it has as many jobs: enough for some dozens of workers.
+const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
+/// A sweep has hardly more parts than twice this: names in a folder stay few.
+const MANY_PARTS: f64 = 20_000.0;
+/// What rounding may add to the sum of costs.
+const ROUNDING: f64 = 1e-9;
 /// Most jobs of a part, so that a part of cheap jobs fits in memory.
 pub const PART_JOBS: usize = 4096;
 /// Version of how sweeps become parts: order, cost and limits. A directory keeps the one that it was started with.
-pub const PLAN_VERSION: u32 = 3;
+pub const PLAN_VERSION: u32 = 4;
 
-/// The sweeps of a directory in the order in which they were run.
+/// A sweep of a directory, and what of it counts there.
+#[derive(Clone, Debug)]
+pub struct Extension {
+    /// The sweep.
+    pub sweep: Sweep,
+    /// Most predicted CPU time of a part with more than one job, in s.
+    pub part_cost: f64,
+    /// Where in the grid the jobs lie that it keeps, as first and last points of its parts; `None` for the last extension,
+    /// which owns all that no earlier one keeps.
+    pub kept: Option<Vec<RangeInclusive<u64>>>,
+}
+
+/// The extensions of a directory in the order in which they began.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
-    extensions: &'a [Sweep],
+    extensions: &'a [Extension],
 }
 
 /// Consecutive jobs of an extension.
@@ -45,38 +65,74 @@ pub struct Totals {
     pub cost: f64,
 }
 
-impl<'a> Plan<'a> {
-    /// The plan of these sweeps. Sweeps of one directory differ in axes and conditions only, see [`Sweep::difference`].
+impl Extension {
+    /// Begins an extension. Its parts have a 64th of its predicted cost at most, and mostly 5 s; where that would be too
+    /// many, a 20,000th. A dear job is a part of its own.
     #[must_use]
-    pub const fn new(extensions: &'a [Sweep]) -> Self {
-        Self { extensions }
+    pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
+        let total: f64 = own_jobs(sweep, earlier).map(|job| job.cost).sum();
+        let part_cost = PART_COST.max(total / MANY_PARTS).min(total / MIN_PARTS);
+        Self { sweep: sweep.clone(), part_cost: part_cost * (1.0 + ROUNDING), kept: None }
     }
 
-    /// The jobs that an extension owns, those that are in no earlier sweep, in grid order.
-    pub(super) fn jobs(self, extension: usize) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
-        let (earlier, sweep) = (&self.extensions[..extension], &self.extensions[extension]);
-        sweep.jobs().filter(move |job| !earlier.iter().any(|sweep| sweep.contains(&job.parameters)))
+    /// Whether it keeps a point of its grid.
+    fn keeps(&self, point: u64) -> bool {
+        self.kept.as_ref().is_none_or(|kept| {
+            let after = kept.partition_point(|range| *range.end() < point);
+            kept.get(after).is_some_and(|range| range.contains(&point))
+        })
+    }
+}
+
+/// The jobs of a sweep that no earlier extension keeps, in grid order.
+fn own_jobs<'a>(sweep: &'a Sweep, earlier: &'a [Extension]) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
+    let is_kept = |extension: &Extension, job: &Job| {
+        extension.sweep.find(&job.parameters).is_some_and(|point| extension.keeps(point))
+    };
+    sweep.jobs().filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
+}
+
+impl<'a> Plan<'a> {
+    /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::difference`].
+    #[must_use]
+    pub const fn new(extensions: &'a [Extension]) -> Self {
+        Self { extensions }
     }
 
     /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
-        let mut source = self.jobs(extension);
-        (0..).map_while(move |index| {
+        let own = &self.extensions[extension];
+        let mut source = own_jobs(&own.sweep, &self.extensions[..extension]).peekable();
+        let parts = (0..).map_while(move |index| {
             let (mut jobs, mut cost) = (Vec::new(), 0.0);
-            while cost < PART_COST
-                && jobs.len() < PART_JOBS
-                && let Some(job) = source.next()
-            {
+            let fits = |jobs: &[Job], cost: f64| jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost);
+            while let Some(job) = source.next_if(|job| fits(&jobs, cost + job.cost)) {
                 cost += job.cost;
                 jobs.push(job);
             }
             (!jobs.is_empty()).then_some(Part { extension, index, jobs, cost })
-        })
+        });
+        parts.filter(|part| part.jobs.first().is_some_and(|job| own.keeps(job.point)))
     }
 
     /// The parts of all extensions, in order.
     pub fn parts(self) -> impl Iterator<Item = Part> + Send + use<'a> {
         (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
+    }
+
+    /// Where in the grid those parts of an extension lie that are to be kept.
+    pub fn ranges(self, extension: usize, is_kept: impl Fn(&Part) -> bool) -> Vec<RangeInclusive<u64>> {
+        let mut ranges: Vec<RangeInclusive<u64>> = Vec::new();
+        let mut next = None;
+        for part in self.parts_of(extension).filter(is_kept) {
+            let last = part.jobs[part.jobs.len() - 1].point;
+            match ranges.last_mut() {
+                Some(range) if next == Some(part.index) => *range = *range.start()..=last,
+                _ => ranges.push(part.jobs[0].point..=last),
+            }
+            next = Some(part.index + 1);
+        }
+        ranges
     }
 
     /// Walks through the plan and adds up.

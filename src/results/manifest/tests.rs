@@ -59,14 +59,31 @@ const THREE_SEEDS: &str = "[axes]\nseed = [0, 1, 2]\n";
 fn a_directory_is_begun_resumed_extended_and_narrowed() {
     let root = tempfile::tempdir().unwrap();
     let open = |text| Results::open(&Layout::new(&Disk, root.path()), &sweep(text)).unwrap();
-    assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (1, 0));
+    let extensions = |text| {
+        let extensions = open(text).extensions().to_vec();
+        extensions.into_iter().map(|extension| (extension.sweep.text().to_owned(), extension.kept)).collect::<Vec<_>>()
+    };
+    let text = |axes| sweep(axes).text().to_owned();
+    let finish = |results: &Results<'_>| {
+        for part in results.plan().parts() {
+            fs::create_dir_all(root.path().join("tables/jobs")).unwrap();
+            fs::write(results.part_file("jobs", &part), "").unwrap();
+        }
+    };
+    assert_eq!(extensions(TWO_SEEDS), [(text(TWO_SEEDS), None)]);
     let before = contents(root.path());
     open(TWO_SEEDS);
     assert_eq!(contents(root.path()), before);
-    assert_eq!((open(THREE_SEEDS).sweeps().len(), open(THREE_SEEDS).current()), (2, 1));
-    assert_eq!((open(TWO_SEEDS).sweeps().len(), open(TWO_SEEDS).current()), (2, 0));
+    finish(&open(TWO_SEEDS));
+    let mut expected = vec![(text(TWO_SEEDS), Some(vec![0..=1])), (text(THREE_SEEDS), None)];
+    assert_eq!(extensions(THREE_SEEDS), expected);
+    assert_eq!(extensions(THREE_SEEDS), expected);
+    // Nothing was done of it, so nothing is kept.
+    expected[1].1 = Some(vec![]);
+    expected.push((text(TWO_SEEDS), None));
+    assert_eq!(extensions(TWO_SEEDS), expected);
     let read = Results::read(&Layout::new(&Disk, root.path())).unwrap();
-    assert_eq!((read.sweeps()[1].text(), read.current()), (sweep(THREE_SEEDS).text(), 0));
+    assert_eq!(read.plan().totals().jobs, 2);
 }
 
 #[test]
@@ -94,9 +111,9 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
     other.identity = "0".repeat(32);
     fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
     refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
-    fs::write(&path, text.replace("\"format\": 4", "\"format\": 5, \"new\": 0")).unwrap();
+    fs::write(&path, text.replace("\"format\": 5", "\"format\": 6, \"new\": 0")).unwrap();
     let error = Results::read(&Layout::new(&Disk, root.path())).unwrap_err().to_string();
-    assert!(error.contains("has format 5"), "{error}");
+    assert!(error.contains("has format 6"), "{error}");
 }
 
 #[test]

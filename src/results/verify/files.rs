@@ -13,7 +13,7 @@ use crate::table::arrow::schema;
 use crate::table::checksum;
 use crate::table::file::{DatasetError, FILE_EXTENSION, footer, has_columns};
 use crate::table::storage::StorageError;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Files that do not belong where they lie, with what is wrong.
@@ -39,21 +39,20 @@ pub(super) fn verify(
 ) -> Result<(), ResultsError> {
     let (mut compacted, mut unexpected) = compacted_files(results)?;
     let mut check = FilesCheck { results, committed, verification };
-    // Number of parts of each extension.
-    let mut planned = Vec::new();
-    for extension in 0..results.sweeps().len() {
+    // Extensions and numbers of all parts.
+    let mut planned = HashSet::new();
+    for extension in 0..results.extensions().len() {
         let mut parts = results.plan().parts_of(extension);
-        planned.push(0);
         loop {
             let here = parts.clone();
             let Some(part) = parts.next() else { break };
-            planned[extension] = part.index + 1;
+            planned.insert((extension, part.index));
             let Some((last, files)) = compacted.remove(&(extension, part.index)) else {
                 check.part(&part)?;
                 continue;
             };
             let members = usize::try_from(last - part.index + 1).unwrap_or(usize::MAX);
-            planned[extension] += parts.by_ref().take(members - 1).count() as u64;
+            planned.extend(parts.by_ref().take(members - 1).map(|part| (extension, part.index)));
             check.compacted(&TableFile::compacted(extension, &(part.index..=last), "*"), &files, || {
                 here.clone().take(members)
             })?;
@@ -105,11 +104,10 @@ impl FilesCheck<'_> {
                     let jobs = ids(results, part).collect();
                     self.verification.problems.push(Problem { parts: vec![name], jobs, ..problem });
                 }
-                None if results.wants(part) => {
+                None => {
                     self.verification.parts_missing += 1;
                     self.verification.jobs_missing += part.jobs.len() as u64;
                 }
-                None => (),
             },
         }
         Ok(())
@@ -219,8 +217,8 @@ fn check_file(results: &Results<'_>, extension: usize, table: &str, path: &Path)
         return damaged("it is another file than its name says");
     }
     let footer = footer(results.layout().storage, path)?;
-    let sweep = results.sweeps().get(extension);
-    if sweep.is_none_or(|sweep| footer.get("sweep").is_none_or(|text| text != sweep.text())) {
+    let sweep = results.extensions().get(extension).map(|extension| extension.sweep.text());
+    if sweep.is_none() || footer.get("sweep").map(String::as_str) != sweep {
         return damaged("it is of another sweep");
     }
     let schemas = [
@@ -272,7 +270,7 @@ fn compacted_files(results: &Results<'_>) -> Result<(Compacted, Unexpected), Res
 }
 
 /// What lies in the folders of the tables and is no table, no part of the plan and no compacted file.
-fn unexpected_files(results: &Results<'_>, planned: &[u64]) -> Result<Unexpected, StorageError> {
+fn unexpected_files(results: &Results<'_>, planned: &HashSet<(usize, u64)>) -> Result<Unexpected, StorageError> {
     let layout = results.layout();
     let tables: BTreeSet<&str> = results.tables().collect();
     let mut unexpected = Unexpected::new();
@@ -288,7 +286,7 @@ fn unexpected_files(results: &Results<'_>, planned: &[u64]) -> Result<Unexpected
             let is_table_file = path.extension().is_some_and(|extension| extension == FILE_EXTENSION);
             let problem = match TableFile::of_path(&path) {
                 Some(file) if file.is_compacted() => continue,
-                Some(file) if planned.get(file.extension).is_some_and(|&parts| file.first < parts) => continue,
+                Some(file) if planned.contains(&(file.extension, file.first)) => continue,
                 Some(_) => "the plan has no such part",
                 None if is_table_file => "no part has this name: its rows are there twice, or belong elsewhere",
                 None => "it is no table file, which breaks readers of the folder",

@@ -4,9 +4,10 @@ use super::{Problem, Remedy};
 use crate::results::commit::alone;
 use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::handle::{Results, no_results};
-use crate::results::layout::{Layout, TableFile};
+use crate::results::layout::{Layout, TableFile, part_name};
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
 use crate::results::tables;
+use crate::sweep::{Extension, Part};
 use crate::table::checksum;
 use crate::table::file::footer;
 use std::path::Path;
@@ -16,14 +17,31 @@ use std::path::Path;
 /// # Errors
 /// When it is no results directory, belongs to another version of the program, or cannot be restored.
 pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Results<'a>, ResultsError> {
-    let (manifest, texts) = texts(layout, problems)?;
-    let sweeps = parse(layout, &texts)?;
-    let first = sweeps.first().ok_or_else(|| no_results(layout.root()))?;
-    if let Some(manifest) = &manifest {
-        refuse(layout, &manifest.difference(&Manifest::new(first)), "use the program that wrote it")?;
+    let extensions = match whole_or_copies(layout, problems)? {
+        Texts::Manifest(manifest) => {
+            let extensions = manifest.extensions(layout)?;
+            refuse(layout, &manifest.difference(&Manifest::new(&extensions)), "use the program that wrote it")?;
+            extensions
+        }
+        Texts::Copies(texts) => begin_again(layout, &texts)?,
+    };
+    Ok(Results::new(layout, extensions))
+}
+
+/// The extensions of these sweeps: an earlier one keeps what is committed of it, as no later run added to that.
+fn begin_again(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Extension>, ResultsError> {
+    let mut extensions = Vec::new();
+    for (number, text) in texts.iter().enumerate() {
+        let sweep = parse(layout, number, text)?;
+        extensions.push(Extension::new(&sweep, &extensions));
+        if number + 1 < texts.len() {
+            let results = Results::new(layout, extensions.clone());
+            let (done, committed) = (results.done_parts()?, results.committed_parts()?);
+            let is_kept = |part: &Part| done.has(part) || committed.contains_key(&part_name(part));
+            extensions[number].kept = Some(results.plan().ranges(number, is_kept));
+        }
     }
-    let current = manifest.map_or(sweeps.len() - 1, |manifest| manifest.current);
-    Ok(Results::new(layout, sweeps, current))
+    Ok(extensions)
 }
 
 /// Writes the manifest and the copies of the sweep files again.
@@ -31,22 +49,25 @@ pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> R
 /// # Errors
 /// When they cannot be written.
 pub(super) fn restore_manifest(results: &Results<'_>) -> Result<(), ResultsError> {
-    let sweeps = results.sweeps();
-    let mut manifest = Manifest::new(&sweeps[0]);
-    manifest.sweeps = sweeps.iter().map(|sweep| sweep.text().to_owned()).collect();
-    manifest.current = results.current();
     let _alone = alone(results.layout(), WRITER)?;
-    manifest.write(results.layout())
+    Manifest::new(results.extensions()).write(results.layout())
 }
 
-/// The manifest, if it is to be believed, and the texts of all sweeps.
-fn texts(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<(Option<Manifest>, Vec<String>), ResultsError> {
+/// What says which sweeps a directory has.
+enum Texts {
+    Manifest(Manifest),
+    /// The copies of the sweep files, if the manifest is not to be believed.
+    Copies(Vec<String>),
+}
+
+/// The manifest if it is to be believed, else the copies; what is damaged is a problem.
+fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<Texts, ResultsError> {
     let copies = copies(layout)?;
     let damaged = match Manifest::read(layout) {
         Ok(Some(manifest)) => match foreign(layout, &manifest, &copies) {
             None => {
-                for (extension, text) in manifest.sweeps.iter().enumerate() {
-                    if copies.get(extension) != Some(text) {
+                for (extension, record) in manifest.extensions.iter().enumerate() {
+                    if copies.get(extension) != Some(&record.sweep) {
                         let path = layout.sweep(extension);
                         let is_there = layout.storage.exists(&path)?;
                         let problem =
@@ -54,8 +75,7 @@ fn texts(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<(Option<Man
                         problems.push(Problem::of_file(path, problem, Remedy::Manifest));
                     }
                 }
-                let texts = manifest.sweeps.clone();
-                return Ok((Some(manifest), texts));
+                return Ok(Texts::Manifest(manifest));
             }
             Some(problem) => problem,
         },
@@ -76,7 +96,7 @@ fn texts(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<(Option<Man
         return Err(ResultsError::damaged(&layout.manifest(), problem));
     }
     problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
-    Ok((None, copies))
+    Ok(Texts::Copies(copies))
 }
 
 /// The copies of sweep files, as far as they can be read.
@@ -97,7 +117,8 @@ fn copies(layout: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
 /// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
 fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Option<String> {
     let is_in_tables = |extension: usize, text: &String| {
-        manifest.sweeps.get(extension) != Some(text) && text_in_tables(layout, extension).as_ref() == Some(text)
+        let in_manifest = manifest.extensions.get(extension).map(|record| &record.sweep);
+        in_manifest != Some(text) && text_in_tables(layout, extension).as_ref() == Some(text)
     };
     let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
     Some(format!("it does not belong to these tables: their sweep {extension} is another"))

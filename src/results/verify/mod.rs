@@ -17,7 +17,7 @@ mod rows;
 use crate::results::error::ResultsError;
 use crate::results::events::RunEvent;
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, part_name};
+use crate::results::layout::Layout;
 use crate::table::checksum;
 use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
@@ -26,7 +26,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Version of [`Verification`] as JSON.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// What a verification found. Serialises to a stable form, whose version is `format`.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -49,9 +49,9 @@ pub struct Verification {
     pub parts_missing: u64,
     /// Jobs in them.
     pub jobs_missing: u64,
-    /// Extensions whose sweeps are to be run for the damaged parts, in this order.
-    pub extensions: Vec<usize>,
-    /// Whether parts that are to be run again were compacted.
+    /// Whether parts are to be run again for what is damaged.
+    pub wants_run: bool,
+    /// Whether such parts were compacted.
     #[serde(skip)]
     lost_compacted: bool,
 }
@@ -113,7 +113,7 @@ impl Verification {
     /// Whether reduced data are to be made again, and no run does it.
     #[must_use]
     pub fn wants_reduction(&self) -> bool {
-        self.extensions.is_empty() && self.problems.iter().any(|problem| problem.remedy == Remedy::Reduce)
+        !self.wants_run && self.problems.iter().any(|problem| problem.remedy == Remedy::Reduce)
     }
 
     /// Names of the parts that are to be run again.
@@ -173,19 +173,8 @@ impl<'a> Results<'a> {
             }
         }
         verification.whole = verification.problems.is_empty();
-        verification.extensions = results.extensions_to_run(&verification.lost_parts());
+        verification.wants_run = !verification.lost_parts().is_empty();
         Ok((results, verification))
-    }
-
-    /// The sweeps to be run for these parts, that which was asked for last at the end.
-    fn extensions_to_run(&self, lost: &BTreeSet<&str>) -> Vec<usize> {
-        if lost.is_empty() {
-            return Vec::new();
-        }
-        let unwanted = self.plan().parts().filter(|part| lost.contains(part_name(part).as_str()) && !self.wants(part));
-        let mut extensions: BTreeSet<usize> = unwanted.map(|part| part.extension).collect();
-        extensions.remove(&self.current());
-        extensions.into_iter().chain([self.current()]).collect()
     }
 }
 

@@ -14,7 +14,7 @@ use crate::solver::segment::Segment;
 impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
     pub(super) fn follow_series(
-        &mut self,
+        &self,
         kernels: &dyn Kernels,
         chain: &Chain,
         series: &Series,
@@ -30,13 +30,13 @@ impl Audit {
                 weight * probe.velocity.iter().flat_map(|row| row.iter()).map(|v| v * v).sum::<f64>()
             })
             .sum();
-        self.damping += chain.mass * chain.damping_rate * (last - first) * length * mean_square;
+        Self::add(&self.damping, chain.mass * chain.damping_rate * (last - first) * length * mean_square);
     }
 
     /// Enters a leap of `elapsed` s from `state`: the damping loss along the driven solution, in closed form, and
     /// the energy of the free motion that is dropped at its start.
     pub(super) fn follow_leap(
-        &mut self,
+        &self,
         chain: &Chain,
         drive: &Harmonic,
         driven: &DrivenSolution,
@@ -69,7 +69,7 @@ impl Audit {
             }
             before = [y, middle];
         }
-        self.left_out += chain.mass * dropped;
+        Self::add(&self.left_out, chain.mass * dropped);
         let mut integral = ramp * elapsed;
         if drive.amplitude > 0.0 {
             let (sine, versine) = sine_and_versine(frequency, elapsed);
@@ -78,19 +78,19 @@ impl Audit {
             let swing = 0.5 * (square[0] * sine_twice - square[1] * versine_twice);
             integral += 0.5 * frequency * (size * frequency * elapsed - swing);
         }
-        self.damping += chain.mass * chain.damping_rate * integral;
+        Self::add(&self.damping, chain.mass * chain.damping_rate * integral);
     }
 
     /// Enters the energies at the end, with the drive at `driven` m.
-    pub(super) fn record_final_energy(&mut self, slider: &Slider, driven: f64) {
+    pub(super) fn record_final_energy(&self, slider: &Slider, driven: f64) {
         let Slider { interface, chain, state } = slider;
         let displacements: Vec<f64> = slider.displacements().collect();
         let speeds = (0..chain.layout.blocks).map(|j| chain.at(&state.velocity, j));
         let stretched: f64 = displacements.windows(2).map(|pair| (pair[1] - pair[0]) * (pair[1] - pair[0])).sum();
         let sprung = chain.drive_stiffness * (driven - displacements[0]) * (driven - displacements[0]);
-        self.kinetic = 0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>();
-        self.elastic =
-            0.5 * (chain.mass * chain.coupling[0][0] * stretched + sprung) + interface.elastic_energy(&displacements);
+        self.kinetic.set(0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>());
+        let chained = chain.mass * chain.coupling[0][0] * stretched;
+        self.elastic.set(0.5 * (chained + sprung) + interface.elastic_energy(&displacements));
     }
 }
 
@@ -108,10 +108,10 @@ impl Integration<'_> {
             }
             let length = self.step.length;
             let s = (left / length).min(1.0);
-            if let Some(audit) = &mut self.audit {
+            if let Some(audit) = self.audit {
                 audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
                 let resolved = self.step.segment_to(s, self.frame.now());
-                audit.unseen_work += work(&self.frame.drive, &audit.quadrature, &resolved);
+                Audit::add(&audit.unseen_work, work(&self.frame.drive, &audit.quadrature, &resolved));
             }
             self.kernels.evaluate(&self.step.series, s, length, &mut self.slider.state);
             done = if s < 1.0 { elapsed } else { done + length };
@@ -120,8 +120,8 @@ impl Integration<'_> {
         self.slider.state = after;
         self.control.min_orders = min_orders;
         self.frame.set_time(start);
-        if let Some(audit) = &mut self.audit {
-            audit.unseen_work -= work(&self.frame.drive, &audit.quadrature, reported);
+        if let Some(audit) = self.audit {
+            Audit::add(&audit.unseen_work, -work(&self.frame.drive, &audit.quadrature, reported));
         }
     }
 }

@@ -140,7 +140,7 @@ impl Leap {
         Bounds { horizon, until_cycle_end, error, reach, largest_force }: Bounds,
         state: &mut State,
         report: impl FnOnce(Segment<'static>),
-        audit: Option<&mut Audit>,
+        audit: Option<&Audit>,
     ) -> Attempt {
         let layout = chain.layout;
         // Worth another try after some e-foldings of the free motion, or after the next event.

@@ -54,7 +54,7 @@ pub(super) fn run(
     resolve: Resolve,
     limits: Limits<'_>,
     observer: &mut dyn Observer,
-    audit: Option<&mut Audit>,
+    audit: Option<&Audit>,
 ) -> Result<Summary, SimulationError> {
     let rows = Layout::new(parameters.blocks).rows;
     if resolve == Resolve::Grid && audit.is_some() {
@@ -84,7 +84,7 @@ struct Integration<'a> {
     /// Largest shear force at the last break and at the ends of steps since, in N.
     largest_force: f64,
     summary: Summary,
-    audit: Option<&'a mut Audit>,
+    audit: Option<&'a Audit>,
 }
 
 impl<'a> Integration<'a> {
@@ -182,7 +182,7 @@ impl<'a> Integration<'a> {
         }
         observer.end(self.summary.end_time, &displacement);
         self.summary.satisfied = satisfied;
-        if let Some(audit) = self.audit.take() {
+        if let Some(audit) = self.audit {
             audit.record_final_energy(&self.slider, self.frame.drive_motion().value(0.0));
         }
         Ok(self.summary)
@@ -236,8 +236,7 @@ impl<'a> Integration<'a> {
         let mut reported = None;
         let report = |segment: Segment<'static>| reported = Some(Segment { start, ..segment });
         let before = self.audit.is_some().then(|| state.clone());
-        let audit = self.audit.as_deref_mut();
-        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, largest, bounds, state, report, audit);
+        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, largest, bounds, state, report, self.audit);
         match attempt {
             Attempt::Wait { seconds } => {
                 self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);

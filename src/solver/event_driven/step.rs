@@ -229,7 +229,7 @@ impl Integration<'_> {
             duration: (last - first) * length,
             path: self.step.force_path(first, [force, end_force]),
         });
-        if let Some(audit) = &mut self.audit {
+        if let Some(audit) = self.audit {
             audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [first, last], length);
         }
         end_force

@@ -117,8 +117,9 @@ fn differences_are_reported_except_in_axes_and_conditions() {
     let before = sweep("[model]\nK = 1e8\n[axes]\nV0 = [1e-4]");
     let same = sweep("where = \"V0 > 0\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 3 }\nDelta = [0, 1]\neta = [1]");
     assert_eq!(before.difference(&same), []);
-    let other =
-        sweep("name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\n[solver]\ntolerance = 1e-7");
+    let other = sweep(
+        "name = \"b\"\n[model]\nK = 2e8\nDelta = 1\nT = 2\n[record]\nmax_time = 1\nslips = 3\n[solver]\ntolerance = 1e-7",
+    );
     let reported: Vec<String> = before.difference(&other).iter().map(ToString::to_string).collect();
     assert_eq!(
         reported,
@@ -128,38 +129,76 @@ fn differences_are_reported_except_in_axes_and_conditions() {
             "model.Delta: 0 -> 1",
             "model.T: none -> 2",
             "solver.tolerance: 0.001 -> 1e-7",
-            "record.max_time: none -> 1",
+            "record.slips: 40 -> 3",
         ]
     );
 }
 
+/// The extensions of these sweeps, each begun once all before it was done.
+fn extensions<'a>(sweeps: impl IntoIterator<Item = &'a Sweep>) -> Vec<Extension> {
+    let mut extensions: Vec<Extension> = Vec::new();
+    for sweep in sweeps {
+        if let Some(last) = extensions.len().checked_sub(1) {
+            extensions[last].kept = Some(Plan::new(&extensions).ranges(last, |_| true));
+        }
+        extensions.push(Extension::new(sweep, &extensions));
+    }
+    extensions
+}
+
 #[test]
 fn parts_end_at_their_cost_and_at_their_number_of_jobs() {
-    // 0.6 s each: nine reach 5 s.
-    let dear = [sweep(
-        "[record]\nmax_time = 5.34e-6\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = { count = 20 }",
-    )];
-    let sizes: Vec<usize> = Plan::new(&dear).parts().map(|part| part.jobs.len()).collect();
-    assert_eq!(sizes, [9, 9, 2]);
-    let cheap = [sweep("[record]\nmax_time = 1e-9\n[axes]\nseed = { count = 10_000 }")];
-    let parts: Vec<(u64, usize)> = Plan::new(&cheap).parts().map(|part| (part.index, part.jobs.len())).collect();
-    assert_eq!(parts, [(0, PART_JOBS), (1, PART_JOBS), (2, 10_000 - 2 * PART_JOBS)]);
+    let sizes = |seeds: u64, cost: f64| -> Vec<usize> {
+        // The fixed step costs 110 ns.
+        let steps = cost / 110e-9;
+        let text = format!(
+            "[record]\nmax_time = {}\n[solver]\nmethod = \"fixed-step\"\ndt = 1e-12\n[axes]\nseed = {{ count = {seeds} }}",
+            steps * 1e-12
+        );
+        Plan::new(&extensions([&sweep(&text)])).parts().map(|part| part.jobs.len()).collect()
+    };
+    // Two parts at least, then 5 s each; dear jobs alone; more than 5 s where parts would be too many.
+    assert_eq!(sizes(10, 0.6), [5, 5]);
+    assert_eq!(sizes(20, 0.6), [8, 8, 4]);
+    assert_eq!(sizes(20, 6.0), [1; 20]);
+    assert_eq!(sizes(20_000, 12.0)[..2], [1, 1]);
+    assert_eq!(sizes(100_000, 3.0)[..2], [5, 5]);
+    assert_eq!(sizes(10_000, 1e-5), [PART_JOBS, PART_JOBS, 10_000 - 2 * PART_JOBS]);
+}
+
+#[test]
+fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
+    // Dear enough for a part each.
+    let record = "[record]\nslips = 10000";
+    let wide = sweep(&format!("[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = 4 }}\n{record}"));
+    let narrow = sweep(&format!("[axes]\nV0 = [1e-4]\nseed = {{ count = 4 }}\n{record}"));
+    let mut all = extensions([&wide]);
+    all[0].kept = Some(Plan::new(&all).ranges(0, |part| [1, 2, 5].contains(&part.index)));
+    let parts: Vec<usize> = Plan::new(&all).parts().map(|part| part.jobs.len()).collect();
+    assert_eq!((parts, &all[0].kept), (vec![1; 3], &Some(vec![1..=2, 5..=5])));
+    all.push(Extension::new(&narrow, &all));
+    let jobs: Vec<(usize, u64, f64, u64)> = Plan::new(&all)
+        .parts()
+        .flat_map(|part| part.jobs.into_iter().map(move |job| (part.extension, part.index, job)))
+        .map(|(extension, index, job)| (extension, index, job.parameters.drive_velocity, job.parameters.seed))
+        .collect();
+    assert_eq!(jobs, [(0, 1, 1e-4, 1), (0, 2, 1e-4, 2), (0, 5, 2e-4, 1), (1, 0, 1e-4, 0), (1, 1, 1e-4, 3)]);
 }
 
 #[test]
 fn an_extended_sweep_owns_its_new_jobs_alone() {
-    let extensions = [
-        sweep("[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 2 }"),
-        sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
-        sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]"),
-    ];
+    let two = sweep("[axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 2 }");
+    let three = sweep("[axes]\nseed = { count = 3 }\nV0 = [2e-4, 1e-4]");
+    let extensions = extensions([&two, &three, &three]);
     let plan = Plan::new(&extensions);
-    let new: Vec<u64> = plan.jobs(1).map(|job| job.parameters.seed).collect();
-    assert_eq!(new, [2, 2]);
-    assert_eq!((plan.jobs(0).count(), plan.jobs(2).count()), (4, 0));
-    let totals = plan.totals();
-    assert_eq!((totals.jobs, totals.parts), (6, 2));
-    assert_eq!(plan.parts().map(|part| part.extension).collect::<Vec<_>>(), [0, 1]);
+    let seeds = |extension| {
+        let jobs = plan.parts_of(extension).flat_map(|part| part.jobs);
+        jobs.map(|job| job.parameters.seed).collect::<Vec<_>>()
+    };
+    assert_eq!(seeds(0), [0, 1, 0, 1]);
+    assert_eq!(seeds(1), [2, 2]);
+    assert!(seeds(2).is_empty());
+    assert_eq!(plan.totals().jobs, 6);
 }
 
 #[test]
@@ -167,11 +206,11 @@ fn the_sweeps_of_the_figures_are_read_and_take_minutes_at_most() {
     for (text, name) in
         [(include_str!("../../../sweeps/fig2.toml"), "fig2"), (include_str!("../../../sweeps/fig3.toml"), "fig3")]
     {
-        let sweep = [sweep(text)];
-        let totals = Plan::new(&sweep).totals();
-        assert_eq!(sweep[0].name(), name);
+        let sweep = sweep(text);
+        let totals = Plan::new(&extensions([&sweep])).totals();
+        assert_eq!(sweep.name(), name);
         assert!((20.0..300.0).contains(&totals.cost), "{name}: {totals:?}");
-        let jobs: HashSet<JobId> = sweep[0].jobs().map(|job| sweep[0].job_id(&job.parameters)).collect();
+        let jobs: HashSet<JobId> = sweep.jobs().map(|job| sweep.job_id(&job.parameters)).collect();
         assert_eq!(jobs.len() as u64, totals.jobs);
     }
 }
@@ -183,16 +222,19 @@ fn ten_million_jobs_are_planned_in_seconds() {
     let text = "where = \"frequency < 1e9\"\n[axes]\nV0 = { log = [3e-5, 2e-4], points = 100 }\n\
                 Delta = { log = [3e-7, 1e-6], points = 10 }\neta = { log = [0.2, 1000], points = 100 }\n\
                 seed = { count = 100 }";
-    let extensions = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
+    let [first, more] = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
     let start = std::time::Instant::now();
-    let totals = Plan::new(&extensions[..1]).totals();
+    let before = extensions([&first]);
+    println!("begun in {:?}", start.elapsed());
+    let start = std::time::Instant::now();
+    let totals = Plan::new(&before).totals();
     println!("{totals:?} in {:?}", start.elapsed());
     let start = std::time::Instant::now();
-    let new = Plan::new(&extensions).jobs(1).count();
+    let all = extensions([&first, &more]);
+    let new: usize = Plan::new(&all).parts_of(1).map(|part| part.jobs.len()).sum();
     println!("{new} new jobs found in {:?}", start.elapsed());
     let start = std::time::Instant::now();
-    let hashed =
-        extensions[0].jobs().take(1_000_000).filter(|job| extensions[0].job_id(&job.parameters).as_bytes()[0] > 0);
+    let hashed = first.jobs().take(1_000_000).filter(|job| first.job_id(&job.parameters).as_bytes()[0] > 0);
     println!("{} of 1e6 ids in {:?}", hashed.count(), start.elapsed());
     assert_eq!((totals.jobs, new), (10_000_000, 100_000));
 }

@@ -1,7 +1,7 @@
 //! Properties of random sweeps: what is printed is read, every job is found, parts cover the jobs once and in order.
 
-use super::super::{Identity, Job, PART_COST, PART_JOBS, Plan, Sweep};
-use super::sweep;
+use super::super::{Extension, Identity, Job, PART_JOBS, Plan, Sweep};
+use super::{extensions, sweep};
 use crate::model::{Parameters, Shortest, Symbol, Value};
 use proptest::collection::btree_set;
 use proptest::prelude::*;
@@ -99,9 +99,9 @@ proptest! {
         let ids: HashSet<_> = jobs.iter().map(|job| sweep.job_id(&job.parameters)).collect();
         prop_assert_eq!(ids.len(), jobs.len());
         prop_assert!(jobs.len() as u64 <= sweep.point_count());
-        for Job { parameters, cost } in &jobs {
+        for Job { point, parameters, cost } in &jobs {
             prop_assert_eq!(&parameters.clone().validated().unwrap(), parameters);
-            prop_assert!(sweep.contains(parameters), "{:?}", parameters);
+            prop_assert_eq!(sweep.find(parameters), Some(*point), "{:?}", parameters);
             prop_assert!(*cost > 0.0);
         }
     }
@@ -120,13 +120,14 @@ proptest! {
 
     #[test]
     fn parts_cover_the_jobs_of_all_extensions_once_and_in_order(texts in prop::collection::vec(texts(), 1..4)) {
-        let extensions: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
-        let identity = Identity::new(extensions[0].solver(), extensions[0].recording());
+        let sweeps: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
+        let identity = Identity::new(sweeps[0].solver(), sweeps[0].recording());
         let mut seen = HashSet::new();
         let mut expected = Vec::new();
-        for (extension, sweep) in extensions.iter().enumerate() {
+        for (extension, sweep) in sweeps.iter().enumerate() {
             expected.extend(sweep.jobs().filter(|job| seen.insert(identity.job(&job.parameters))).map(|job| (extension, job)));
         }
+        let extensions = extensions(&sweeps);
         let plan = Plan::new(&extensions);
         let mut covered = Vec::new();
         let mut next = vec![0; extensions.len()];
@@ -134,11 +135,39 @@ proptest! {
             prop_assert_eq!(part.index, next[part.extension]);
             next[part.extension] += 1;
             prop_assert!(!part.jobs.is_empty() && part.jobs.len() <= PART_JOBS);
-            let before_last: f64 = part.jobs[..part.jobs.len() - 1].iter().map(|job| job.cost).sum();
-            prop_assert!(before_last < PART_COST);
+            prop_assert!(part.jobs.len() == 1 || part.cost <= extensions[part.extension].part_cost);
             covered.extend(part.jobs.into_iter().map(|job| (part.extension, job)));
         }
         prop_assert_eq!(covered, expected);
+    }
+
+    /// Whatever was done of each sweep when the next began.
+    #[test]
+    fn every_job_of_the_last_sweep_is_there_once_and_of_the_others_what_was_done(
+        texts in prop::collection::vec(texts(), 2..4), is_done in prop::collection::vec(any::<bool>(), 64)
+    ) {
+        let sweeps: Vec<Sweep> = texts.iter().map(|text| sweep(text)).collect();
+        let identity = Identity::new(sweeps[0].solver(), sweeps[0].recording());
+        let (mut extensions, mut done): (Vec<Extension>, Vec<_>) = (Vec::new(), Vec::new());
+        for sweep in &sweeps {
+            if let Some(last) = extensions.len().checked_sub(1) {
+                let is_done = |index: u64| is_done[(index as usize + 7 * last) % is_done.len()];
+                let plan = Plan::new(&extensions);
+                done.extend(plan.parts_of(last).filter(|part| is_done(part.index)));
+                extensions[last].kept = Some(plan.ranges(last, |part| is_done(part.index)));
+            }
+            extensions.push(Extension::new(sweep, &extensions));
+        }
+        let parts: Vec<_> = Plan::new(&extensions).parts().collect();
+        prop_assert_eq!(&parts[..done.len()], &done[..]);
+        let ids = |jobs: &mut dyn Iterator<Item = &Job>| jobs.map(|job| identity.job(&job.parameters)).collect::<Vec<_>>();
+        let there = ids(&mut parts.iter().flat_map(|part| &part.jobs));
+        let once: HashSet<_> = there.iter().copied().collect();
+        prop_assert_eq!(once.len(), there.len());
+        let last: Vec<Job> = sweeps[sweeps.len() - 1].jobs().collect();
+        let wanted: HashSet<_> = ids(&mut last.iter()).into_iter().collect();
+        let kept: HashSet<_> = ids(&mut done.iter().flat_map(|part| &part.jobs)).into_iter().collect();
+        prop_assert_eq!(once, wanted.union(&kept).copied().collect::<HashSet<_>>());
     }
 
     #[test]
