@@ -29,4 +29,4 @@ pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use source::SweepError;
+pub use source::{Mistake, SweepError};
