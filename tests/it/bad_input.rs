@@ -110,6 +110,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
     std::fs::create_dir_all(folder.path("theirs/data")).unwrap();
     std::fs::create_dir(folder.path("empty")).unwrap();
     folder.ends(0, "run good.toml --out good");
+    folder.ends(0, "run good.toml --out results/usual --no-reduce");
     folder.write("other-model.toml", &GOOD.replace("N = 3", "N = 4"));
     folder.write("other-recording.toml", &GOOD.replace("slips = 2", "slips = 3"));
     folder.write("other-solver.toml", &format!("{GOOD}[solver]\ntolerance = 1e-7\n"));
@@ -137,14 +138,21 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         // Directories that belong to something else.
         (
             "run good.toml --out theirs",
-            &["theirs: is not empty and no results directory", "choose another with --out"],
+            &["theirs: is neither empty nor a results directory", "choose another with --out"],
         ),
-        ("run good.toml --out plain.txt", &["plain.txt: is not empty and no results directory", "--out"]),
+        ("run good.toml --out plain.txt", &["plain.txt: is neither empty nor a results directory", "--out"]),
         ("run other-model.toml --out good", &["good: holds other results", "model.N: 3 -> 4", "undo the change"]),
         ("run other-recording.toml --out good", &["record.slips: 2 -> 3", "choose another directory with --out"]),
         ("run other-solver.toml --out good", &["solver.tolerance: 0.001 -> 1e-7", "--out"]),
         ("status", &["<DIR>"]),
-        ("status missing", &["missing: is no results directory", "such as results/"]),
+        ("status missing", &["missing: there is no such directory; name one that a run made, such as results/fig3"]),
+        ("status godo", &["godo: there is no such directory; did you mean good?"]),
+        ("reduce ./results/godo/", &["there is no such directory; name one"]),
+        ("verify usal", &["usal: there is no such directory; did you mean results/usual?"]),
+        ("verify results/usal", &["results/usal: there is no such directory; did you mean results/usual?"]),
+        ("status results", &["results: is no results directory, but holds some: results/usual"]),
+        ("plot .", &[".: is no results directory, but holds some: ./good"]),
+        ("status good.toml", &["good.toml: is a sweep file; name its results directory, by default results/good"]),
         ("status theirs", &["theirs: is no results directory", "such as results/"]),
         ("status plain.txt", &["plain.txt: is no results directory", "such as results/"]),
         ("status good --yaml", &["--yaml"]),

@@ -3,9 +3,10 @@
 use super::{Problem, Remedy};
 use crate::results::commit::alone;
 use crate::results::error::{ErrorKind, ResultsError};
-use crate::results::handle::{Results, no_results};
+use crate::results::handle::Results;
 use crate::results::layout::{Layout, TableFile};
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
+use crate::results::missing::no_results;
 use crate::results::tables;
 use crate::table::checksum;
 use crate::table::file::footer;
@@ -18,7 +19,7 @@ use std::path::Path;
 pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Results<'a>, ResultsError> {
     let (manifest, texts) = texts(layout, problems)?;
     let sweeps = parse(layout, &texts)?;
-    let first = sweeps.first().ok_or_else(|| no_results(layout.root()))?;
+    let first = sweeps.first().ok_or_else(|| no_results(layout))?;
     if let Some(manifest) = &manifest {
         refuse(layout, &manifest.difference(&Manifest::new(first)), "use the program that wrote it")?;
     }
@@ -59,7 +60,7 @@ fn texts(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<(Option<Man
             }
             Some(problem) => problem,
         },
-        Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
+        Ok(None) if copies.is_empty() => return Err(no_results(layout)),
         Ok(None) => "it is missing".to_owned(),
         Err(error) if error.kind == ErrorKind::Damaged => error.problem,
         Err(error) => return Err(error),
