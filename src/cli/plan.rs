@@ -94,7 +94,7 @@ struct Axis {
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::from_file(&arguments.sweep)?;
     output::warn(&sweep.warnings());
-    let root = arguments.out.clone().unwrap_or_else(|| PathBuf::from("results").join(sweep.name()));
+    let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {

@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         (sweep, arguments.sweep.clone())
     } else {
         let sweep = Sweep::from_file(&arguments.sweep)?;
-        let root = PathBuf::from("results").join(sweep.name());
+        let root = Layout::default_root(&sweep);
         (sweep, root)
     };
     let root = arguments.out.clone().unwrap_or(default_root);

@@ -24,7 +24,7 @@ use stickslip::observe::{
 use stickslip::results::tables;
 use stickslip::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
 use stickslip::solver::{self, Observer};
-use stickslip::sweep::{Job, Sweep, SweepError};
+use stickslip::sweep::{Job, Mistake, Sweep, SweepError};
 use stickslip::table::file::Footer;
 
 /// Simulate one realisation and show what it does
@@ -326,12 +326,15 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
 /// A message about the sweep text, as one about the flags.
 fn as_flags(error: SweepError) -> anyhow::Error {
     match error {
-        SweepError::Invalid { problem, .. } => {
+        SweepError::Invalid { mistakes, .. } => {
             // Flags have neither sections nor lines.
-            let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((&problem, ""));
-            let end = end.split_once(')').map_or("", |(_, rest)| rest);
-            let problem = format!("{start}{end}").replace(" in [model]", "");
-            UsageError(format!("in the flags: {problem}")).into()
+            let problems = mistakes.iter().map(|Mistake { problem, .. }| {
+                let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));
+                let end = end.split_once(')').map_or("", |(_, rest)| rest);
+                format!("{start}{end}").replace(" in [model]", "")
+            });
+            let between = if mistakes.len() > 1 { "\n  " } else { " " };
+            UsageError(format!("in the flags:{between}{}", problems.collect::<Vec<_>>().join(between))).into()
         }
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     }

@@ -4,6 +4,7 @@ use crate::results::commit::alone;
 use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
 use crate::results::manifest::{self, Manifest};
+use crate::results::missing::no_results;
 use crate::results::tables;
 use crate::sweep::{Extension, Job, Part, Plan, Sweep};
 use crate::table::file::Footer;
@@ -51,7 +52,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When it is no results directory, belongs to other versions, or is damaged.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
-        let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout.root()))?;
+        let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout))?;
         manifest::refuse(layout, &manifest.difference(&Manifest::new(&extensions)), "use the program that wrote it")?;
         Ok(Self::new(layout, extensions))
     }
@@ -71,7 +72,7 @@ impl<'a> Results<'a> {
                 return Ok((Self::new(layout, extensions), Some(manifest)));
             }
             let problem =
-                "is not empty and no results directory (there is no run/manifest.json); choose another with --out";
+                "is neither empty nor a results directory (there is no run/manifest.json); choose another with --out";
             return Err(ResultsError::refused(layout.root(), problem));
         };
         let before = Self::new(layout, extensions.clone());
@@ -160,13 +161,6 @@ impl<'a> Results<'a> {
         }
         Ok(())
     }
-}
-
-/// A directory that is none of ours, for those who look at one.
-pub(super) fn no_results(root: &Path) -> ResultsError {
-    let problem =
-        "is no results directory (there is no run/manifest.json); name one that a run made, such as results/fig3";
-    ResultsError::refused(root, problem)
 }
 
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.

@@ -14,7 +14,7 @@
 //! folders: a stray file of any name there breaks some reader.
 
 use crate::results::tables;
-use crate::sweep::Part;
+use crate::sweep::{Part, Sweep};
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
 use crate::table::storage::{Storage, StorageError};
 use std::fmt;
@@ -27,6 +27,8 @@ const TABLES: &str = "tables";
 pub const RUN: &str = "run";
 /// Name of the manifest within it.
 const MANIFEST: &str = "manifest.json";
+/// Folder of the results directories that nobody placed elsewhere.
+pub(super) const RESULTS: &str = "results";
 /// Names of its folders.
 pub const RUN_FOLDERS: [&str; 3] = ["staging", "lock", "log"];
 
@@ -49,6 +51,12 @@ impl<'a> Layout<'a> {
     #[must_use]
     pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
         Self { storage, root: root.to_owned() }
+    }
+
+    /// The directory of a sweep, unless another is chosen.
+    #[must_use]
+    pub fn default_root(sweep: &Sweep) -> PathBuf {
+        Path::new(RESULTS).join(sweep.name())
     }
 
     /// The directory.

@@ -10,7 +10,7 @@
 //!   events.rs                 what happens, and its log
 //!   compact.rs                many parts in one file
 //!   verify/                   what is damaged, and its repair
-//! error.rs                    why a directory cannot be used or changed
+//! error.rs, missing.rs        why a directory cannot be used or changed, and which one was meant
 //! ```
 
 pub mod commit;
@@ -21,6 +21,7 @@ pub mod handle;
 pub mod layout;
 pub mod lock;
 pub mod manifest;
+mod missing;
 pub mod parts;
 pub mod tables;
 pub mod verify;

@@ -7,15 +7,14 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
-use super::read_axes::PlacedAxis;
-use super::source::{Section, Source, SweepError};
+use super::source::{Refused, Section, Source};
 use crate::model::{Shortest, Symbol};
 use crate::solver::{Resolve, Solver};
 use std::ops::RangeInclusive;
 
 /// Where each quantity is set.
 pub(super) struct Places<'a> {
-    source: Source<'a>,
+    source: &'a Source<'a>,
     set: Vec<Place>,
 }
 
@@ -27,26 +26,12 @@ struct Place {
 }
 
 impl<'a> Places<'a> {
-    pub const fn new(source: Source<'a>) -> Self {
+    pub const fn new(source: &'a Source<'a>) -> Self {
         Self { source, set: Vec::new() }
     }
 
-    /// A quantity is set in `[model]`; refused if another fixes the period already.
-    pub fn model(&mut self, quantity: Quantity, at: usize) -> Result<(), SweepError> {
-        self.set(Place { quantity, at, in_model: true })
-    }
-
-    /// Quantities are set on axes; refused if something else sets them, or the period, already.
-    pub fn axes(&mut self, axes: Vec<PlacedAxis>) -> Result<Vec<Axis>, SweepError> {
-        for PlacedAxis { axis, places } in &axes {
-            let set = axis.quantities().into_iter().zip(places);
-            set.map(|(quantity, &at)| Place { quantity, at, in_model: false }).try_for_each(|place| self.set(place))?;
-        }
-        Ok(axes.into_iter().map(|placed| placed.axis).collect())
-    }
-
-    fn set(&mut self, new: Place) -> Result<(), SweepError> {
-        let Place { quantity, at, .. } = new;
+    /// A quantity is set, in `[model]` or on an axis; refused if something else sets it, or the period, already.
+    pub fn set(&mut self, quantity: Quantity, at: usize, in_model: bool) {
         let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
         if let Some(place) = self.set.iter().find(clash) {
             let (key, other) = (quantity.key(), place.quantity.key());
@@ -57,49 +42,49 @@ impl<'a> Places<'a> {
             } else {
                 format!("{key}: fixes the period, as does {other} in {section} (line {line}); keep one")
             };
-            return Err(self.source.error(at, problem));
+            self.source.refuse(at, problem);
+        } else {
+            self.set.push(Place { quantity, at, in_model });
         }
-        self.set.push(new);
-        Ok(())
     }
 
-    /// An error where a quantity is set, or the one that bounds it, or at the head of the file.
-    fn error(&self, quantity: Quantity, problem: String) -> SweepError {
+    /// Reports a mistake where a quantity is set, or the one that bounds it, or at the head of the file.
+    fn refuse(&self, quantity: Quantity, problem: String) -> Refused {
         let bound = match quantity {
             Quantity::Parameter(Symbol::Dfs) => Quantity::Parameter(Symbol::Fs),
             Quantity::Parameter(Symbol::Ns) => Quantity::Parameter(Symbol::N),
             other => other,
         };
         let place = |quantity| self.set.iter().find(|place| place.quantity == quantity);
-        self.source.error(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
+        self.source.refuse(place(quantity).or_else(|| place(bound)).map_or(0, |place| place.at), problem)
     }
 }
 
 /// All checks of a sweep that is read.
-pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), SweepError> {
+pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
     let place_of = |key: &str| file.entry(key).map_or(0, |entry| entry.at);
     if sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len())).is_none() {
         let problem = "[axes]: 2^64 points or more; take fewer, or a sample ([axes.sobol])";
-        return Err(file.source.error(place_of("axes"), problem));
+        return Err(file.source.refuse(place_of("axes"), problem));
     }
     period(sweep, places)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
         && let Some(((quantity, problem), point)) =
             sweep.admitted().find_map(|(_, point)| Some((invalid(&point)?, point)))
     {
-        return Err(places.error(quantity, problem + &place(sweep, &point)));
+        return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
     let Some((_, first)) = sweep.admitted().next() else {
-        return Err(file.source.error(place_of("where"), "where: drops every point; relax it, or extend the axes"));
+        return Err(file.source.refuse(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
     if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
-        return Err(file.source.error(place_of("record"), problem));
+        return Err(file.source.refuse(place_of("record"), problem));
     }
     // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
     let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
     let time_step = solver.and_then(|solver| solver.entry("dt")).map_or(0, |entry| entry.at);
-    sweep.solver.check(&first.parameters).map_err(|error| file.source.error(time_step, error.to_string()))
+    sweep.solver.check(&first.parameters).map_err(|error| file.source.refuse(time_step, error.to_string()))
 }
 
 /// Drive velocity in m/s from which a slip of microseconds would be driven through: micrometres per second were meant.
@@ -137,17 +122,17 @@ impl Sweep {
 }
 
 /// A period without modulation has no effect, and a modulation without period no meaning.
-fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), SweepError> {
+fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), Refused> {
     let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
     match places.set.iter().find(|place| place.quantity.is_period()) {
         Some(place) if !is_modulated => {
             let key = place.quantity.key();
             let problem = format!("{key}: has no effect while Delta = 0; set Delta > 0 (m), or remove {key}");
-            Err(places.source.error(place.at, problem))
+            Err(places.source.refuse(place.at, problem))
         }
         None if is_modulated => {
             let problem = "Delta > 0: needs a period; set T (s), frequency (Hz) or eta";
-            Err(places.error(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
+            Err(places.refuse(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
         }
         _ => Ok(()),
     }

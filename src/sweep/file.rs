@@ -1,7 +1,8 @@
 //! Sweep files: strict TOML in, a valid [`Sweep`] out.
 //!
 //! Whatever is unknown, impossible, contradictory or without effect is refused with file, line, key, value and the way
-//! out. Contract: every job of a sweep that was read has valid parameters (see `check.rs`), and there is at least one.
+//! out. Sections and entries are all read, whatever was refused before; the sweep as a whole is checked if nothing was.
+//! Contract: every job of a sweep that was read has valid parameters (see `check.rs`), and there is at least one.
 
 use super::axes::{Axis, Column};
 use super::check::{self, Places};
@@ -10,7 +11,7 @@ use super::grid::Sweep;
 use super::job::Identity;
 use super::quantity::Quantity;
 use super::read_axes;
-use super::source::{Entry, Section, Source, SweepError};
+use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
@@ -33,25 +34,33 @@ impl Sweep {
     /// Reads the text of a sweep file; the path is for messages only.
     ///
     /// # Errors
-    /// Names the line, key and value of the first thing that is not allowed, and what is.
+    /// Names the line, key and value of all that is not allowed, and what is.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
-        let source = Source { path, text };
-        let table = source.table()?;
-        let file = Section { source, title: "the file", at: 0, table: &table };
-        file.only(&["name", "where", "model", "axes", "record", "solver"])?;
-        let name = read_name(&file.required("name", "it becomes a folder, such as name = \"fig3\"")?)?;
-        let mut places = Places::new(source);
-        let (base, period) = read_section(&file, "model", "[model]", |model| read_model(model, &mut places))?;
-        let axes = places.axes(read_section(&file, "axes", "[axes]", read_axes::read)?)?;
-        let axes = period.into_iter().chain(axes).collect();
-        let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry))?;
-        let recording = read_section(&file, "record", "[record]", read_recording)?;
-        let solver = read_section(&file, "solver", "[solver]", read_solver)?;
-        let identity = Identity::new(solver, &recording);
-        let sweep = Self { name, text: text.to_owned(), base, axes, conditions, recording, solver, identity };
-        check::whole(&sweep, &file, &places)?;
-        Ok(sweep)
+        let source = Source::new(path, text);
+        read(&source).map_err(|_| source.error())
     }
+}
+
+/// Reads all of a file, as far as it goes.
+fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
+    let table = source.table()?;
+    let file = Section { source, title: "the file", at: 0, table: &table };
+    file.only(&["name", "where", "model", "axes", "record", "solver"]).ok();
+    let name = read_name(&file);
+    let mut places = Places::new(source);
+    let model = read_section(&file, "model", "[model]", |model| read_model(model, &mut places));
+    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places));
+    let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
+    let recording = read_section(&file, "record", "[record]", read_recording);
+    let solver = read_section(&file, "solver", "[solver]", read_solver);
+    source.passed()?;
+    let ((base, period), recording, solver) = (model?, recording?, solver?);
+    let axes = period.into_iter().chain(axes?).collect();
+    let identity = Identity::new(solver, &recording);
+    let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
+    let sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity };
+    check::whole(&sweep, &file, &places)?;
+    Ok(sweep)
 }
 
 /// Reads a table of the file, or takes the default if there is none.
@@ -59,15 +68,24 @@ fn read_section<T: Default>(
     file: &Section<'_>,
     key: &str,
     title: &'static str,
-    read: impl FnOnce(&Section<'_>) -> Result<T, SweepError>,
-) -> Result<T, SweepError> {
+    read: impl FnOnce(&Section<'_>) -> Result<T, Refused>,
+) -> Result<T, Refused> {
     match file.entry(key) {
         None => Ok(T::default()),
         Some(entry) => read(&entry.section(title).ok_or_else(|| entry.must_be(&format!("a table {title}")))?),
     }
 }
 
-fn read_name(entry: &Entry<'_>) -> Result<String, SweepError> {
+fn read_name(file: &Section<'_>) -> Result<String, Refused> {
+    // A name within a section is refused as misplaced; it is not missing, too.
+    let misplaced =
+        |table: Entry<'_>| Some(table.section("")?.entry("name")?.unknown(&format!("[{}]", table.key), &[]));
+    if file.entry("name").is_none()
+        && let Some(refused) = file.entries().into_iter().find_map(misplaced)
+    {
+        return Err(refused);
+    }
+    let entry = file.required("name", "it becomes a folder, such as name = \"fig3\"")?;
     let allowed = |name: &&str| {
         let characters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         (1..=MAX_NAME).contains(&name.len()) && name.chars().all(characters) && !name.starts_with('-')
@@ -79,13 +97,13 @@ fn read_name(entry: &Entry<'_>) -> Result<String, SweepError> {
 }
 
 /// Reads the parameters, and η or the frequency as an axis of one value.
-fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameters, Option<Axis>), SweepError> {
+fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameters, Option<Axis>), Refused> {
     let keys: Vec<&str> = Quantity::all().map(Quantity::key).collect();
     let (mut parameters, mut period) = (Parameters::default(), None);
-    for entry in model.entries() {
+    all(model.entries().iter().map(|entry| {
         let quantity = Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
-        let value = read_axes::read_value(&entry, quantity)?;
-        places.model(quantity, entry.at)?;
+        places.set(quantity, entry.at, true);
+        let value = read_axes::read_value(entry, quantity)?;
         match quantity {
             Quantity::Parameter(symbol) => {
                 parameters.put(symbol, value).ok_or_else(|| entry.must_be(symbol.description().allowed))?;
@@ -94,62 +112,54 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameter
                 period = Axis::table(vec![Column { quantity, values: vec![value] }]).ok();
             }
         }
-    }
+        Ok(())
+    }))?;
     Ok((parameters, period))
 }
 
-fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, SweepError> {
-    entry
-        .list()
-        .unwrap_or_else(|| vec![*entry])
-        .iter()
-        .map(|entry| {
-            let text = entry.word().ok_or_else(|| {
-                entry.must_be("a condition in quotes, or a list of them, such as where = \"frequency < 500\"")
-            })?;
-            Condition::parse(text).map_err(|error| entry.refuse(error.to_string()))
-        })
-        .collect()
+fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, Refused> {
+    all(entry.list().unwrap_or_else(|| vec![*entry]).iter().map(|entry| {
+        let text = entry.word().ok_or_else(|| {
+            entry.must_be("a condition in quotes, or a list of them, such as where = \"frequency < 500\"")
+        })?;
+        Condition::parse(text).map_err(|error| entry.refuse(error.to_string()))
+    }))
 }
 
-fn read_recording(record: &Section<'_>) -> Result<Recording, SweepError> {
+fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
     let keys = RecordingKey::ALL.map(RecordingKey::key);
     let mut recording = Recording::default();
-    for entry in record.entries() {
+    all(record.entries().iter().map(|entry| {
         let key = RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;
         let value = entry.value().and_then(|value| key.checked(value));
-        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(key.description().allowed))?;
-    }
+        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(key.description().allowed))
+    }))?;
     Ok(recording)
 }
 
-fn read_solver(solver: &Section<'_>) -> Result<Solver, SweepError> {
+fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
     let method = solver.entry("method");
     match method.map_or(Some("event-driven"), |method| method.word()) {
         Some("event-driven") => {
-            solver.only(&["method", "tolerance", "resolve"])?;
-            let Solver::EventDriven { mut tolerance, mut resolve } = Solver::default() else {
+            solver.only(&["method", "tolerance", "resolve"]).ok();
+            let Solver::EventDriven { tolerance, resolve } = Solver::default() else {
                 unreachable!("the default is event-driven")
             };
-            if let Some(entry) = solver.entry("tolerance") {
-                tolerance = match entry.value() {
-                    Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => tolerance,
-                    _ => {
-                        let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
-                        return Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")));
-                    }
-                };
-            }
-            if let Some(entry) = solver.entry("resolve") {
-                resolve = entry
-                    .word()
-                    .and_then(Resolve::from_word)
-                    .ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))?;
-            }
-            Ok(Solver::EventDriven { tolerance, resolve })
+            let tolerance = solver.entry("tolerance").map_or(Ok(tolerance), |entry| match entry.value() {
+                Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => Ok(tolerance),
+                _ => {
+                    let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+                    Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")))
+                }
+            });
+            let resolve = solver.entry("resolve").map_or(Ok(resolve), |entry| {
+                let word = entry.word().and_then(Resolve::from_word);
+                word.ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))
+            });
+            Ok(Solver::EventDriven { tolerance: tolerance?, resolve: resolve? })
         }
         Some("fixed-step") => {
-            solver.only(&["method", "dt"])?;
+            solver.only(&["method", "dt"]).ok();
             let time_step = solver.required("dt", "the fixed step in s, such as dt = 1e-6")?.positive("s")?;
             Ok(Solver::FixedStep { time_step })
         }

@@ -14,7 +14,7 @@
 //! (V. R. Pratt, POPL 1973).
 
 use super::quantity::{Point, Quantity};
-use super::source::nearest;
+use super::source::hint;
 use std::cmp::Ordering;
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
@@ -240,7 +240,7 @@ impl Reader<'_> {
                 Some(quantity) => Expression::Quantity(quantity),
                 None => {
                     let numbers = Quantity::all().filter(|quantity| *quantity != Quantity::BREAK_ON);
-                    let hint = nearest(text, &numbers.map(Quantity::key).collect::<Vec<_>>());
+                    let hint = hint(text, &numbers.map(Quantity::key).collect::<Vec<_>>());
                     return Err(self.error(format!("\"{text}\" is not a known quantity; {hint}")));
                 }
             },

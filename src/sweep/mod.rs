@@ -29,4 +29,5 @@ pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use source::SweepError;
+pub(crate) use source::nearest;
+pub use source::{Mistake, SweepError};

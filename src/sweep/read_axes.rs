@@ -9,12 +9,13 @@
 //! ```
 //!
 //! Axes stand in the order of the file; the last moves fastest. A range of a whole-number quantity is rounded to whole
-//! numbers.
+//! numbers. An axis reports its first mistake, a zip or a sample that of each column.
 
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
+use super::check::Places;
 use super::quantity::Quantity;
 use super::samples::{Range, Sample};
-use super::source::{Entry, Section, SweepError};
+use super::source::{Entry, Refused, Section, all};
 use crate::model::{Shortest, Value};
 
 const RANGE_FORMS: &str = "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
@@ -22,59 +23,49 @@ const AXIS_FORMS: &str =
     "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
-/// An axis, and for each quantity on it the byte of the text that sets it.
-pub(super) struct PlacedAxis {
-    pub axis: Axis,
-    pub places: Vec<usize>,
-}
-
-type TableReader = fn(&Section<'_>) -> Result<PlacedAxis, SweepError>;
+type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
 /// Reads all axes.
-pub(super) fn read(section: &Section<'_>) -> Result<Vec<PlacedAxis>, SweepError> {
-    let mut axes = Vec::new();
-    for entry in section.entries() {
+pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
+    let axes = all(section.entries().iter().map(|entry| {
         let (title, read): (_, TableReader) = match entry.key {
             "zip" => ("[axes.zip]", read_zip),
-            "sobol" => ("[axes.sobol]", |table| read_sample(table, Sample::Sobol)),
-            "latin" => ("[axes.latin]", |table| read_sample(table, Sample::Latin)),
-            _ => {
-                axes.push(read_single(&entry)?);
-                continue;
-            }
+            "sobol" => ("[axes.sobol]", |table, places| read_sample(table, Sample::Sobol, places)),
+            "latin" => ("[axes.latin]", |table, places| read_sample(table, Sample::Latin, places)),
+            _ => return Ok(vec![read_single(entry, places)?]),
         };
-        for table in tables(&entry, title)? {
-            axes.push(read(&table)?);
-        }
-    }
-    Ok(axes)
+        all(tables(entry, title)?.iter().map(|table| read(table, places)))
+    }));
+    Ok(axes?.into_iter().flatten().collect())
 }
 
 /// One table, or the tables of a list.
-fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>, SweepError> {
+fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>, Refused> {
     let entries = entry.list().unwrap_or_else(|| vec![*entry]);
     let table = |entry: &Entry<'a>| {
         entry.section(title).ok_or_else(|| entry.must_be(&format!("a table {title} or several, [{title}]")))
     };
-    entries.iter().map(table).collect()
+    all(entries.iter().map(table))
 }
 
-fn known(entry: &Entry<'_>, title: &str, also: &[&'static str]) -> Result<Quantity, SweepError> {
-    Quantity::from_key(entry.key).ok_or_else(|| {
+/// The quantity that an entry sets.
+fn known(entry: &Entry<'_>, title: &str, also: &[&'static str], places: &mut Places<'_>) -> Result<Quantity, Refused> {
+    let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
         let allowed: Vec<&str> = Quantity::all().map(Quantity::key).chain(also.iter().copied()).collect();
         entry.unknown(title, &allowed)
-    })
+    })?;
+    places.set(quantity, entry.at, false);
+    Ok(quantity)
 }
 
-fn read_single(entry: &Entry<'_>) -> Result<PlacedAxis, SweepError> {
-    let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"])?;
-    let places = vec![entry.at];
+fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
+    let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"], places)?;
     if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
-        return Ok(PlacedAxis { axis: Axis::Counted { symbol, first, count }, places });
+        return Ok(Axis::Counted { symbol, first, count });
     }
     let values = read_values(entry, quantity)?;
     let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
-    let axis = Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
+    Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
         let (earlier, later) = (earlier + 1, later + 1);
         let problem = format!(
@@ -82,13 +73,12 @@ fn read_single(entry: &Entry<'_>) -> Result<PlacedAxis, SweepError> {
              keep one, or take fewer points",
             entry.key
         );
-        entry.source.error(at, problem)
-    })?;
-    Ok(PlacedAxis { axis, places })
+        entry.source.refuse(at, problem)
+    })
 }
 
 /// Reads the values of a quantity, each with the byte of the text that sets it.
-fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, SweepError> {
+fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -121,7 +111,7 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
 }
 
 /// Reads the first of counted values and their number; none if the entry has another form.
-fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, SweepError> {
+fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)>, Refused> {
     let Some(table) = entry.section("an axis") else { return Ok(None) };
     let Some(count) = table.entry("count") else { return Ok(None) };
     table.only(&["count", "first"])?;
@@ -135,14 +125,14 @@ fn read_count(entry: &Entry<'_>, quantity: Quantity) -> Result<Option<(u64, u64)
     for value in [first, first + count - 1] {
         if quantity.checked(Value::Count(value)).is_none() {
             let problem = format!("{} = {value}: must be {}; use first and count", entry.key, quantity.allowed());
-            return Err(entry.source.error(entry.at, problem));
+            return Err(entry.source.refuse(entry.at, problem));
         }
     }
     Ok(Some((first, count)))
 }
 
 /// Reads one value of a quantity, as a list or `[model]` gives it.
-pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value, SweepError> {
+pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value, Refused> {
     let hint = if entry.node.get_ref().is_array() || entry.node.get_ref().is_table() {
         "; several values belong in [axes]"
     } else {
@@ -154,7 +144,7 @@ pub(super) fn read_value(entry: &Entry<'_>, quantity: Quantity) -> Result<Value,
         .ok_or_else(|| entry.must_be(&format!("{}{hint}", quantity.allowed())))
 }
 
-fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, SweepError> {
+fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, Refused> {
     let (entry, logarithmic) = match (table.entry("linear"), table.entry("log")) {
         (Some(entry), None) => (entry, false),
         (None, Some(entry)) => (entry, true),
@@ -184,67 +174,67 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
 }
 
 /// A value within a range, whole where the quantity is.
-fn ranged(entry: &Entry<'_>, quantity: Quantity, value: f64) -> Result<Value, SweepError> {
+fn ranged(entry: &Entry<'_>, quantity: Quantity, value: f64) -> Result<Value, Refused> {
     let value = if quantity.is_count() { value.round() } else { value };
     // Between two allowed ends everything is allowed; a quantity with a gap would be refused here.
     quantity.checked(Value::Real(value)).ok_or_else(|| {
         let problem = format!("{} = {}: must be {}", entry.key, Shortest(value), quantity.allowed());
-        entry.source.error(entry.at, problem)
+        entry.source.refuse(entry.at, problem)
     })
 }
 
-fn read_zip(table: &Section<'_>) -> Result<PlacedAxis, SweepError> {
-    let mut columns: Vec<(Column, usize)> = Vec::new();
-    for entry in table.entries() {
-        let quantity = known(&entry, table.title, &[])?;
-        let values: Vec<Value> = read_values(&entry, quantity)?.into_iter().map(|(value, _)| value).collect();
-        if let Some((first, _)) = columns.first().filter(|(first, _)| first.values.len() != values.len()) {
-            let (key, expected) = (first.quantity.key(), first.values.len());
-            let problem =
-                format!("has {} values, {key} has {expected}: columns of a zip have equal length", values.len());
-            return Err(entry.refuse(problem));
-        }
-        columns.push((Column { quantity, values }, entry.at));
-    }
-    if columns.len() < 2 {
+fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
+    let entries = table.entries();
+    let columns = all(entries.iter().map(|entry| {
+        let quantity = known(entry, table.title, &[], places)?;
+        let values = read_values(entry, quantity)?.into_iter().map(|(value, _)| value).collect();
+        Ok(Column { quantity, values })
+    }))?;
+    let [first, _, ..] = columns.as_slice() else {
         let problem = "zip: needs at least two columns that move together; a single one is an axis of its own";
-        return Err(table.source.error(table.at, problem));
+        return Err(table.source.refuse(table.at, problem));
+    };
+    let (key, expected) = (first.quantity.key(), first.values.len());
+    let lengths = entries.iter().zip(columns.iter().map(|column| column.values.len()));
+    if let Some((entry, length)) = lengths.into_iter().find(|(_, length)| *length != expected) {
+        let problem = format!("has {length} values, {key} has {expected}: columns of a zip have equal length");
+        return Err(entry.refuse(problem));
     }
-    placed(table, columns)
+    of_columns(table, columns)
 }
 
-fn read_sample(table: &Section<'_>, sample: Sample) -> Result<PlacedAxis, SweepError> {
+fn read_sample(table: &Section<'_>, sample: Sample, places: &mut Places<'_>) -> Result<Axis, Refused> {
     const SETTINGS: [&str; 2] = ["points", "seed"];
-    let points = table.required("points", "the number of points of the sample")?.count(1, sample.max_points())?;
-    let seed = table.entry("seed").map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)))?;
-    let [points, seed] = [points, seed].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
-    let mut columns: Vec<(Column, usize)> = Vec::new();
-    for (dimension, entry) in (0..).zip(table.entries().into_iter().filter(|entry| !SETTINGS.contains(&entry.key))) {
-        let quantity = known(&entry, table.title, &SETTINGS)?;
+    let points = table.required("points", "the number of points of the sample");
+    let points = points.and_then(|points| points.count(1, sample.max_points()));
+    let seed = table.entry("seed").map_or(Ok(0), |seed| seed.count(0, u64::from(u32::MAX)));
+    let entries: Vec<Entry<'_>> = table.entries().into_iter().filter(|entry| !SETTINGS.contains(&entry.key)).collect();
+    let ranges = all(entries.iter().map(|entry| {
+        let quantity = known(entry, table.title, &SETTINGS, places)?;
         let form = entry.section("a range of a sample").ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
         form.only(&["linear", "log"])?;
-        let range = read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
-        let coordinates = sample.coordinates(dimension, points, seed);
-        let values =
-            coordinates.into_iter().map(|x| ranged(&entry, quantity, range.at(x))).collect::<Result<_, _>>()?;
-        columns.push((Column { quantity, values }, entry.at));
-    }
-    if columns.is_empty() {
+        Ok((entry, quantity, read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?))
+    }))?;
+    if ranges.is_empty() {
         let problem =
             format!("{}: needs a range for at least one quantity, such as V0 = {{ log = [1e-5, 1e-4] }}", table.title);
-        return Err(table.source.error(table.at, problem));
+        return Err(table.source.refuse(table.at, problem));
     }
-    placed(table, columns)
+    let [points, seed] = [points?, seed?].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
+    let columns = all((0..).zip(ranges).map(|(dimension, (entry, quantity, range))| {
+        let coordinates = sample.coordinates(dimension, points, seed);
+        let values = coordinates.into_iter().map(|x| ranged(entry, quantity, range.at(x))).collect::<Result<_, _>>()?;
+        Ok(Column { quantity, values })
+    }))?;
+    of_columns(table, columns)
 }
 
 /// The axis of a zip or a sample.
-fn placed(table: &Section<'_>, columns: Vec<(Column, usize)>) -> Result<PlacedAxis, SweepError> {
-    let (columns, places) = columns.into_iter().unzip();
-    let axis = Axis::table(columns).map_err(|Repeated { earlier, later }| {
+fn of_columns(table: &Section<'_>, columns: Vec<Column>) -> Result<Axis, Refused> {
+    Axis::table(columns).map_err(|Repeated { earlier, later }| {
         let (title, earlier, later) = (table.title, earlier + 1, later + 1);
         let problem =
             format!("{title}: row {later} repeats row {earlier} (counted from 1); keep one, or take fewer points");
-        table.source.error(table.at, problem)
-    })?;
-    Ok(PlacedAxis { axis, places })
+        table.source.refuse(table.at, problem)
+    })
 }

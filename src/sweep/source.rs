@@ -1,11 +1,15 @@
 //! The text of a sweep file: sections, entries and values that know their place, and errors that name it.
 //!
+//! An error is reported where it is made, and [`Refused`] says so from there on: a reader that meets one goes on with
+//! what does not depend on it, and all errors of a file are reported at once.
+//!
 //! Reads TOML with spans (crate `toml`), so that every refusal says file, line, key and value as written. Not by serde's
 //! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
 //! value as written nor the way out.
 
 use crate::model::Value;
 use crate::model::value::FieldType;
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -23,41 +27,102 @@ pub enum SweepError {
         source: std::io::Error,
     },
     /// The file does not say what to run.
-    #[error("{}:{line}: {problem}", .path.display())]
+    #[error("{}", listed(path, mistakes))]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// Line, counted from 1.
-        line: usize,
-        /// Key, value, what is allowed and the way out.
-        problem: String,
+        /// At least one, in the order of their lines.
+        mistakes: Vec<Mistake>,
     },
+}
+
+/// A mistake in a sweep file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Key, value, what is allowed and the way out.
+    pub problem: String,
 }
 
 /// Longest value that an error message shows, in characters.
 const MAX_EXCERPT: usize = 40;
+/// Most mistakes that an error message shows.
+const MAX_SHOWN: usize = 10;
 
-/// A file and its text.
-#[derive(Clone, Copy)]
+/// One mistake on its line, several below each other.
+fn listed(path: &Path, mistakes: &[Mistake]) -> String {
+    let path = path.display();
+    let shown = |Mistake { line, problem }: &Mistake| format!("{path}:{line}: {problem}");
+    if let [mistake] = mistakes {
+        return shown(mistake);
+    }
+    let heading = format!("{path}: has {} mistakes:", mistakes.len());
+    let more = mistakes.len().checked_sub(MAX_SHOWN).filter(|more| *more > 0).map(|more| format!("and {more} more"));
+    let lines = std::iter::once(heading).chain(mistakes.iter().take(MAX_SHOWN).map(shown)).chain(more);
+    lines.collect::<Vec<_>>().join("\n  ")
+}
+
+/// Something was refused, and its [`Source`] has the mistake.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refused(());
+
+/// Reads everything, so that all mistakes are reported, whether or not one of them makes the whole useless.
+pub(super) fn all<T>(read: impl Iterator<Item = Result<T, Refused>>) -> Result<Vec<T>, Refused> {
+    read.collect::<Vec<_>>().into_iter().collect()
+}
+
+/// A file, its text, and the mistakes that were found in it.
 pub(super) struct Source<'a> {
-    pub path: &'a Path,
+    path: &'a Path,
     pub text: &'a str,
+    /// Each with the byte of the text that it is about.
+    mistakes: RefCell<Vec<(usize, String)>>,
 }
 
 impl<'a> Source<'a> {
-    /// An error at a byte of the text.
-    pub fn error(&self, at: usize, problem: impl Into<String>) -> SweepError {
-        SweepError::Invalid { path: self.path.to_owned(), line: self.line(at), problem: problem.into() }
+    pub const fn new(path: &'a Path, text: &'a str) -> Self {
+        Self { path, text, mistakes: RefCell::new(Vec::new()) }
+    }
+
+    /// Reports a mistake at a byte of the text.
+    pub fn refuse(&self, at: usize, problem: impl Into<String>) -> Refused {
+        self.mistakes.borrow_mut().push((at, problem.into()));
+        Refused(())
+    }
+
+    /// Refused if anything was.
+    pub fn passed(&self) -> Result<(), Refused> {
+        if self.mistakes.borrow().is_empty() { Ok(()) } else { Err(Refused(())) }
+    }
+
+    /// All that was refused.
+    pub fn error(&self) -> SweepError {
+        let mut mistakes = self.mistakes.take();
+        mistakes.sort_unstable();
+        // A misspelt key is met twice where it stands for one that must be there.
+        mistakes.dedup();
+        let (mut line, mut start) = (1, 0);
+        let placed = mistakes.into_iter().map(|(at, problem)| {
+            line += self.line_ends(start..at);
+            start = at;
+            Mistake { line, problem }
+        });
+        SweepError::Invalid { path: self.path.to_owned(), mistakes: placed.collect() }
     }
 
     /// The line of a byte of the text, counted from 1.
     pub fn line(&self, at: usize) -> usize {
-        let before = &self.text.as_bytes()[..at.min(self.text.len())];
-        before.split(|byte| *byte == b'\n').count()
+        1 + self.line_ends(0..at)
+    }
+
+    fn line_ends(&self, stretch: Range<usize>) -> usize {
+        self.text.as_bytes().get(stretch).unwrap_or_default().split(|byte| *byte == b'\n').count() - 1
     }
 
     /// The tables of the text.
-    pub fn table(&self) -> Result<DeTable<'a>, SweepError> {
+    pub fn table(&self) -> Result<DeTable<'a>, Refused> {
+        // The errors of a parser that goes on after one mostly follow from it.
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| {
             let span = error.span().unwrap_or(self.text.len()..self.text.len());
             // The end of the file lies on its last line, not below it.
@@ -68,7 +133,7 @@ impl<'a> Source<'a> {
                 }
                 written => written,
             };
-            self.error(at, format!("{written}: {}; the file must be TOML 1.0", error.message()))
+            self.refuse(at, format!("{written}: {}; the file must be TOML 1.0", error.message()))
         })
     }
 
@@ -86,7 +151,7 @@ impl<'a> Source<'a> {
 
 /// A table of the file under its name.
 pub(super) struct Section<'a> {
-    pub source: Source<'a>,
+    pub source: &'a Source<'a>,
     /// As errors name it: `[model]`, `the file`.
     pub title: &'static str,
     /// Byte of its heading.
@@ -110,24 +175,25 @@ impl<'a> Section<'a> {
         self.entries().into_iter().find(|entry| entry.key == key)
     }
 
-    /// An entry that must be there; `need` says what it is for.
-    pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, SweepError> {
-        self.entry(key).ok_or_else(|| self.source.error(self.at, format!("{key} is missing in {}: {need}", self.title)))
+    /// An entry that must be there, unless a misspelt one was meant; `need` says what it is for.
+    pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, Refused> {
+        self.entry(key).ok_or_else(|| match self.entries().iter().find(|entry| nearest(entry.key, &[key]).is_some()) {
+            Some(misspelt) => misspelt.unknown(self.title, &[key]),
+            None => self.source.refuse(self.at, format!("{key} is missing in {}: {need}", self.title)),
+        })
     }
 
     /// Refuses keys that are not allowed here.
-    pub fn only(&self, allowed: &[&str]) -> Result<(), SweepError> {
-        match self.entries().into_iter().find(|entry| !allowed.contains(&entry.key)) {
-            None => Ok(()),
-            Some(entry) => Err(entry.unknown(self.title, allowed)),
-        }
+    pub fn only(&self, allowed: &[&str]) -> Result<(), Refused> {
+        let unknown = self.entries().into_iter().filter(|entry| !allowed.contains(&entry.key));
+        all(unknown.map(|entry| Err(entry.unknown(self.title, allowed)))).map(|_: Vec<()>| ())
     }
 }
 
 /// A key and its value, or a key and one value of its list.
 #[derive(Clone, Copy)]
 pub(super) struct Entry<'a> {
-    pub source: Source<'a>,
+    pub source: &'a Source<'a>,
     pub key: &'a str,
     /// Byte of the text that errors point to.
     pub at: usize,
@@ -135,29 +201,29 @@ pub(super) struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// An error about this value.
-    pub fn refuse(&self, problem: impl AsRef<str>) -> SweepError {
+    /// Reports a mistake in this value.
+    pub fn refuse(&self, problem: impl AsRef<str>) -> Refused {
         let problem = problem.as_ref();
         let value = match self.node.get_ref() {
             DeValue::Table(_) => String::new(),
             _ => format!(" = {}", self.source.excerpt(self.node.span())),
         };
-        self.source.error(self.at, format!("{}{value}: {problem}", self.key))
+        self.source.refuse(self.at, format!("{}{value}: {problem}", self.key))
     }
 
-    /// An error that says what is allowed.
-    pub fn must_be(&self, allowed: &str) -> SweepError {
+    /// Reports what is allowed.
+    pub fn must_be(&self, allowed: &str) -> Refused {
         self.refuse(format!("must be {allowed}"))
     }
 
-    /// An error about a key that means nothing here.
-    pub fn unknown(&self, title: &str, allowed: &[&str]) -> SweepError {
+    /// Reports a key that means nothing here.
+    pub fn unknown(&self, title: &str, allowed: &[&str]) -> Refused {
         let hint = match self.key {
             "name" | "where" => format!("{} must stand above the first [section]", self.key),
             key if title == "the file" && super::quantity::Quantity::from_key(key).is_some() => {
                 "parameters belong in [model] or [axes]".to_owned()
             }
-            key => nearest(key, allowed),
+            key => hint(key, allowed),
         };
         self.refuse(format!("unknown key in {title}; {hint}"))
     }
@@ -193,13 +259,13 @@ impl<'a> Entry<'a> {
     }
 
     /// A finite number > 0.
-    pub fn positive(&self, unit: &str) -> Result<f64, SweepError> {
+    pub fn positive(&self, unit: &str) -> Result<f64, Refused> {
         let number = self.value().and_then(Value::number).filter(|number| *number > 0.0 && number.is_finite());
         number.ok_or_else(|| self.must_be(&format!("a finite number > 0, in {unit}")))
     }
 
     /// A whole number within bounds.
-    pub fn count(&self, min: u64, max: u64) -> Result<u64, SweepError> {
+    pub fn count(&self, min: u64, max: u64) -> Result<u64, Refused> {
         match self.value().and_then(u64::from_value) {
             Some(count) if (min..=max).contains(&count) => Ok(count),
             _ => Err(self.must_be(&format!("a whole number from {min} to {max}"))),
@@ -208,13 +274,18 @@ impl<'a> Entry<'a> {
 }
 
 /// The hint for an unknown word: the nearest known one, or all.
-pub(super) fn nearest(word: &str, known: &[&str]) -> String {
-    let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
-    // Half of a short word, two letters of a long one.
-    let max = (word.chars().count() / 2).min(2);
-    let near = known.iter().filter(|candidate| distance(candidate) <= max);
-    match near.min_by_key(|candidate| distance(candidate)) {
+pub(super) fn hint(word: &str, known: &[&str]) -> String {
+    match nearest(word, known) {
         Some(candidate) => format!("did you mean {candidate}?"),
         None => format!("allowed are {}", known.join(", ")),
     }
+}
+
+/// The known word that was probably meant by an unknown one.
+pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
+    let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
+    // Half of a short word, two letters of a long one.
+    let max = (word.chars().count() / 2).min(2);
+    let near = known.iter().copied().filter(|candidate| distance(candidate) <= max);
+    near.min_by_key(|candidate| distance(candidate))
 }

@@ -86,6 +86,22 @@ fn bad_sweep_files_are_refused_by_plan_and_run_and_nothing_is_written() {
 }
 
 #[test]
+fn all_errors_of_a_sweep_file_are_reported_at_once() {
+    let folder = Folder::new();
+    folder.write("bad.toml", "[record]\nslips = 0\n[model]\nN = 0\nM = 0\n");
+    let expected = "\
+error: bad.toml: has 4 mistakes:
+  bad.toml:1: name is missing in the file: it becomes a folder, such as name = \"fig3\"
+  bad.toml:2: slips = 0: must be a whole number from 1 to 2^53 - 1
+  bad.toml:4: N = 0: must be a whole number from 1 to 100000
+  bad.toml:5: M = 0: must be a finite number > 0, in kg
+";
+    for command in ["plan bad.toml", "plan bad.toml --json", "run bad.toml"] {
+        assert_refused(&folder, command, &[expected]);
+    }
+}
+
+#[test]
 fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
     let folder = Folder::new();
     folder.write("good.toml", GOOD);
@@ -94,6 +110,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
     std::fs::create_dir_all(folder.path("theirs/data")).unwrap();
     std::fs::create_dir(folder.path("empty")).unwrap();
     folder.ends(0, "run good.toml --out good");
+    folder.ends(0, "run good.toml --out results/usual --no-reduce");
     folder.write("other-model.toml", &GOOD.replace("N = 3", "N = 4"));
     folder.write("other-recording.toml", &GOOD.replace("slips = 2", "slips = 3"));
     folder.write("other-solver.toml", &format!("{GOOD}[solver]\ntolerance = 1e-7\n"));
@@ -119,13 +136,23 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("run good.toml --shard half", &["--shard", "1 <= K <= N, such as 2/8"]),
         ("run good.toml --fast", &["--fast"]),
         // Directories that belong to something else.
-        ("run good.toml --out theirs", &["theirs: is not empty and no results directory", "choose another with --out"]),
-        ("run good.toml --out plain.txt", &["plain.txt: is not empty and no results directory", "--out"]),
+        (
+            "run good.toml --out theirs",
+            &["theirs: is neither empty nor a results directory", "choose another with --out"],
+        ),
+        ("run good.toml --out plain.txt", &["plain.txt: is neither empty nor a results directory", "--out"]),
         ("run other-model.toml --out good", &["good: holds other results", "model.N: 3 -> 4", "undo the change"]),
         ("run other-recording.toml --out good", &["record.slips: 2 -> 3", "choose another directory with --out"]),
         ("run other-solver.toml --out good", &["solver.tolerance: 0.001 -> 1e-7", "--out"]),
         ("status", &["<DIR>"]),
-        ("status missing", &["missing: is no results directory", "such as results/"]),
+        ("status missing", &["missing: there is no such directory; name one that a run made, such as results/fig3"]),
+        ("status godo", &["godo: there is no such directory; did you mean good?"]),
+        ("reduce ./results/godo/", &["there is no such directory; name one"]),
+        ("verify usal", &["usal: there is no such directory; did you mean results/usual?"]),
+        ("verify results/usal", &["results/usal: there is no such directory; did you mean results/usual?"]),
+        ("status results", &["results: is no results directory, but holds some: results/usual"]),
+        ("plot .", &[".: is no results directory, but holds some: ./good"]),
+        ("status good.toml", &["good.toml: is a sweep file; name its results directory, by default results/good"]),
         ("status theirs", &["theirs: is no results directory", "such as results/"]),
         ("status plain.txt", &["plain.txt: is no results directory", "such as results/"]),
         ("status good --yaml", &["--yaml"]),
@@ -165,6 +192,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
         ("simulate --set V0=1e-4 --set V0=2e-4", &["--set V0=2e-4", "is set before; keep one"]),
         ("simulate --set Delta=1e-6", &["Delta > 0", "needs a period; set T"]),
         ("simulate --set eta=2", &["eta: has no effect while Delta = 0", "set Delta > 0"]),
+        ("simulate --set V0=fast --slips 0", &["in the flags:\n  V0 = \"fast\": must", "\n  slips = 0: must be"]),
         ("simulate --set break_on=force", &["break_on = \"force\"", "\"tension\""]),
         // Its length and its solver.
         ("simulate --slips 0", &["slips = 0", "must be a whole number from 1"]),

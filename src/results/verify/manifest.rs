@@ -3,9 +3,10 @@
 use super::{Problem, Remedy};
 use crate::results::commit::alone;
 use crate::results::error::{ErrorKind, ResultsError};
-use crate::results::handle::{Results, no_results};
+use crate::results::handle::Results;
 use crate::results::layout::{Layout, TableFile, part_name};
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
+use crate::results::missing::no_results;
 use crate::results::tables;
 use crate::sweep::{Extension, Part};
 use crate::table::checksum;
@@ -79,7 +80,7 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
             }
             Some(problem) => problem,
         },
-        Ok(None) if copies.is_empty() => return Err(no_results(layout.root())),
+        Ok(None) if copies.is_empty() => return Err(no_results(layout)),
         Ok(None) => "it is missing".to_owned(),
         Err(error) if error.kind == ErrorKind::Damaged => error.problem,
         Err(error) => return Err(error),

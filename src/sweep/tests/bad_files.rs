@@ -1,11 +1,11 @@
 //! Sweep files that are refused: the line, the key with its value, and words of the way out.
 
-use super::super::{Sweep, SweepError};
+use super::super::{Mistake, Sweep, SweepError};
 use std::path::Path;
 
-fn refusal(text: &str) -> (usize, String) {
+fn refused(text: &str) -> Vec<Mistake> {
     match Sweep::parse(text, Path::new("bad.toml")) {
-        Err(SweepError::Invalid { line, problem, .. }) => (line, problem),
+        Err(SweepError::Invalid { mistakes, .. }) => mistakes,
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("must be refused:\n{text}"),
     }
@@ -13,8 +13,9 @@ fn refusal(text: &str) -> (usize, String) {
 
 fn assert_refused(table: &[(&str, usize, &[&str])]) {
     for (text, line, words) in table {
-        let (found, problem) = refusal(text);
-        assert_eq!(found, *line, "{text}\n{problem}");
+        let mistakes = refused(text);
+        let [Mistake { line: found, problem }] = mistakes.as_slice() else { panic!("{text}\n{mistakes:?}") };
+        assert_eq!(found, line, "{text}\n{problem}");
         for word in *words {
             assert!(problem.contains(word), "{word:?} is missing in: {problem}\n{text}");
         }
@@ -52,7 +53,11 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
         ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"", 2, &["dt is missing", "dt = 1e-6"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed\"\ndt = 1", 3, &["\"fixed\"", "fixed-step"]),
         ("name = \"a\"\n[solver]\ndt = 1e-6", 3, &["dt = 1e-6", "allowed are method, tolerance"]),
-        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ntolerance = 1", 4, &["tolerance = 1", "method, dt"]),
+        (
+            "name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ntolerance = 1\ndt = 1e-6",
+            4,
+            &["tolerance = 1", "method, dt"],
+        ),
         ("name = \"a\"\n[axes.sobol]\nV0 = { log = [1, 2] }", 2, &["points is missing", "[axes.sobol]"]),
         ("name = \"a\"\n[axes.sobol]\npoints = 4\nseeds = 1", 4, &["seeds = 1", "did you mean seed?"]),
     ]);
@@ -156,4 +161,101 @@ fn a_missing_file_is_named() {
 fn an_error_reads_file_line_key_value_and_what_is_allowed() {
     let error = Sweep::parse("name = \"fig3\"\n[model]\nDelta = 1e-6\nT = -0.01", Path::new("sweeps/fig3.toml"));
     assert_eq!(error.unwrap_err().to_string(), "sweeps/fig3.toml:4: T = -0.01: must be a finite number > 0, in s");
+}
+
+/// Errors in every section, out of the order in which the sections are read; those of the whole are not among them.
+const MANY: &str = "\
+nmae = \"a\"
+where = [\"V0 < \", \"T < 1\", \"v < 1\"]
+[solver]
+tolerance = 1
+resolve = \"fast\"
+[record]
+slips = 0
+slps = 3
+[model]
+T = -1
+gama = 3
+[axes]
+eta = [1, 2]
+V0 = { log = [1, 2], point = 3 }
+";
+
+#[test]
+fn all_errors_of_a_file_are_reported_at_once_in_the_order_of_its_lines() {
+    let expected = [
+        (1, "nmae = \"a\": unknown key in the file; did you mean name?"),
+        (2, "where = \"V0 < \": at character 6"),
+        (2, "where = \"v < 1\": at character 1"),
+        (4, "tolerance = 1: must be"),
+        (5, "resolve = \"fast\": must be"),
+        (7, "slips = 0: must be"),
+        (8, "slps = 3: unknown key in [record]; did you mean slips?"),
+        (10, "T = -1: must be"),
+        (11, "gama = 3: unknown key in [model]; did you mean gamma?"),
+        (13, "eta: fixes the period, as does T in [model] (line 10)"),
+        (14, "point = 3: unknown key in an axis; did you mean points?"),
+    ];
+    let mistakes = refused(MANY);
+    for (Mistake { line, problem }, (expected_line, words)) in mistakes.iter().zip(expected) {
+        assert!(
+            *line == expected_line && problem.starts_with(words),
+            "{line}: {problem}, not {expected_line}: {words}"
+        );
+    }
+    assert_eq!(mistakes.len(), expected.len());
+}
+
+#[test]
+fn ten_errors_are_shown_and_the_others_counted() {
+    let bad = |count: usize| {
+        let keys: Vec<String> = (0..count).map(|n| format!("x{n} = 1")).collect();
+        let text = format!("name = \"a\"\n[record]\n{}", keys.join("\n"));
+        Sweep::parse(&text, Path::new("bad.toml")).unwrap_err().to_string()
+    };
+    let shown = bad(12);
+    let lines: Vec<&str> = shown.lines().collect();
+    assert_eq!(lines.len(), 12, "{shown}");
+    assert_eq!(lines[0], "bad.toml: has 12 mistakes:");
+    assert!(lines[1].starts_with("  bad.toml:3: x0 = 1: unknown key in [record]; "), "{shown}");
+    assert!(lines[10].starts_with("  bad.toml:12: x9 = 1: "), "{shown}");
+    assert_eq!(lines[11], "  and 2 more");
+    assert!(bad(10).ends_with("give_up_after"), "{}", bad(10));
+    assert!(!bad(1).contains('\n'), "{}", bad(1));
+}
+
+#[test]
+fn an_error_leads_to_no_other() {
+    for (text, words) in [
+        // What is refused is not missing.
+        ("name = 3\n[axes]\nDelta = [1]", "name = 3"),
+        ("[model]\nname = \"a\"\nDelta = 1", "name must stand above"),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"\ndt = 0", "dt = 0"),
+        ("name = \"a\"\n[solver]\nmethod = \"fixed\"\ndt = 1\ntolerance = 1", "method = "),
+        ("name = \"a\"\n[axes.sobol]\npoint = 4\nV0 = { log = [1, 2] }", "did you mean points?"),
+        // A column that is refused makes a zip neither short nor uneven.
+        ("name = \"a\"\n[axes.zip]\nV0 = [1, 2]\nN = [0]", "N = 0"),
+        ("name = \"a\"\n[axes.latin]\npoints = 4\nV0 = [1, 2]", "V0 = [1, 2]"),
+        // Nor is a period missing, or a modulation, or any point.
+        ("name = \"a\"\n[model]\nDelta = 1\nT = -1", "T = -1"),
+        ("name = \"a\"\n[model]\nDelta = -1\n[axes]\neta = [1]", "Delta = -1"),
+        ("name = \"a\"\nwhere = \"V0 > 1\"\n[axes]\nV0 = [1, 2, \"x\"]", "V0 = \"x\""),
+        // Nor is the rest of a broken file refused.
+        ("name = 3\n[model\nN = 3\nNs = 4\n[axes]\nV0 = [1]", "TOML"),
+        ("name = \"a\"\n[axes]\nV0 = [1, 2\nN = [3]\nNs = [3]\n", "TOML"),
+        ("name = \"a\"\n[model]\nV0 = \"abc\nN = 3\nNs = 4", "TOML"),
+    ] {
+        let mistakes = refused(text);
+        assert!(mistakes.len() == 1 && mistakes[0].problem.contains(words), "{text}\n{mistakes:?}");
+    }
+}
+
+#[test]
+fn every_column_of_a_zip_or_a_sample_and_every_axis_is_read() {
+    let mistakes = refused(
+        "name = \"a\"\n[axes]\nfs = []\nseed = { count = 0 }\n[[axes.zip]]\nV0 = [0]\nN = [0]\n\
+         [axes.sobol]\npoints = 0\nseed = -1\nK = 3\nfs = { log = [1, 2] }\nM = { log = [2, 1] }\n",
+    );
+    let lines: Vec<usize> = mistakes.iter().map(|mistake| mistake.line).collect();
+    assert_eq!(lines, [3, 4, 6, 7, 9, 10, 11, 12, 13], "{mistakes:?}");
 }
