@@ -261,7 +261,7 @@ def edge(results: Path) -> Section:
         "Until the first break the model is linear, so a slow modulation spreads over the blocks as the load does:"
         " a block carries a part of it in proportion to its displacement.",
         f"The first block carries {carried:.3f} of F_S.",
-        "After precursors the edge holds contacts of different ages, and how the modulation spreads then is not recorded.",
+        "After precursors the edge holds contacts of different ages; how the modulation spreads then is not recorded.",
     )
     section.verdict = Verdict(
         "holds in part",

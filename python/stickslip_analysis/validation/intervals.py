@@ -96,8 +96,8 @@ def stick_slip(results: Path) -> Section:
     seen = share(slips["largest_drop_before"] >= VISIBLE * peak, slips["seed"])
     section.check(
         "... as drops of F_S, what the experiment sees (Fig. 1d)",
-        f"more than half of the slips have two or three drops of {100 * VISIBLE:.0f} % of the peak force or more, what a"
-        " plot of F_S shows",
+        f"more than half of the slips have two or three drops of {100 * VISIBLE:.0f} % of the peak force or more,"
+        " what a plot of F_S shows",
         f"at most {seen.text(2)}: these have any drop of {VISIBLE * peak:.1f} N; the largest before a slip is"
         f" {slips['largest_drop_before'].median():.1f} N in the median, a slip {slips['drop'].median():.0f} N",
         seen.low > 0.5,

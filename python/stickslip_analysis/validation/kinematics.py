@@ -72,7 +72,7 @@ def nucleation_phase(slips: pandas.DataFrame) -> pandas.Series:
 
 
 def under_minimum(phases: pandas.Series, eta: pandas.Series, tolerance: float = 0.0) -> pandas.Series:
-    """Whether phases in rad, modulo 2π, are off the window of loads above all before by more than a tolerance. η > 1."""
+    """Whether phases in rad, modulo 2π, are off the window of loads above all before by a tolerance or more. η > 1."""
     windows = {one: load_window(one) for one in eta.unique()}
     low, high = (eta.map({one: window[end] for one, window in windows.items()}) for end in (0, 1))
     end = high + tolerance
