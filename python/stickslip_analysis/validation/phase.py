@@ -64,14 +64,14 @@ def phase(results: Path) -> Section:
         f"Each of these slips had a precursor, of {late['largest_precursor'].min()} breaks or more, and fewer contacts"
         f" are attached than before the others, {late['attached_before'].mean():.3f} instead of"
         f" {others['attached_before'].mean():.3f}.",
-        "So the load seems to break contacts at its maximum without a slip, and the slip begins as it rises again, before"
-        " it is as large: a period is too short for all of them to attach again.",
+        "So the load seems to break contacts at its maximum without a slip, and the slip begins as it rises again,"
+        " before it is as large: a period is too short for all of them to attach again.",
     )
     section.verdict = Verdict(
         "holds in part; for slow drives it follows from kinematics",
         f"onsets lie above φ_min by definition; by the first break {last.text(2)} of the slips lie under the back-bone"
-        f" for η > 200; φ begins at {start.text(2)}, not −π; below 1e-4 m/s the phases are bunched as those of slips at random loads,"
-        f" {excess['slow'].text()} beyond; from 1e-4 m/s on {excess['fast'].text()} beyond",
+        f" for η > 200; φ begins at {start.text(2)}, not −π; below 1e-4 m/s the phases are bunched as those of slips at"
+        f" random loads, {excess['slow'].text()} beyond; from 1e-4 m/s on {excess['fast'].text()} beyond",
     )
     return section
 
