@@ -4,7 +4,6 @@ Jobs of different seeds are independent, slips of one job are not. So the units 
 again (bootstrap) are seeds or parameter sets, never slips.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -36,8 +35,12 @@ def near_whole(periods: pandas.Series) -> pandas.Series:
 
 def rayleigh_p(angles: ArrayLike) -> float:
     """p-value of the Rayleigh test of many independent angles in rad against uniform ones, by Wilkie's formula."""
-    count, length = len(angles), resultant_length(angles)
-    return math.exp(math.sqrt(1 + 4 * count + 4 * count**2 * (1 - length**2)) - (1 + 2 * count))
+    return float(rayleigh_p_of(len(angles), resultant_length(angles)))
+
+
+def rayleigh_p_of(count: int, length: ArrayLike) -> numpy.ndarray:
+    """The same of so many angles by their resultant length."""
+    return numpy.exp(numpy.sqrt(1 + 4 * count + 4 * count**2 * (1 - numpy.square(length))) - (1 + 2 * count))
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,12 @@ def share(flags: pandas.Series, units: pandas.Series) -> Estimate:
     """The share of rows with a flag, by the jackknife over the unit of each row."""
     frame = pandas.DataFrame({"flag": flags.to_numpy(dtype=float), "unit": units.to_numpy()})
     return jackknife(lambda rows: rows["flag"].mean(), frame, unit="unit")
+
+
+def proportion(flags: pandas.Series) -> Estimate:
+    """The share of independent units with a flag, by the exact binomial interval, also where none or all have it."""
+    ends = stats.binomtest(int(flags.sum()), len(flags)).proportion_ci(LEVEL)
+    return Estimate(float(flags.mean()), float(ends.low), float(ends.high), len(flags))
 
 
 def difference(

@@ -26,6 +26,12 @@ def assert_95_percent(covered):
     assert abs(np.mean(covered) - 0.95) < 3 * np.sqrt(0.95 * 0.05 / len(covered)), np.mean(covered)
 
 
+def test_the_exact_binomial_interval_is_open_where_no_unit_has_the_flag():
+    none = statistics.proportion(pd.Series([False] * 105))
+    assert none.low == 0
+    assert none.high == pytest.approx(1 - 0.025 ** (1 / 105))
+
+
 def test_the_difference_of_means_is_that_of_the_paired_t_test():
     generator = np.random.default_rng(1)
     a, b = slips(generator, 0.001), slips(generator, 0)

@@ -9,7 +9,8 @@ import pandas
 import pytest
 from conftest import ROOT
 
-from stickslip_analysis.validation import beyond, document, friction, intervals, phase
+from stickslip_analysis import statistics
+from stickslip_analysis.validation import beyond, document, friction, intervals, kinematics, phase
 
 
 @pytest.mark.parametrize(
@@ -17,7 +18,7 @@ from stickslip_analysis.validation import beyond, document, friction, intervals,
     [(1.1, -3.8447), (1.82, -2.6110), (3.64, -1.7732), (10, -1.0664), (100, -0.34617), (1000, -0.11116)],
 )
 def test_minimum_phase_solves_eq_2(eta, expected):
-    assert phase.minimum_phase(eta) == pytest.approx(expected, abs=1e-4)
+    assert kinematics.minimum_phase(eta) == pytest.approx(expected, abs=1e-4)
 
 
 def test_two_peaks_are_found_where_there_are_two_and_one_where_there_is_one():
@@ -31,14 +32,45 @@ def test_two_peaks_are_found_where_there_are_two_and_one_where_there_is_one():
 def test_the_envelope_of_phases_above_phi_min_has_its_exponent():
     generator = numpy.random.default_rng(4)
     etas = numpy.geomspace(2, 1000, 20).repeat(400)
-    lowest = numpy.array([phase.minimum_phase(eta) for eta in etas])
+    lowest = numpy.array([kinematics.minimum_phase(eta) for eta in etas])
     frame = pandas.DataFrame(
         {"eta": etas, "phase": lowest * (1 - generator.random(etas.size)), "set_id": numpy.arange(etas.size) // 40}
     )
+    frame = frame.assign(first=frame["phase"])
     *_, agrees = phase.envelope(frame)
     assert agrees
-    *_, agrees = phase.envelope(frame.assign(phase=-(frame["eta"] ** -0.8)))
-    assert not agrees
+    for exponent in (-1 / 3, -2 / 3):
+        other = frame["phase"] * frame["eta"] ** (exponent + 0.5)
+        *_, agrees = phase.envelope(frame.assign(phase=other, first=other))
+        assert not agrees, exponent
+
+
+@pytest.mark.parametrize("eta", [0.3, 0.8, 1.5, 20])
+def test_slips_at_random_loads_have_a_uniform_load_phase(eta):
+    ranks = numpy.linspace(0.05, 0.95, 19)
+    phases = kinematics.random_load_phases(eta, ranks)
+    load = phases + eta * numpy.cos(phases)
+    assert numpy.diff(load) == pytest.approx(numpy.diff(load).mean(), rel=1e-3)
+
+
+def test_slips_at_random_loads_count_as_locked_near_eta_1_but_not_in_load():
+    generator = numpy.random.default_rng(5)
+    phases = kinematics.random_load_phases(0.83, generator.random((200, 30)))
+    slips = pandas.DataFrame({"phase": phases.ravel(), "eta": 0.83, "set_id": numpy.arange(200).repeat(30)})
+    load_p = kinematics.load_phase(slips).groupby(slips["set_id"]).apply(statistics.rayleigh_p)
+    sets = pandas.DataFrame({"set_id": load_p.index, "load_rayleigh_p": load_p.to_numpy()})
+    by_phase = [statistics.rayleigh_p(row) < 1e-3 and statistics.resultant_length(row) > 0.5 for row in phases]
+    expected, _ = kinematics.locked_by_chance(0.83, 30, 5000)
+    assert expected > 0.2
+    assert numpy.mean(by_phase) == pytest.approx(expected, abs=0.1)
+    assert kinematics.locked_in_load(sets, slips).mean() < 0.02
+
+
+def test_phases_under_phi_min_are_those_on_falling_load_of_any_period():
+    eta = pandas.Series([20.0] * 5)
+    lowest, top = kinematics.load_window(20)
+    phases = pandas.Series([lowest - 0.2, lowest + 0.01, top + 0.1, top + 0.2, top + 0.2 - 6 * numpy.pi])
+    assert list(kinematics.under_minimum(phases, eta, 0.15)) == [True, False, False, True, True]
 
 
 def test_curves_are_below_a_level_from_their_last_crossing_on():
@@ -64,12 +96,25 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
 
 def test_the_document_holds_every_section_and_no_number_is_missing():
     text = (ROOT / "docs" / "validation.md").read_text()
-    for number in range(1, 10):
+    for number in range(1, 13):
         assert f"### {number}. " in text
     assert "## Beyond the paper" in text
     assert not re.search(r"\bnan\b|\binf\b", text)
     for picture in re.findall(r"\((\.\./results/[^)]+\.png)\)", text):
         assert (ROOT / "docs" / picture).exists(), picture
+
+
+def test_the_readme_counts_the_verdicts():
+    rows = re.findall(r"^\| (\d+)\. [^|]*\| ([^|]*) \|", (ROOT / "docs" / "validation.md").read_text(), re.M)
+    counts = {"statements": len(rows), "hold:": sum(word == "holds" for _, word in rows)}
+    kinds = {"hold in part:": ("holds in part", "holds for"), "holds, but": "holds; ", "restates": "restates"}
+    for said, words in kinds.items():
+        counts[said] = sum(word.startswith(words) for _, word in rows)
+    assert sum(counts.values()) == 2 * len(rows), "each verdict is of one kind"
+    numbers = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+    readme = (ROOT / "README.md").read_text()
+    for said, count in counts.items():
+        assert re.search(rf"\b{numbers[count]}\b[^:;\n]*{said}", readme), f"{numbers[count]} ... {said}"
 
 
 def test_sentences_begin_on_lines_of_their_own_and_long_ones_are_wrapped():

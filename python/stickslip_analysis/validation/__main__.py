@@ -22,6 +22,8 @@ STATEMENTS = (
     friction.loading_profile,
     intervals.stress_drops,
     intervals.stochasticity,
+    phase.below_one,
+    friction.edge,
 )
 QUESTIONS = (
     *beyond.DRAGS,

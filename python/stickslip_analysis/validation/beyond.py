@@ -1,6 +1,5 @@
 """Questions that the paper leaves open: each a sweep, a figure and a finding, with its statistical error."""
 
-import math
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -8,10 +7,11 @@ from pathlib import Path
 import numpy
 import pandas
 
-from ..statistics import difference, jackknife, mean, near_whole, resultant_length, share
+from ..statistics import difference, jackknife, locking_index, mean, near_whole, resultant_length, share
 from ..tables import Sweep, select
 from .document import Section
 from .intervals import SIZES, count_by_slip, of_same_jobs, without_modulation
+from .kinematics import locked_by_chance, locked_in_load
 
 #: Locking index from which a set is called strongly locked here.
 STRONG = 0.8
@@ -74,31 +74,44 @@ DRAGS = (
 def locking_map(results: Path) -> Section:
     """Where slips lock, over period and amplitude."""
     section = Section("Arnold tongues: locking over period and amplitude", "`sweeps/locking-map.toml`", "locking-map")
-    sets = Sweep(results / "locking-map").reduced("sets")
+    sweep = Sweep(results / "locking-map")
+    sets = sweep.reduced("sets")
+    chance = [locked_by_chance(*one, 200) for one in zip(sets["eta"], sets["slips"], strict=True)]
+    sets = sets.assign(chance=[locked for locked, _ in chance], chance_index=[index for _, index in chance])
     for low, high in pairwise((0, 0.5, 1, 1.5, 2, 3, 5, 10, 20)):
         mine = sets[(sets["eta"] >= low) & (sets["eta"] < high)]
         if len(mine) < 2:
             continue
-        short = mine[mine["T"] < SHORT]["locking_index"]
+        is_short = mine["T"] < SHORT
+        short, expected = mine["locking_index"][is_short], mine["chance_index"][is_short]
         section.rows.append(
             {
                 "η": f"{low:g} to {high:g}",
                 "sets": len(mine),
                 "share with locked phases": mean(mine["locked"].astype(float)).text(2),
+                "of slips at random loads": f"{mine['chance'].mean():.2f}",
                 f"mean locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text() if len(short) > 1 else "",
+                "beyond that of slips at random loads": mean(short - expected).text() if len(short) > 1 else "",
                 f"share of these above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
             }
         )
-    count = sets["intervals"].mean()
+    natural = without_modulation(Sweep(results / "fig2").slips())["interval"]
+    under = sets[sets["eta"] < 1]
+    slips = sweep.slips()
+    in_load = locked_in_load(under, slips[slips["eta"] < 1].dropna(subset="phase"))
+    over = sets[(sets["eta"] > 1) & (sets["eta"] < 2)]
     section.remark(
         f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
-        f"A set without any locking has an index of {math.sqrt(math.pi / 4 / count):.2f} on average, as it has"
-        f" {count:.0f} intervals.",
+        "Slips at random loads that exceed all before count as locked by their phases, too:"
+        f" {over['chance'].mean():.2f} of the sets for η from 1 to 2, where {over['locked'].mean():.2f} are locked.",
+        f"Below η = 1 they give {under['chance'].sum():.0f} of {len(under)}, and {under['locked'].sum()} are locked;"
+        f" by the load phase φ + η cos φ, in which random loads are uniform, {in_load.sum()} are.",
+        f"Random loads leave out that τ varies little: even without modulation its locking index is"
+        f" {locking_index(29 * natural):.2f} at 29 Hz, so not all that is beyond random loads is locking.",
     )
     # How well a tongue locks may depend on where τ without modulation lies between two multiples of T.
-    natural = without_modulation(Sweep(results / "fig2").slips())["interval"].mean()
     tongues = sets[(sets["eta"] > 1) & (sets["eta"] < 3)]
-    beyond = (natural / tongues["T"]) % 1
+    beyond = (natural.mean() / tongues["T"]) % 1
     quarters = [
         mean(tongues["locking_index"][(beyond >= low) & (beyond < high)])
         for low, high in pairwise((0, 0.25, 0.5, 0.75, 1))
@@ -106,8 +119,8 @@ def locking_map(results: Path) -> Section:
     matters = max(one.low for one in quarters) > min(one.high for one in quarters)
     section.remark(
         f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the interval without modulation,"
-        f" τ_0 = {natural:.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a turn"
-        f" the mean locking index is {', '.join(one.text(2) for one in quarters)}."
+        f" τ_0 = {natural.mean():.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a"
+        f" turn the mean locking index is {', '.join(one.text(2) for one in quarters)}."
     )
     return section
 

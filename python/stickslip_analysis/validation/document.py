@@ -24,7 +24,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be said of a statement: "holds", "holds for ...", "follows from kinematics", "does not hold"; and why."""
+    """What is to be said of a statement: "holds", "holds for ...", "holds in part", "restates ..."; and why."""
 
     word: str
     reason: str = ""

@@ -1,0 +1,88 @@
+"""The committed pictures of sweeps are those that their sweep files give now.
+
+The cheap ones are drawn again from nothing. The others take minutes: what they were drawn from must be unchanged, as
+scripts/reproduce wrote it down in results/pictures.txt, and where their results are there they are drawn from these.
+"""
+
+import hashlib
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+#: Sweeps that take less than 15 s of CPU time.
+CHEAP = ("choices", "contacts", "drag", "drag-strong", "velocity")
+#: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
+OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "speed-against-error.png"}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A line of results/pictures.txt: which figure of a sweep a picture is, and checksums of what it was drawn from."""
+
+    name: str
+    sweep: str
+    figure: str
+    png: str
+    sweep_file: str
+    golden_figures: str
+
+    @property
+    def remedy(self):
+        return f"{self.name} is out of date: scripts/reproduce {self.sweep} draws it again"
+
+    def assert_drawn(self, folder: Path):
+        """The results in a folder have just this picture."""
+        assert (folder / self.figure).read_bytes() == (ROOT / "results" / self.name).read_bytes(), self.remedy
+
+
+LINES = (ROOT / "results" / "pictures.txt").read_text().splitlines()
+PICTURES = [picture for line in LINES if (picture := Picture(*line.split())).name not in OTHERS]
+SWEEPS = sorted({picture.sweep for picture in PICTURES})
+
+
+def pictures_of(sweep):
+    return [picture for picture in PICTURES if picture.sweep == sweep]
+
+
+def checksum(data):
+    return hashlib.sha256(data).hexdigest()
+
+
+def golden_figures():
+    """The lines of the golden files that hold figures."""
+    files = sorted((ROOT / "tests" / "golden").glob("*.txt"))
+    return b"".join(line for file in files for line in file.read_bytes().splitlines(True) if b"figures/" in line)
+
+
+def test_every_picture_is_checked():
+    assert {file.name for file in (ROOT / "results").glob("*.png")} == {picture.name for picture in PICTURES} | OTHERS
+    assert set(CHEAP) < set(SWEEPS)
+
+
+@pytest.mark.parametrize("picture", PICTURES, ids=lambda picture: picture.name)
+def test_what_a_picture_was_drawn_from_is_unchanged(picture):
+    assert checksum((ROOT / "results" / picture.name).read_bytes()) == picture.png, picture.remedy
+    assert checksum((ROOT / "sweeps" / f"{picture.sweep}.toml").read_bytes()) == picture.sweep_file, picture.remedy
+    assert checksum(golden_figures()) == picture.golden_figures, picture.remedy
+
+
+@pytest.mark.parametrize("sweep", CHEAP)
+def test_a_cheap_sweep_gives_its_picture_again(stickslip, tmp_path, sweep):
+    stickslip("run", ROOT / "sweeps" / f"{sweep}.toml", "--out", tmp_path / "results")
+    for picture in pictures_of(sweep):
+        picture.assert_drawn(tmp_path / "results")
+
+
+@pytest.mark.parametrize("sweep", [sweep for sweep in SWEEPS if sweep not in CHEAP])
+def test_results_that_are_there_give_their_pictures_again(stickslip, tmp_path, sweep):
+    results = ROOT / "results" / sweep
+    if not (results / "reduced").exists():
+        pytest.skip(f"{results} is not there; scripts/reproduce {sweep} makes it")
+    for folder in ("reduced", "run"):
+        shutil.copytree(results / folder, tmp_path / folder)
+    stickslip("plot", tmp_path)
+    for picture in pictures_of(sweep):
+        picture.assert_drawn(tmp_path)
