@@ -20,7 +20,7 @@ const LONGEST: Duration = Duration::from_mins(2);
 /// The tables of a sweep.
 pub const TABLES: [&str; 3] = ["slips", "precursors", "jobs"];
 
-/// Many jobs of some 50 µs, in several parts of 4096 jobs: something to interrupt.
+/// Many jobs of some 50 µs, in many parts: something to interrupt.
 pub const MANY: &str = "\
 name = \"many\"
 [model]
@@ -33,7 +33,7 @@ slips = 2
 discard = 0
 ";
 /// Parts of [`MANY`].
-pub const MANY_PARTS: usize = 7;
+pub const MANY_PARTS: usize = 64;
 
 /// One in three jobs needs more contact events than it may have.
 pub const FAILING: &str = "\
