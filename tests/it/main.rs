@@ -22,6 +22,6 @@ mod program;
 mod ramp;
 mod regimes;
 mod runs;
-mod shards;
+mod sharing;
 mod simulate;
 mod statistics;
