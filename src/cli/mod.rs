@@ -9,8 +9,11 @@ mod plan;
 mod progress;
 mod reduce;
 mod run;
+mod signals;
 mod simulate;
 mod status;
+mod threads;
+mod time;
 mod verify;
 
 use self::exit::Exit;
