@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod bad_input;
+mod batch;
 mod compaction;
 mod damage;
 mod deterministic_rows;
