@@ -5,6 +5,7 @@ mod batch;
 mod compact;
 mod completions;
 mod exit;
+mod merge;
 mod output;
 mod plan;
 mod progress;
@@ -48,6 +49,7 @@ enum Command {
     Plot(reduce::PlotArguments),
     Verify(verify::Arguments),
     Compact(compact::Arguments),
+    Merge(merge::Arguments),
     Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
     Completions(completions::Arguments),
@@ -64,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Plot(arguments) => reduce::plot(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Compact(arguments) => compact::compact(&arguments),
+        Command::Merge(arguments) => merge::merge(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Completions(arguments) => completions::completions(&arguments),

@@ -39,11 +39,17 @@ impl<'a> Commit<'a> {
     /// # Errors
     /// When it cannot be created.
     pub fn stage(&mut self, target: &Path) -> Result<StoredFile, StorageError> {
+        let staged = self.next_staged(target);
+        self.storage.create(&staged)
+    }
+
+    /// Where the next file is staged.
+    fn next_staged(&mut self, target: &Path) -> PathBuf {
         let mut name = OsString::from(format!("{}-{}-", self.token, self.staged.len()));
         name.push(target.file_name().unwrap_or_default());
         let staged = self.staging.join(name);
         self.staged.push((staged.clone(), target.to_owned()));
-        self.storage.create(&staged)
+        staged
     }
 
     /// Stages a small file of which all bytes are known.
@@ -54,6 +60,15 @@ impl<'a> Commit<'a> {
         let mut file = self.stage(target)?;
         file.write(bytes)?;
         file.sync()
+    }
+
+    /// Stages a file that lies elsewhere and is to stay there.
+    ///
+    /// # Errors
+    /// When it cannot be linked or copied.
+    pub(super) fn stage_link(&mut self, from: &Path, target: &Path) -> Result<(), StorageError> {
+        let staged = self.next_staged(target);
+        self.storage.link(from, &staged)
     }
 
     /// Moves the staged files to their targets, in the order in which they were staged.

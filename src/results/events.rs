@@ -97,6 +97,11 @@ pub enum RunEvent {
         /// Its name.
         part: String,
     },
+    /// A part was taken over from another directory.
+    PartMerged {
+        /// Its name.
+        part: String,
+    },
     /// Parts were compacted.
     Compacted {
         /// Names of the files of the jobs table.
@@ -264,7 +269,7 @@ impl Results<'_> {
     pub(super) fn committed_parts(&self) -> Result<BTreeMap<String, Kept>, StorageError> {
         let mut parts = BTreeMap::new();
         self.events(|event| match event {
-            RunEvent::PartCommitted { part, .. } => {
+            RunEvent::PartCommitted { part, .. } | RunEvent::PartMerged { part } => {
                 parts.insert(part, Kept::Alone);
             }
             RunEvent::PartQuarantined { part } => {

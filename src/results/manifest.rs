@@ -136,6 +136,11 @@ impl Manifest {
         Ok(commit.publish()?)
     }
 
+    /// Whether the parts of both have the same jobs and the same bytes.
+    pub(super) fn is_of_same_plan(&self, other: &Self) -> bool {
+        self.difference(other).is_empty() && self.extensions == other.extensions
+    }
+
     /// Its extensions, with their sweeps parsed.
     pub(super) fn extensions(&self, layout: &Layout<'_>) -> Result<Vec<Extension>, ResultsError> {
         let extension = |(number, Record { sweep, part_cost, kept }): (usize, &Record)| {

@@ -8,7 +8,7 @@
 //!   parts.rs                  which parts are done, and the rows of one, in all tables at once
 //!   workers.rs, claims.rs     who is at work, and at what
 //!   events.rs                 what happens, and its log
-//!   compact.rs                many parts in one file
+//!   compact.rs, merge.rs      many parts in one file, many directories in one
 //!   verify/                   what is damaged, and its repair
 //! error.rs, missing.rs        why a directory cannot be used or changed, and which one was meant
 //! ```
@@ -21,6 +21,7 @@ pub mod events;
 pub mod handle;
 pub mod layout;
 pub mod manifest;
+pub mod merge;
 mod missing;
 pub mod parts;
 pub mod tables;

@@ -210,10 +210,6 @@ fn the_commands_of_the_page_on_clusters_are_right() {
             let Some((_, command)) = line.split_once("stickslip ") else { continue };
             let end = command.find(['>', '#', '"']).unwrap_or(command.len());
             let words = command[..end].split(" -- ").next().unwrap();
-            // Not there yet.
-            if words.starts_with("merge ") {
-                continue;
-            }
             // With --help, what precedes it is parsed, and nothing is done.
             folder.ends(0, &format!("{words} --help"));
             commands += 1;
