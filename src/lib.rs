@@ -23,9 +23,11 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep, known by a hash of parameters, solver and recording |
 //! | set | all jobs that differ in the seed alone |
-//! | extension | a further sweep in a results directory; it owns the jobs that are in no earlier one |
+//! | extension | a sweep in a results directory; it owns its jobs but for those that earlier ones have done |
 //! | part | consecutive jobs of an extension, committed together |
-//! | shard | a share of the parts, run by one process beside others and locked while it runs |
+//! | worker | a process at work on a results directory, beside others |
+//! | claim | which worker runs a part |
+//! | shard | a share of the parts, run into a directory of its own |
 
 #[cfg(feature = "sweeps")]
 pub mod accuracy;

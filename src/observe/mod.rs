@@ -18,4 +18,4 @@ pub use recording::{Recording, RecordingKey};
 pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
 pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
-pub use slip::{Modulation, Precursor, Slip, SlipObserver};
+pub use slip::{Energies, Modulation, Precursor, Slip, SlipObserver};

@@ -178,10 +178,12 @@ fn signals_of_batch_systems_stop_a_run_and_what_is_done_is_kept() {
 #[test]
 fn a_worker_whose_time_is_over_ends_well() {
     let folder = Folder::new();
-    folder.write("many.toml", MANY);
-    folder.ends(3, "run many.toml --no-reduce --out r --walltime 0.501s");
-    let ended = folder.ends(0, "run many.toml --no-reduce --out r --worker --walltime 0.501s");
+    folder.write("many.toml", &MANY.replace("count = 28000", "count = 1000000"));
+    folder.ends(3, "run many.toml --no-reduce --out r --walltime 3s");
+    let ended = folder.ends(0, "run many.toml --no-reduce --out r --worker --walltime 3s");
     assert!(ended.stderr.contains("stopped with"), "{}", ended.stderr);
+    let nothing = folder.ends(3, "run many.toml --no-reduce --out r --worker --walltime 0.501s");
+    assert!(nothing.stderr.contains("give a longer --walltime"), "{}", nothing.stderr);
     folder.write("failing.toml", FAILING);
     folder.ends(1, "run failing.toml --no-reduce --out failing --worker");
 }

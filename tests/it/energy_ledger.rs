@@ -1,7 +1,8 @@
 //! The energy ledger balances: an error certificate of every solver, on the model of Fig. 1.
 
+use std::sync::atomic::AtomicBool;
 use stickslip::model::Parameters;
-use stickslip::observe::ContactLog;
+use stickslip::observe::{ContactLog, Recording, measure};
 use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate, simulate_audited};
 
 const LIMITS: Limits<'static> = Limits { end_time: 0.25, events: 1_000_000, interrupt: None };
@@ -75,4 +76,32 @@ fn a_ledger_takes_taylor_steps_and_none_is_kept_along_the_grid() {
         assert_eq!(ledger(Resolve::Auto), ledger(Resolve::Taylor));
         assert_eq!(ledger(Resolve::Grid).unwrap_err(), SimulationError::LedgerOnGrid);
     }
+}
+
+/// What is stored in the springs varies by a few per cent of the work of ten slips.
+#[test]
+fn the_work_of_the_drive_over_many_slips_goes_into_damping_and_broken_contacts() {
+    let recording = Recording { slips: 30, discard: 3, energies: true, ..Recording::default() };
+    for (modulation_amplitude, modulation_period) in [(0.0, None), (1e-6, Some(1.0 / 58.0))] {
+        let parameters = Parameters { modulation_amplitude, modulation_period, ..Parameters::default() };
+        let measured = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
+        let total = |energy: &dyn Fn(&stickslip::observe::Slip) -> Option<f64>| -> f64 {
+            measured.slips.iter().map(|slip| energy(slip).unwrap()).sum()
+        };
+        let work = total(&|slip| slip.energies.work);
+        let losses = total(&|slip| slip.energies.damping) + total(&|slip| slip.energies.broken);
+        assert!((losses / work - 1.0).abs() < 0.01, "{losses} J of {work} J");
+        // The mean friction times the distance of the drive.
+        let time: f64 = measured.slips.iter().filter_map(|slip| slip.interval).sum();
+        let friction = measured.averages.unwrap().friction;
+        let expected = friction * parameters.drive_velocity * time;
+        assert!(modulation_amplitude > 0.0 || (work / expected - 1.0).abs() < 0.02, "{work} J against {expected} J");
+    }
+    let measured = measure(
+        &Parameters::default(),
+        &Recording { slips: 2, ..Recording::default() },
+        Solver::default(),
+        &AtomicBool::new(false),
+    );
+    assert!(measured.unwrap().slips.iter().all(|slip| slip.energies.work.is_none()));
 }
