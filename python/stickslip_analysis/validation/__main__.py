@@ -32,6 +32,7 @@ QUESTIONS = (
     *beyond.DEPENDENCES,
     phase.stiff_drive,
     beyond.choices,
+    beyond.energies,
 )
 
 
