@@ -26,11 +26,12 @@ class Command:
 
     def output(self):
         """What it printed so far."""
-        return self.files.with_suffix(".out").read_text()
+        file = self.files.with_suffix(".out")
+        return file.read_text() if file.exists() else ""
 
     def wait(self, seconds=60, expected=0):
         """Waits until it ends with this status, and returns what it printed."""
-        wait_until(lambda: self.status() is not None, seconds, f"{self.files.name} ends; {self.output()}")
+        wait_until(lambda: self.status() is not None, seconds, lambda: f"the command ends\n{self.output()}")
         assert self.status() == expected, self.output()
         return self.output()
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 
 def wait_until(condition, seconds, what):
-    """Waits until a condition holds, and returns its value."""
+    """Waits until a condition holds, and returns its value. `what` is said if it does not: a text or what makes it."""
     end = time.monotonic() + seconds
     while True:
         if value := condition():
             return value
-        assert time.monotonic() < end, f"not within {seconds} s: {what}"
+        assert time.monotonic() < end, f"not within {seconds} s: {what() if callable(what) else what}"
         time.sleep(0.1)
 
 
