@@ -40,11 +40,15 @@ impl Progress {
 
     pub fn show(&mut self, event: &RunEvent) {
         match event {
-            &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, .. } => {
+            &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.jobs = jobs;
                 self.predicted = predicted_cost;
+                let beside = match others {
+                    0 => String::new(),
+                    others => format!(", shared with {}", output::count(others as u64, "worker")),
+                };
                 self.say(&format!(
-                    "running {}, {jobs_there} there already; about {} on {}",
+                    "running {}, {jobs_there} there already; about {} on {}{beside}",
                     output::count(jobs, "job"),
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),
@@ -67,7 +71,7 @@ impl Progress {
                 self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
                 self.advance(*predicted_cost);
             }
-            RunEvent::Stopping => self.say("stopping: jobs in flight end, finished parts are kept"),
+            RunEvent::Stopping => self.say("stopping: jobs in flight end, finished jobs are kept"),
             RunEvent::OutOfTime => self.say("not enough time left to start another part"),
             RunEvent::Finished(_) => self.bar.finish_and_clear(),
             _ => {}

@@ -26,10 +26,11 @@ Examples:
   stickslip run sweeps/fig3.toml
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
   stickslip run results/fig3                     resume, without the sweep file
-  stickslip run sweeps/fig3.toml --shard 2/8     the second of eight processes on one directory
+  stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; `merge` puts the parts together
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
-Ctrl-C and SIGTERM keep what is done; the same command resumes from there.")]
+Ctrl-C and SIGTERM keep what is done; the same command resumes from there. Started several times, also on several hosts
+with a common disk, it shares the work.")]
 pub struct Arguments {
     /// Sweep file, or results directory to resume
     #[arg(value_name = "SWEEP.toml|DIR")]
@@ -40,7 +41,7 @@ pub struct Arguments {
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
-    /// Run one share of N, beside other processes that run the others
+    /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// End within this time, such as 90s, 55m or 1h30m: start only what ends by then; reduction and figures come on top
@@ -82,10 +83,10 @@ fn walltime(text: &str) -> Result<Duration, String> {
 const FORMAT: u32 = 1;
 
 #[derive(Serialize)]
-struct Report {
+struct Report<'a> {
     format: u32,
     #[serde(flatten)]
-    report: RunReport,
+    report: &'a RunReport,
 }
 
 /// Set by the first Ctrl-C or SIGTERM.
@@ -118,24 +119,36 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new();
-    let report = stickslip::run::run(
-        &layout,
-        &sweep,
-        options,
-        &|job, interrupt| measure(&job.parameters, &recording, solver, interrupt),
-        &mut |event| progress.show(event),
-    )?;
-    if arguments.json {
-        output::json(&Report { format: FORMAT, report })?;
-    } else {
-        output::pairs(&summary_lines(&report))?;
-    }
+    let report = stickslip::run::join(&layout, &sweep, options, |session| -> Result<RunReport> {
+        let report =
+            session.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
+                progress.show(event);
+            })?;
+        if arguments.json {
+            output::json(&Report { format: FORMAT, report: &report })?;
+        } else {
+            output::pairs(&summary_lines(&report))?;
+        }
+        let is_complete = report.jobs_left == 0 && !report.stopped;
+        if is_complete && !arguments.no_reduce {
+            if arguments.shard.is_some() || session.takes_reduction()? {
+                reduce_and_draw(&layout, arguments)?;
+            } else {
+                output::report("all jobs are done; another worker reduces them");
+            }
+        }
+        Ok(report)
+    })?;
     if report.stopped {
         output::report(&resume_hint(&report, arguments.walltime.is_some()));
         return Ok(Exit::Stopped);
     }
-    if !arguments.no_reduce {
-        reduce_and_draw(&layout, arguments)?;
+    if report.jobs_left > 0 {
+        let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));
+        let out = root.display();
+        output::report(&format!(
+            "nothing is left to take: others run the last {left} ({hosts}); see stickslip status {out}"
+        ));
     }
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
@@ -178,7 +191,7 @@ fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
         }
         _ => "The same command resumes.".to_owned(),
     };
-    format!("stopped with {left} left; finished parts are kept. {hint}")
+    format!("stopped with {left} left; finished jobs are kept. {hint}")
 }
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {

@@ -7,16 +7,23 @@ use clap::Args;
 use std::path::PathBuf;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
-use stickslip::run::Failure;
+use stickslip::results::workers::Worker;
+use stickslip::run::{Failure, Overview, Present};
 use stickslip::table::storage::Disk;
 
-/// Show what of a results directory is done, failed, missing and running, and the predicted time left
+/// Show what of a results directory is done, failed and missing, who is at work, and the predicted time left
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  stickslip status results/fig3")]
+#[command(after_help = "\
+Examples:
+  stickslip status results/fig3
+  stickslip status results/fig3 --check     in a script: exit code 3 while jobs are missing")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
+    /// End with exit code 3 while jobs are missing
+    #[arg(long)]
+    check: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -33,7 +40,6 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
             (_, None) => format!("{} of CPU time predicted", output::duration(overview.predicted_cost_missing)),
         };
-        let running = if status.running.is_empty() { "nothing".to_owned() } else { status.running.join(", ") };
         let kept = match overview.jobs_kept {
             0 => String::new(),
             kept => format!(", {kept} of them kept of values that the sweep no longer has"),
@@ -44,9 +50,15 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ("jobs failed", overview.jobs_failed.to_string()),
             ("jobs missing", overview.jobs_missing.to_string()),
             ("parts", format!("{} done, {} missing", overview.parts_done, overview.parts_missing)),
-            ("running", running),
             ("time left", left),
         ])?;
+        for Present { worker, last_beat } in &status.workers {
+            let Worker { host, process, threads, jobs_per_second, .. } = worker;
+            output::print(&format!(
+                "worker  process {process} on {host}: {}, {jobs_per_second:.2} jobs/s, last beat {last_beat:.0} s ago\n",
+                output::count(*threads as u64, "thread")
+            ))?;
+        }
         for Failure { job_id, reason, command } in &status.failures {
             output::print(&format!("failed  {job_id}: {reason}\n  alone: {command}\n"))?;
         }
@@ -54,5 +66,9 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             output::print("failed  and more: see outcome and reason in tables/jobs\n")?;
         }
     }
-    Ok(if overview.jobs_failed > 0 { Exit::Failed } else { Exit::Done })
+    Ok(match overview {
+        Overview { jobs_missing: 1.., .. } if arguments.check => Exit::Stopped,
+        Overview { jobs_failed: 1.., .. } => Exit::Failed,
+        _ => Exit::Done,
+    })
 }

@@ -26,6 +26,8 @@ pub enum RunEvent {
         program: String,
         /// Shard, as `K/N`.
         shard: String,
+        /// Other workers that are there.
+        others: usize,
         /// Threads.
         threads: usize,
         /// Jobs to run.
@@ -103,18 +105,24 @@ pub enum RunEvent {
 }
 
 /// What a run did. Jobs count when they are committed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunReport {
     /// Jobs run, failed ones included.
     pub jobs_run: u64,
-    /// Jobs that still count as failed in the parts of this run's shard, earlier ones included.
+    /// Jobs that count as failed: all that are asked for if no other worker was there at the end, else those of this run.
     pub jobs_failed: u64,
-    /// Jobs of this run's shard that are still to be run.
+    /// Jobs that are still to be run, by other workers if this one was not stopped.
     pub jobs_left: u64,
+    /// Jobs finished of parts that are not done; they are kept.
+    #[serde(default)]
+    pub jobs_spilled: u64,
     /// Parts committed.
     pub parts_committed: u64,
     /// Whether the run was stopped, or its time did not suffice, before all was done.
     pub stopped: bool,
+    /// Hosts of the workers that run the jobs which are left.
+    #[serde(default)]
+    pub hosts: Vec<String>,
     /// Predicted wall time of the cheapest part that was not started for want of time, in s.
     pub time_wanted: Option<f64>,
     /// Predicted CPU time of the jobs run, in s.
@@ -128,9 +136,16 @@ pub struct RunReport {
 impl RunEvent {
     /// The event with which a run begins.
     #[must_use]
-    pub fn started(shard: String, threads: usize, jobs: u64, jobs_there: u64, predicted_cost: f64) -> Self {
+    pub fn started(
+        shard: String,
+        others: usize,
+        threads: usize,
+        jobs: u64,
+        jobs_there: u64,
+        predicted_cost: f64,
+    ) -> Self {
         let (program, process) = (PROGRAM.to_owned(), std::process::id());
-        Self::Started { host: host(), process, program, shard, threads, jobs, jobs_there, predicted_cost }
+        Self::Started { host: host(), process, program, shard, others, threads, jobs, jobs_there, predicted_cost }
     }
 
     /// Whether the log keeps it: a line for each job, or each second, would be millions.
@@ -168,6 +183,14 @@ fn now() -> f64 {
 pub struct Log(StoredFile);
 
 impl Log {
+    /// Brings what was written to the disk, where other hosts see it.
+    ///
+    /// # Errors
+    /// When it cannot be brought there.
+    pub fn sync(&mut self) -> Result<(), StorageError> {
+        self.0.sync()
+    }
+
     /// Appends an event, if it is one that the log keeps.
     ///
     /// # Errors
@@ -272,7 +295,7 @@ mod tests {
         let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         let mut log = results.begin_log().unwrap();
         let events = [
-            RunEvent::started("1/1".to_owned(), 2, 3, 0, 4.0),
+            RunEvent::started("1/1".to_owned(), 1, 2, 3, 0, 4.0),
             RunEvent::Finished(RunReport { jobs_run: 3, time_wanted: Some(1.5), ..RunReport::default() }),
             RunEvent::Error { error: "disk full".to_owned() },
             RunEvent::Stopping,

@@ -11,6 +11,7 @@ use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::io::ErrorKind;
 use std::path::Path;
+use std::time::SystemTime;
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
@@ -34,6 +35,15 @@ impl<'a> Results<'a> {
         // Another run may have written the manifest before the lock was ours.
         let (results, unwritten) = Self::compare(layout, sweep)?;
         if let Some(manifest) = unwritten {
+            if let Some(other) = layout.living(SystemTime::now())?.into_values().next() {
+                let problem = format!(
+                    "{}, for another sweep file; wait for it or stop it, or choose another directory with --out",
+                    other.doing()
+                );
+                return Err(ResultsError::busy(layout.root(), problem));
+            }
+            // It is of parts that are no more.
+            layout.storage.remove_folder(&layout.spill())?;
             manifest.write(layout)?;
         }
         Ok(results)

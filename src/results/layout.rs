@@ -5,7 +5,8 @@
 //!                tables/{slips,precursors,jobs}/compact-EEE-FFFFFF-LLLLLL-CHECKSUM.parquet  what was compacted
 //!                reduced/  figures/                                      made from the tables
 //!                run/manifest.json  sweep-EEE.toml                       what the tables belong to
-//!                run/{staging,lock,log}/                                 of no use once nothing runs
+//!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
+//!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
 //!                run/quarantine/                                         damaged files that a repair took away
 //! ```
 //!
@@ -30,7 +31,7 @@ const MANIFEST: &str = "manifest.json";
 /// Folder of the results directories that nobody placed elsewhere.
 pub(super) const RESULTS: &str = "results";
 /// Names of its folders.
-pub const RUN_FOLDERS: [&str; 3] = ["staging", "lock", "log"];
+pub const RUN_FOLDERS: [&str; 6] = ["staging", "lock", "log", "workers", "claims", "spill"];
 
 /// Paths within a results directory, and the storage on which it lies.
 #[derive(Clone)]
@@ -154,6 +155,24 @@ impl<'a> Layout<'a> {
     #[must_use]
     pub fn locks(&self) -> PathBuf {
         self.run().join("lock")
+    }
+
+    /// Folder of the workers' files.
+    #[must_use]
+    pub fn workers(&self) -> PathBuf {
+        self.run().join("workers")
+    }
+
+    /// Folder of the claims.
+    #[must_use]
+    pub fn claims(&self) -> PathBuf {
+        self.run().join("claims")
+    }
+
+    /// Folder of what a stopped run had finished of parts that are not done.
+    #[must_use]
+    pub fn spill(&self) -> PathBuf {
+        self.run().join("spill")
     }
 
     /// Folder of the logs.

@@ -87,8 +87,8 @@ mod tests {
             ("results/fgi3", "did you mean results/fig3?"),
             ("results/fig3x/", "did you mean results/fig3?"),
             ("results/Friktion", "did you mean results/friction?"),
-            ("results/drag", "name one that a run made, such as results/fig3"),
-            ("elsewhere/fig3", "name one that a run made, such as results/fig3"),
+            ("results/unlike", "name one that a run made, such as results/fig3"),
+            ("elsewhere/unlike", "name one that a run made, such as results/fig3"),
         ] {
             assert_eq!(refusal(&there, path), format!("{path}: there is no such directory; {way_out}"));
         }

@@ -6,25 +6,26 @@
 //! layout.rs, manifest.rs      where everything lies, and which sweeps it belongs to
 //! handle.rs                   a directory that fits this program
 //!   parts.rs                  which parts are done, and the rows of one, in all tables at once
-//!   lock.rs                   who runs a shard, and who has the whole directory
+//!   workers.rs, claims.rs     who is at work, and at what
 //!   events.rs                 what happens, and its log
 //!   compact.rs                many parts in one file
 //!   verify/                   what is damaged, and its repair
 //! error.rs, missing.rs        why a directory cannot be used or changed, and which one was meant
 //! ```
 
+pub mod claims;
 pub mod commit;
 pub mod compact;
 pub mod error;
 pub mod events;
 pub mod handle;
 pub mod layout;
-pub mod lock;
 pub mod manifest;
 mod missing;
 pub mod parts;
 pub mod tables;
 pub mod verify;
+pub mod workers;
 
 pub use error::{ErrorKind, ResultsError};
 pub use handle::Results;

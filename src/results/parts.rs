@@ -1,7 +1,8 @@
 //! Parts: consecutive jobs of the plan whose rows are committed together, in the plan's order.
 //!
 //! A part has one file in each table. The one in `jobs` comes last, so a part is done exactly if that is there, or if a
-//! compacted file of `jobs` holds it.
+//! compacted file of `jobs` holds it. What a stopped run had finished of other parts is *spilled*: the same files, with the
+//! rows of these jobs alone, aside from the tables until the part is committed.
 
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
@@ -15,7 +16,7 @@ use crate::sweep::Part;
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Batch, Dataset, DatasetError, TableWriter};
 use crate::table::storage::StorageError;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -124,26 +125,108 @@ impl Results<'_> {
         }
     }
 
-    /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have.
+    /// The parts of which something is spilled.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn spilled_parts(&self) -> Result<HashSet<(usize, u64)>, StorageError> {
+        let names = self.layout().storage.list(&self.layout().spill().join(tables::JOBS))?;
+        let files = names.iter().filter_map(|name| TableFile::of_path(name.as_ref()));
+        Ok(files.map(|file| (file.extension, file.first)).collect())
+    }
+
+    /// Positions of the jobs of a part that are spilled. None if a file is damaged: they then run again.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn spilled(&self, part: &Part) -> Result<BTreeSet<usize>, ResultsError> {
+        let mut ids = HashSet::new();
+        for table in self.tables() {
+            let files = Dataset::new(self.layout().storage, vec![self.spilled_file(table, part)]);
+            for batch in files.rows::<RowOfJob>() {
+                match batch {
+                    Ok(rows) if table == tables::JOBS => ids.extend(rows.into_iter().map(|row| row.job_id)),
+                    Ok(_) => (),
+                    Err(DatasetError::Damaged { .. }) => return Ok(BTreeSet::new()),
+                    Err(error) => return Err(error.into()),
+                }
+            }
+        }
+        Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(part, position))).collect())
+    }
+
+    fn spilled_file(&self, table: &str, part: &Part) -> PathBuf {
+        self.layout().spill().join(table).join(TableFile::of_part(part.extension, part.index).to_string())
+    }
+
+    /// Spills the outcomes of some jobs of a part, beside those that are spilled already.
+    ///
+    /// # Errors
+    /// As [`Results::commit`].
+    pub fn spill(
+        &self,
+        staging: &Path,
+        part: &Part,
+        outcomes: &BTreeMap<usize, Outcome>,
+        spilled: &BTreeSet<usize>,
+    ) -> Result<(), ResultsError> {
+        let from = (!spilled.is_empty()).then_some(Place::Spill);
+        self.write(staging, part, outcomes, spilled, from, Place::Spill)
+    }
+
+    /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have, in the tables
+    /// or `spilled`.
     ///
     /// # Errors
     /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
     /// counts as before, or as done, but never as half done.
-    pub fn commit(&self, staging: &Path, part: &Part, outcomes: &BTreeMap<usize, Outcome>) -> Result<(), ResultsError> {
+    pub fn commit(
+        &self,
+        staging: &Path,
+        part: &Part,
+        outcomes: &BTreeMap<usize, Outcome>,
+        spilled: &BTreeSet<usize>,
+    ) -> Result<(), ResultsError> {
+        let keeps = outcomes.len() < part.jobs.len();
+        let from = if spilled.is_empty() { Place::Tables } else { Place::Spill };
+        let others: BTreeSet<usize> = (0..part.jobs.len()).collect();
+        self.write(staging, part, outcomes, &others, keeps.then_some(from), Place::Tables)?;
+        if !spilled.is_empty() {
+            // Jobs first: what is spilled without them is nothing.
+            for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
+                self.layout().storage.remove(&self.spilled_file(table, part))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes files of a part: new rows of jobs with an outcome, the old ones of the `kept` others.
+    fn write(
+        &self,
+        staging: &Path,
+        part: &Part,
+        outcomes: &BTreeMap<usize, Outcome>,
+        kept: &BTreeSet<usize>,
+        from: Option<Place>,
+        to: Place,
+    ) -> Result<(), ResultsError> {
         let sweep = &self.extensions()[part.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
-        let jobs: Jobs<'_> = (0..part.jobs.len()).map(|position| (label(position), outcomes.get(&position))).collect();
+        let is_written = |position: &usize| outcomes.contains_key(position) || kept.contains(position);
+        let positions = (0..part.jobs.len()).filter(is_written);
+        let jobs: Jobs<'_> = positions.map(|position| (label(position), outcomes.get(&position))).collect();
+        let places = (from, to);
         let mut commit = Commit::begin(self.layout().storage, staging)?;
-        self.stage::<SlipRow<'_>>(&mut commit, part, &jobs, |writer, job, outcome| {
+        self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
         })?;
         if sweep.recording().precursors {
-            self.stage::<PrecursorRow<'_>>(&mut commit, part, &jobs, |writer, job, outcome| {
+            self.stage::<PrecursorRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
                 let mut precursors = outcome.iter().flat_map(|result| &result.precursors);
                 precursors.try_for_each(|precursor| writer.push(&(job, precursor)))
             })?;
         }
-        self.stage::<JobRow>(&mut commit, part, &jobs, |writer, job, outcome| {
+        self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             writer.push(&(relabel(job), JobRecord::new(outcome.as_ref().map_err(String::as_str))))
         })?;
         Ok(commit.publish()?)
@@ -154,14 +237,20 @@ impl Results<'_> {
         &self,
         commit: &mut Commit<'_>,
         part: &Part,
+        (from, to): (Option<Place>, Place),
         jobs: &'j Jobs<'_>,
         write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), DatasetError>,
     ) -> Result<(), ResultsError> {
-        let (target, storage) = (self.part_file(R::NAME, part), self.layout().storage);
-        storage.ensure_folder(&self.layout().table(R::NAME))?;
-        let keeps = jobs.iter().any(|(_, outcome)| outcome.is_none());
-        let before = if keeps { vec![target.clone()] } else { Vec::new() };
-        let kept = KeptRows::read(Dataset::new(storage, before))?;
+        let storage = self.layout().storage;
+        let place = |place| match place {
+            Place::Tables => self.part_file(R::NAME, part),
+            Place::Spill => self.spilled_file(R::NAME, part),
+        };
+        let target = place(to);
+        if let Some(folder) = target.parent() {
+            storage.ensure_folder(folder)?;
+        }
+        let kept = KeptRows::read(Dataset::new(storage, from.map(place).into_iter().collect()))?;
         let mut writer = TableWriter::new(commit.stage(&target)?, &self.footer(part.extension))?;
         for (job, outcome) in jobs {
             match outcome {
@@ -172,6 +261,13 @@ impl Results<'_> {
         writer.finish()?;
         Ok(())
     }
+}
+
+/// Where files of a part lie.
+#[derive(Clone, Copy)]
+enum Place {
+    Tables,
+    Spill,
 }
 
 /// The jobs of a part, those that were run with their outcomes.

@@ -3,17 +3,18 @@
 use crate::results::ResultsError;
 use crate::results::layout::part_name;
 use crate::results::parts::Outcome;
+use crate::results::workers::Member;
 use crate::run::cpu;
-use crate::run::share::{PartJob, Share};
+use crate::run::share::{Left, PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
-use crate::sweep::{Job, Part};
+use crate::sweep::Job;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -61,7 +62,7 @@ type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
 
 /// A part of which some jobs are still out.
 struct OpenPart {
-    part: Arc<Part>,
+    of: Arc<Taken>,
     outcomes: BTreeMap<usize, Outcome>,
     failed_before: u64,
     predicted_cost: f64,
@@ -70,7 +71,8 @@ struct OpenPart {
 
 pub(super) struct Collector<'a, 'e> {
     share: &'a Share<'a>,
-    staging: &'a Path,
+    member: &'a Member<'a>,
+    staging: PathBuf,
     walltime: &'a Walltime,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
@@ -80,17 +82,23 @@ pub(super) struct Collector<'a, 'e> {
 impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
         share: &'a Share<'a>,
-        staging: &'a Path,
+        member: &'a Member<'a>,
         walltime: &'a Walltime,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { share, staging, walltime, events, report, open: HashMap::new() }
+        Self { share, member, staging: member.staging(), walltime, events, report, open: HashMap::new() }
     }
 
-    /// Runs the jobs of the share, until they are done, the flag turns true, the time is over, or something fails that
-    /// is not a job. Returns whether all were run.
-    pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+    /// Runs jobs of the share, of which `parts` are missing, until none is left for this worker, the flag turns true, the
+    /// time is over, or something fails that is not a job. Returns what is left to others; `None` if it ended before.
+    pub fn run(
+        &mut self,
+        parts: u64,
+        threads: usize,
+        stop: &AtomicBool,
+        kernel: &Kernel<'_>,
+    ) -> Result<Option<Left>, ResultsError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.share.results.layout().root(), problem)
@@ -99,15 +107,38 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let jobs = self.share.jobs(self.walltime).take_while(|_| !interrupt.load(Ordering::Relaxed));
-        pool.in_place_scope(|workers| {
+        let left = &Mutex::<Left>::default();
+        let jobs = Work::new(self.share, self.member, self.walltime, interrupt, left, parts)?;
+        let all_run = pool.in_place_scope(|workers| {
             workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, under_way, &sender)));
             let collected = self.collect(&receiver, under_way, stop, interrupt);
             interrupt.store(true, Ordering::Relaxed);
             // Frees workers that wait to send.
             drop(receiver);
             collected
-        })
+        })?;
+        if !all_run {
+            self.spill()?;
+        }
+        let left = left.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(all_run.then(|| left.clone()))
+    }
+
+    /// Keeps the finished jobs of parts that are not whole.
+    fn spill(&mut self) -> Result<(), ResultsError> {
+        let open: Vec<OpenPart> = self.open.drain().map(|(_, open)| open).collect();
+        for open in &open {
+            let Taken { part, spilled, again, .. } = &*open.of;
+            if *again {
+                self.commit(open)?;
+            } else {
+                self.share.results.spill(&self.staging, part, &open.outcomes, spilled)?;
+                let jobs = open.outcomes.len() as u64;
+                self.report.jobs_spilled += jobs;
+                self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
+            }
+        }
+        Ok(())
     }
 
     fn collect(
@@ -150,7 +181,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             let elapsed = begin.elapsed();
             if elapsed >= *long_after {
                 *long_after = 2 * elapsed;
-                let part = &job.part;
+                let part = &job.of.part;
                 self.events.send(&RunEvent::JobTakesLong {
                     command: self.share.results.sweep().command(&part.jobs[job.position]),
                     predicted_cost: part.jobs[job.position].cost,
@@ -162,22 +193,24 @@ impl<'a, 'e> Collector<'a, 'e> {
     }
 
     fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
-        let job = &of.part.jobs[of.position];
+        let part = &of.of.part;
+        let job = &part.jobs[of.position];
+        self.member.count_job();
         let predicted_cost = job.cost;
         self.walltime.ended(predicted_cost, time.wall);
         let event = match &outcome {
             Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
             Err(reason) => RunEvent::JobFailed {
-                job_id: self.share.results.job_id(&of.part, of.position),
+                job_id: self.share.results.job_id(part, of.position),
                 reason: reason.clone(),
                 command: self.share.results.sweep().command(job),
                 predicted_cost,
             },
         };
         self.events.send(&event)?;
-        let key = (of.part.extension, of.part.index);
+        let key = (part.extension, part.index);
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
-            part: Arc::clone(&of.part),
+            of: Arc::clone(&of.of),
             outcomes: BTreeMap::new(),
             failed_before: 0,
             predicted_cost: 0.0,
@@ -188,7 +221,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         open.predicted_cost += predicted_cost;
         open.measured.cpu += time.cpu;
         open.measured.wall += time.wall;
-        if open.outcomes.len() == of.together
+        if open.outcomes.len() == of.of.together
             && let Some(whole) = self.open.remove(&key)
         {
             self.commit(&whole)?;
@@ -198,15 +231,15 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
-        self.share.results.commit(self.staging, &whole.part, &whole.outcomes)?;
+        let Taken { part, spilled, .. } = &*whole.of;
+        self.share.results.commit(&self.staging, part, &whole.outcomes, spilled)?;
         self.walltime.committed(begin.elapsed().as_secs_f64());
-        let (part, jobs) = (part_name(&whole.part), whole.outcomes.len());
+        let (part, jobs) = (part_name(part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
         let OpenPart { predicted_cost, measured: JobTime { cpu: measured_cost, wall }, .. } = *whole;
         let report = &mut *self.report;
         report.parts_committed += 1;
         report.jobs_run += jobs as u64;
-        // A part that others committed since the overview is not in the count.
         report.jobs_left = report.jobs_left.saturating_sub(jobs as u64);
         report.jobs_failed = (report.jobs_failed + failed as u64).saturating_sub(whole.failed_before);
         report.predicted_cost += predicted_cost;
@@ -231,10 +264,10 @@ fn work(
     let message = match job {
         Err(error) => Message::Broken(error),
         Ok(job) => {
-            let (begin, task) = (Instant::now(), &job.part.jobs[job.position]);
+            let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
             let long_after =
                 Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
-            let key = (job.part.extension, job.part.index, job.position);
+            let key = (job.of.part.extension, job.of.part.index, job.position);
             locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
             let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
             locked(under_way).remove(&key);

@@ -1,14 +1,15 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! share.rs   parts that are not there -> their jobs, lazily
+//! share.rs   parts that are not there, claimed -> their jobs, lazily
 //!            -> rayon -> kernel -> bounded channel ->
 //!            walltime.rs: those that end in time
 //! collect.rs on the calling thread: outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
-//! What is done is what is committed, so a killed run resumes by looking which part files are missing.
-//! Contract: the bytes of the tables depend on neither threads nor shards nor interruptions. Memory: the parts with a
+//! What is done is what is committed, so a killed run resumes by looking which part files are missing. The same command,
+//! started several times, shares the parts.
+//! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
 //! job in flight.
 
 mod collect;
@@ -23,11 +24,13 @@ mod walltime;
 pub use crate::results::events::{RunEvent, RunReport};
 pub use shard::{Shard, ShardError};
 pub use share::Overview;
-pub use status::{Failure, MAX_FAILURES, Status, status};
+pub use status::{Failure, MAX_FAILURES, Present, Status, status};
 
 use crate::observe::Measurements;
+use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
+use crate::results::workers::{Member, Task};
 use crate::results::{Results, ResultsError};
 use crate::run::collect::Collector;
 use crate::run::share::Share;
@@ -41,6 +44,9 @@ use std::time::{Duration, Instant};
 
 /// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
 pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
+
+/// What the claim of the reduction is called.
+const REDUCTION: &str = "reduce";
 
 /// How to run.
 #[derive(Clone, Copy, Debug)]
@@ -70,13 +76,105 @@ impl Events<'_> {
     }
 }
 
-/// Runs the jobs of a sweep that are not yet in a directory.
-///
-/// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
+/// A worker at the results of a sweep.
+pub struct Session<'a> {
+    results: &'a Results<'a>,
+    member: &'a Member<'a>,
+    begin: Instant,
+    threads: usize,
+    options: Options<'a>,
+}
+
+/// Joins those who work on the directory of a sweep, while `body` runs.
 ///
 /// # Errors
-/// When the directory belongs to something else or another process has it, or the disk fails. What was committed is
-/// kept, and the same command resumes from there.
+/// When the directory belongs to something else, or somebody has it alone; and what `body` says.
+pub fn join<T, E: From<ResultsError>>(
+    layout: &Layout<'_>,
+    sweep: &Sweep,
+    options: Options<'_>,
+    body: impl FnOnce(&Session<'_>) -> Result<T, E>,
+) -> Result<T, E> {
+    let begin = Instant::now();
+    let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
+    let results = Results::open(layout, sweep)?;
+    results.join(Task::Run, threads, |member| {
+        let ended = body(&Session { results: &results, member, begin, threads, options })?;
+        member.tidy().map_err(ResultsError::from)?;
+        Ok(ended)
+    })
+}
+
+impl Session<'_> {
+    /// The directory.
+    #[must_use]
+    pub const fn results(&self) -> &Results<'_> {
+        self.results
+    }
+
+    /// Runs jobs of the sweep that are not yet in the directory, beside the other workers, until none is left for this one.
+    ///
+    /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
+    ///
+    /// # Errors
+    /// When the disk fails. What was committed is kept, and the same command resumes from there.
+    pub fn run(&self, kernel: &Kernel<'_>, display: &mut dyn FnMut(&RunEvent)) -> Result<RunReport, ResultsError> {
+        let Self { results, member, begin, threads, options } = *self;
+        results.sync_names()?;
+        member.tidy()?;
+        let share = Share::look_up(results, options.shard, options.retry_failed)?;
+        let overview = share.overview()?;
+        let (jobs_again, cost_again) =
+            if options.retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
+        let jobs_left = overview.jobs_missing + jobs_again;
+        let mut report = RunReport { jobs_failed: jobs_again, jobs_left, ..RunReport::default() };
+        let mut events = Events { log: None, display };
+        if jobs_left > 0 {
+            let earlier_pace = if options.walltime.is_some() { results.pace()? } else { None };
+            let walltime = Walltime::new(begin, options.walltime, threads, earlier_pace);
+            events.log = Some(results.begin_log()?);
+            let (shard, predicted_cost) = (options.shard.to_string(), overview.predicted_cost_missing + cost_again);
+            let (others, jobs_there) = (member.others()?.len(), overview.jobs_done + overview.jobs_failed - jobs_again);
+            events.send(&RunEvent::started(shard, others, threads, jobs_left, jobs_there, predicted_cost))?;
+            let mut collector = Collector::new(&share, member, &walltime, &mut events, &mut report);
+            let ended = collector.run(overview.parts_missing, threads, options.stop, kernel);
+            report.wall = begin.elapsed().as_secs_f64();
+            let left = ended.inspect_err(|error| {
+                // The disk may be what failed: the first error counts.
+                let _ = events.send(&RunEvent::Error { error: error.to_string() });
+            })?;
+            report.time_wanted = walltime.refused();
+            report.stopped = left.is_none() && report.jobs_left > 0;
+            if let Some(left) = left {
+                (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());
+            }
+        }
+        if report.jobs_left == 0 && member.others()?.is_empty() {
+            report.jobs_failed =
+                Share::look_up(results, options.shard, false)?.overview_with_failures(|_, _, _| ())?.jobs_failed;
+        }
+        events.send(&RunEvent::Finished(report.clone()))?;
+        Ok(report)
+    }
+
+    /// Whether this worker is the one that reduces, of all that find every job done.
+    ///
+    /// # Errors
+    /// When the claims cannot be read or written.
+    pub fn takes_reduction(&self) -> Result<bool, ResultsError> {
+        let mut claims = Claims::list(self.results, self.member)?;
+        match claims.standing(REDUCTION, &self.member.others()?)? {
+            Standing::Free(generation) => claims.take(REDUCTION, generation),
+            Standing::Own => Ok(true),
+            Standing::Taken(_) => Ok(false),
+        }
+    }
+}
+
+/// Runs the jobs of a sweep that are not yet in a directory: a [`Session`] of this alone.
+///
+/// # Errors
+/// As [`join`] and [`Session::run`].
 pub fn run(
     layout: &Layout<'_>,
     sweep: &Sweep,
@@ -84,57 +182,5 @@ pub fn run(
     kernel: &Kernel<'_>,
     display: &mut dyn FnMut(&RunEvent),
 ) -> Result<RunReport, ResultsError> {
-    let begin = Instant::now();
-    let results = Results::open(layout, sweep)?;
-    let lock = results.lock_shard(&options.shard.writer())?.ok_or_else(|| {
-        let shard = options.shard;
-        let problem =
-            format!("shard {shard} is being run by another process; wait for it, stop it, or take another --shard");
-        ResultsError::busy(layout.root(), problem)
-    })?;
-    lock.while_held(|| run_locked(&results, begin, options, kernel, display))
-}
-
-/// Runs a shard that no other process has.
-fn run_locked(
-    results: &Results<'_>,
-    begin: Instant,
-    options: Options<'_>,
-    kernel: &Kernel<'_>,
-    display: &mut dyn FnMut(&RunEvent),
-) -> Result<RunReport, ResultsError> {
-    results.sync_names()?;
-    let staging = results.layout().staging(&options.shard.writer());
-    results.layout().storage.clear_folder(&staging)?;
-    results.clear_abandoned_staging()?;
-    let share = Share::look_up(results, options.shard, options.retry_failed)?;
-    let overview = share.overview(|_, _, _| ())?;
-    let (jobs_again, cost_again) =
-        if options.retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
-    let jobs_left = overview.jobs_missing + jobs_again;
-    let mut report = RunReport { jobs_failed: overview.jobs_failed, jobs_left, ..RunReport::default() };
-    let mut events = Events { log: None, display };
-    if jobs_left > 0 {
-        let threads =
-            options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
-        let walltime = Walltime::new(begin, options.walltime, threads, results.pace()?);
-        events.log = Some(results.begin_log()?);
-        let (shard, predicted_cost) = (options.shard.to_string(), overview.predicted_cost_missing + cost_again);
-        let jobs_there = overview.jobs_done + overview.jobs_failed;
-        events.send(&RunEvent::started(shard, threads, jobs_left, jobs_there, predicted_cost))?;
-        let mut collector = Collector::new(&share, &staging, &walltime, &mut events, &mut report);
-        let ended = collector.run(threads, options.stop, kernel);
-        report.wall = begin.elapsed().as_secs_f64();
-        let all_run = ended.inspect_err(|error| {
-            // The disk may be what failed: the first error counts.
-            let _ = events.send(&RunEvent::Error { error: error.to_string() });
-        })?;
-        if all_run {
-            report.jobs_left = 0;
-        }
-        report.time_wanted = walltime.refused();
-        report.stopped = report.jobs_left > 0;
-    }
-    events.send(&RunEvent::Finished(report))?;
-    Ok(report)
+    join(layout, sweep, options, |session| session.run(kernel, display))
 }

@@ -1,14 +1,15 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
 use crate::results::events::RunEvent;
+use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::shard::Shard;
 use crate::run::share::{Overview, Share};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::time::SystemTime;
 
 /// Version of [`Status`] as JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Failed jobs that are listed one by one, at most.
 pub const MAX_FAILURES: usize = 10;
 
@@ -22,15 +23,25 @@ pub struct Status {
     /// How far all parts are.
     #[serde(flatten)]
     pub overview: Overview,
-    /// Shards that are being run now, as `K/N`.
-    pub running: Vec<String>,
+    /// Workers that are there now.
+    pub workers: Vec<Present>,
     /// Measured over predicted CPU time so far, by the logs; null before the first part.
     pub pace: Option<f64>,
-    /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that run now or ran last; null
+    /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
     /// before the first part.
     pub time_left: Option<f64>,
     /// The first failed jobs, [`MAX_FAILURES`] at most.
     pub failures: Vec<Failure>,
+}
+
+/// A worker that is there.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Present {
+    /// Who.
+    #[serde(flatten)]
+    pub worker: Worker,
+    /// Time since its last beat, in s; beside the clock of the file system, that of this host is read.
+    pub last_beat: f64,
 }
 
 /// A job that failed.
@@ -50,38 +61,39 @@ pub struct Failure {
 /// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
-    let overview = Share::look_up(results, Shard::default(), false)?.overview(|part, position, reason| {
-        if failures.len() < MAX_FAILURES {
-            failures.push(Failure {
-                job_id: results.job_id(part, position),
-                reason: reason.to_owned(),
-                command: results.sweep().command(&part.jobs[position]),
-            });
-        }
-    })?;
-    let mut threads = BTreeMap::new();
+    let overview =
+        Share::look_up(results, Shard::default(), false)?.overview_with_failures(|part, position, reason| {
+            if failures.len() < MAX_FAILURES {
+                failures.push(Failure {
+                    job_id: results.job_id(part, position),
+                    reason: reason.to_owned(),
+                    command: results.sweep().command(&part.jobs[position]),
+                });
+            }
+        })?;
     let mut last_threads = None;
     results.events(|event| {
-        if let RunEvent::Started { shard, threads: started, .. } = event {
-            threads.insert(shard, started);
-            last_threads = Some(started);
+        if let RunEvent::Started { threads, .. } = event {
+            last_threads = Some(threads);
         }
     })?;
-    let mut running = Vec::new();
-    for name in threads.keys() {
-        let Ok(shard) = name.parse::<Shard>() else { continue };
-        if results.layout().is_locked(&shard.writer())? {
-            running.push(name.clone());
-        }
-    }
-    let threads =
-        if running.is_empty() { last_threads } else { Some(running.iter().map(|shard| threads[shard]).sum()) };
+    let now = SystemTime::now();
+    let present = |Living { worker, beat, .. }| {
+        let last_beat = now.duration_since(beat).unwrap_or_default().as_secs_f64();
+        Present { worker, last_beat }
+    };
+    let workers: Vec<Present> = results.layout().living(now)?.into_values().map(present).collect();
+    let threads = if workers.is_empty() {
+        last_threads
+    } else {
+        Some(workers.iter().map(|present| present.worker.threads).sum())
+    };
     let pace = results.pace()?;
     Ok(Status {
         format: FORMAT,
         name: results.sweep().name().to_owned(),
         overview,
-        running,
+        workers,
         pace,
         time_left: pace
             .zip(threads)

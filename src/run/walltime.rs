@@ -68,6 +68,12 @@ impl Walltime {
         admitted
     }
 
+    /// Jobs of these predicted costs are not started after all.
+    pub fn withdraw(&self, cost: f64) {
+        let mut state = self.state();
+        state.under_way = (state.under_way - cost).max(0.0);
+    }
+
     /// A job has ended.
     pub fn ended(&self, predicted: f64, measured: f64) {
         let mut state = self.state();

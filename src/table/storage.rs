@@ -7,7 +7,7 @@ use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How often to look whether a lock is free.
 const LOCK_POLL: Duration = Duration::from_millis(20);
@@ -68,6 +68,8 @@ pub trait Storage: Sync {
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
     /// Gives a file a second name within the file system; copies it where files have one name only.
     fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
+    /// Gives a file a second name that nothing has; false if something has it. Copies it where files have one name only.
+    fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError>;
     /// Returns when the names in a folder are on the disk.
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Names in a folder, sorted; none if there is no such folder.
@@ -90,6 +92,12 @@ pub trait Storage: Sync {
         let mut bytes = Vec::new();
         self.open(file)?.read_to_end(&mut bytes).map_err(StorageError::at("read", file))?;
         Ok(bytes)
+    }
+
+    /// When a file was written last, by the clock of its file system.
+    fn modified(&self, file: &Path) -> Result<SystemTime, StorageError> {
+        let modified = self.open(file)?.metadata().and_then(|metadata| metadata.modified());
+        modified.map_err(StorageError::at("look up", file))
     }
 
     /// The number of bytes of a file.
@@ -206,6 +214,21 @@ impl Storage for Disk {
     fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
         let copied = || fs::copy(from, to).and_then(|_| File::open(to)?.sync_all());
         fs::hard_link(from, to).or_else(|_| copied()).map_err(StorageError::at("copy a file here", to))
+    }
+
+    fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
+        let copied = || -> io::Result<()> {
+            let bytes = fs::read(from)?;
+            File::create_new(to)?.write_all(&bytes)
+        };
+        match fs::hard_link(from, to) {
+            Ok(()) => Ok(true),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+            Err(_) => match copied() {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+                copied => copied.map(|()| true).map_err(StorageError::at("create", to)),
+            },
+        }
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {

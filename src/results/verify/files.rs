@@ -96,19 +96,16 @@ impl FilesCheck<'_> {
         match found {
             State::Whole => self.whole(&files, [part.jobs.len()].into_iter())?,
             State::Damaged(errors) => self.damaged(&errors, &files, &[name], ids(results, part).collect()),
-            State::Missing => match self.committed.get(&name) {
-                Some(kept) => {
-                    self.verification.lost_compacted |= *kept == Kept::Compacted;
-                    let problem = "it is missing, though it was committed";
-                    let problem = Problem::of_file(jobs_file, problem, Remedy::Run);
-                    let jobs = ids(results, part).collect();
-                    self.verification.problems.push(Problem { parts: vec![name], jobs, ..problem });
-                }
-                None => {
-                    self.verification.parts_missing += 1;
-                    self.verification.jobs_missing += part.jobs.len() as u64;
-                }
-            },
+            State::Missing if let Some(kept) = self.committed.get(&name) => {
+                self.verification.lost_compacted |= *kept == Kept::Compacted;
+                let problem = Problem::of_file(jobs_file, "it is missing, though it was committed", Remedy::Run);
+                let jobs = ids(results, part).collect();
+                self.verification.problems.push(Problem { parts: vec![name], jobs, ..problem });
+            }
+            State::Missing => {
+                self.verification.parts_missing += 1;
+                self.verification.jobs_missing += part.jobs.len() as u64;
+            }
         }
         Ok(())
     }

@@ -67,7 +67,11 @@ fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<Run
 
 /// Tables, reduced data, manifest and sweeps, without logs, locks and leftovers.
 fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
-    let is_result = |path: &Path| !["run/log", "run/lock", "run/staging"].iter().any(|folder| path.starts_with(folder));
+    let is_result = |path: &Path| {
+        !["run/log", "run/lock", "run/staging", "run/workers", "run/claims"]
+            .iter()
+            .any(|folder| path.starts_with(folder))
+    };
     files.iter().filter(|(path, _)| is_result(path)).map(|(path, bytes)| (path.as_path(), bytes.as_slice())).collect()
 }
 

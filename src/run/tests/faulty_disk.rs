@@ -326,6 +326,16 @@ impl Storage for FaultyDisk {
         Err(StorageError::at("link", to)(io::ErrorKind::Unsupported.into()))
     }
 
+    fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
+        self.on(Operation::Create, to, |state| {
+            let bytes = Arc::clone(state.file(from)?);
+            state.is_folder(to.parent().unwrap())?;
+            let is_new = !state.seen.contains_key(to);
+            state.seen.entry(to.to_owned()).or_insert(Node::File(bytes));
+            Ok(is_new)
+        })
+    }
+
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.on(Operation::SyncFolder, folder, |state| {
             state.is_folder(folder)?;

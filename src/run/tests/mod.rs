@@ -9,7 +9,10 @@ use super::*;
 use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::results::ErrorKind;
+use crate::results::layout::part_name;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
+use crate::results::workers::SILENCE;
+use crate::results::workers::tests::leave;
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::Job;
 use crate::table::columns::Row;
@@ -152,8 +155,8 @@ fn a_stopped_run_resumes_byte_identical_and_runs_no_committed_job_again() {
     })
     .unwrap();
     assert!(report.stopped && stopping == 1);
-    assert!(report.jobs_run > 0 && report.jobs_failed == 0, "{report:?}");
-    assert_eq!(report.jobs_run + report.jobs_left, 2 * SEEDS);
+    assert!(report.jobs_spilled > 0 && report.jobs_failed == 0, "{report:?}");
+    assert_eq!(report.jobs_run + report.jobs_spilled + report.jobs_left, 2 * SEEDS);
     let again = AtomicU64::new(0);
     let resumed = run_all(root.path(), &sweep(SEEDS, ""), &|job, interrupt| {
         again.fetch_add(1, Ordering::Relaxed);
@@ -330,20 +333,145 @@ fn a_damaged_part_is_named_with_the_way_out_which_works() {
 }
 
 #[test]
-fn the_same_shard_twice_is_refused_while_it_runs() {
+fn a_second_worker_takes_what_the_first_has_not_and_ends_before_it() {
     let root = tempfile::tempdir().unwrap();
     let second = Mutex::new(None);
-    run_all(root.path(), &sweep(1, ""), &|job, interrupt| {
-        let stop = AtomicBool::new(false);
+    let stop = AtomicBool::new(false);
+    let again = |seeds| run(&Layout::new(&Disk, root.path()), &sweep(seeds, ""), options(&stop, 1), &fine, &mut |_| ());
+    let kernel = |job: &Job, interrupt: &AtomicBool| {
         let mut second = second.lock().unwrap();
         if second.is_none() {
-            *second = run(&Layout::new(&Disk, root.path()), &sweep(1, ""), options(&stop, 1), &fine, &mut |_| ()).err();
+            let other_sweep = again(SEEDS + 1).unwrap_err();
+            assert!(other_sweep.kind == ErrorKind::Busy, "{other_sweep}");
+            assert!(other_sweep.to_string().contains("for another sweep file"), "{other_sweep}");
+            *second = Some(again(SEEDS).unwrap());
         }
         fine(job, interrupt)
-    });
-    let error = second.into_inner().unwrap().unwrap();
-    assert!(error.kind == ErrorKind::Busy && error.to_string().contains("shard 1/1 is being run"), "{error}");
-    assert_eq!(run_all(root.path(), &sweep(1, ""), &fine).jobs_left, 0);
+    };
+    let first =
+        run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
+    let second = second.into_inner().unwrap().unwrap();
+    assert_eq!(first.jobs_run + second.jobs_run, 2 * SEEDS);
+    assert_eq!((second.jobs_left, second.hosts.len(), second.stopped), (first.jobs_run, 1, false));
+    assert!(first.jobs_run > 0 && second.jobs_run > first.jobs_run && first.jobs_left == 0);
+    assert!(tables_of(root.path()) == expected_tables());
+    assert!(fs::read_dir(root.path().join("run/claims")).unwrap().next().is_none());
+    assert!(fs::read_dir(root.path().join("run/workers")).unwrap().next().is_none());
+}
+
+/// Many threads of this process, each a worker of its own.
+#[test]
+fn workers_that_begin_at_once_run_every_part_exactly_once() {
+    for round in 0..5 {
+        let root = tempfile::tempdir().unwrap();
+        let runs = Mutex::new(BTreeMap::new());
+        let kernel = |job: &Job, interrupt: &AtomicBool| {
+            let id = (job.parameters.seed, job.parameters.drive_velocity.to_bits());
+            *runs.lock().unwrap().entry(id).or_insert(0) += 1;
+            std::thread::yield_now();
+            fine(job, interrupt)
+        };
+        let reports: Vec<RunReport> = std::thread::scope(|scope| {
+            let workers: Vec<_> =
+                (0..8).map(|_| scope.spawn(|| run_all(root.path(), &sweep(SEEDS, ""), &kernel))).collect();
+            workers.into_iter().map(|worker| worker.join().unwrap()).collect()
+        });
+        assert!(runs.into_inner().unwrap().values().all(|&count| count == 1), "round {round}");
+        assert_eq!(reports.iter().map(|report| report.jobs_run).sum::<u64>(), 2 * SEEDS);
+        assert!(tables_of(root.path()) == expected_tables());
+    }
+}
+
+#[test]
+fn finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again() {
+    let root = tempfile::tempdir().unwrap();
+    let all = Mutex::new(BTreeSet::new());
+    let mut stops = 0;
+    loop {
+        let (runs, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+        let kernel = |job: &Job, interrupt: &AtomicBool| {
+            // Seven jobs and no more.
+            if runs.fetch_add(1, Ordering::Relaxed) == 7 {
+                stop.store(true, Ordering::Relaxed);
+                while !interrupt.load(Ordering::Relaxed) {
+                    std::thread::yield_now();
+                }
+                return Err(SimulationError::Interrupted { time: 0.0 });
+            }
+            let is_new = all.lock().unwrap().insert((job.parameters.seed, job.parameters.drive_velocity.to_bits()));
+            assert!(is_new, "{job:?} is run again");
+            Ok(measure(&job.parameters))
+        };
+        let report =
+            run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
+        let (done, overview) = (all.lock().unwrap().len() as u64, {
+            status(&Results::read(&Layout::new(&Disk, root.path())).unwrap()).unwrap().overview
+        });
+        assert_eq!((overview.jobs_done, overview.jobs_missing), (done, 2 * SEEDS - done));
+        assert_eq!(report.jobs_left, 2 * SEEDS - done);
+        if !report.stopped {
+            break;
+        }
+        stops += 1;
+    }
+    assert!(stops > 10, "{stops}");
+    assert!(tables_of(root.path()) == expected_tables());
+    for table in ["slips", "precursors", "jobs"] {
+        assert!(fs::read_dir(root.path().join("run/spill").join(table)).unwrap().next().is_none());
+    }
+}
+
+/// Another host has claimed two parts: it beats, was silent for long, or is silent from now on.
+#[test]
+fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_left() {
+    for (silent, beats, is_taken) in
+        [(Duration::ZERO, true, false), (2 * SILENCE, false, true), (Duration::ZERO, false, true)]
+    {
+        let root = tempfile::tempdir().unwrap();
+        let layout = Layout::new(&Disk, root.path());
+        let results = Results::open(&layout, &sweep(SEEDS, "")).unwrap();
+        leave(&layout, "worker-elsewhere", false, silent);
+        fs::create_dir_all(layout.claims()).unwrap();
+        for part in results.plan().parts().skip(1).take(2) {
+            fs::write(layout.claims().join(format!("{}.0", part_name(&part))), "worker-elsewhere").unwrap();
+        }
+        let done = AtomicBool::new(false);
+        let report = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while beats && !done.load(Ordering::Relaxed) {
+                    leave(&layout, "worker-elsewhere", false, Duration::ZERO);
+                    std::thread::sleep(SILENCE / 20);
+                }
+            });
+            let begin = Instant::now();
+            let report = run_all(root.path(), &sweep(SEEDS, ""), &fine);
+            done.store(true, Ordering::Relaxed);
+            // Who beats is known after a beat, and who does not after the silence.
+            assert!(begin.elapsed() < 2 * SILENCE, "{:?}", begin.elapsed());
+            report
+        });
+        assert_eq!((report.jobs_left == 0, report.hosts.is_empty()), (is_taken, is_taken), "{report:?}");
+        assert_eq!(report.jobs_run == 2 * SEEDS, is_taken);
+        assert_eq!(tables_of(root.path()) == expected_tables(), is_taken);
+    }
+}
+
+#[test]
+fn a_damaged_spill_is_run_again() {
+    let root = tempfile::tempdir().unwrap();
+    let (runs, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let kernel = |job: &Job, _: &AtomicBool| {
+        stop.fetch_or(runs.fetch_add(1, Ordering::Relaxed) == 1, Ordering::Relaxed);
+        Ok(measure(&job.parameters))
+    };
+    let stopped =
+        run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
+    assert!(stopped.jobs_spilled > 0, "{stopped:?}");
+    for entry in fs::read_dir(root.path().join("run/spill/slips")).unwrap() {
+        fs::write(entry.unwrap().path(), "half a file").unwrap();
+    }
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    assert!(tables_of(root.path()) == expected_tables());
 }
 
 #[test]
@@ -358,7 +486,7 @@ fn the_status_reports_what_is_there_and_what_is_missing() {
     let failed = rows.iter().filter(|outcome| *outcome == "failed").count() as u64;
     assert_eq!((overview.jobs_failed, overview.jobs_done), (failed, rows.len() as u64 - failed));
     assert_eq!(overview.jobs_missing, 2 * SEEDS - rows.len() as u64);
-    assert!(overview.parts_done > 0 && overview.parts_missing > 0 && status.running.is_empty());
+    assert!(overview.parts_done > 0 && overview.parts_missing > 0 && status.workers.is_empty());
     assert!(status.pace.is_some_and(|pace| pace > 0.0) && status.time_left.is_some());
 }
 

@@ -151,7 +151,7 @@ proptest! {
         let (mut extensions, mut done): (Vec<Extension>, Vec<_>) = (Vec::new(), Vec::new());
         for sweep in &sweeps {
             if let Some(last) = extensions.len().checked_sub(1) {
-                let is_done = |index: u64| is_done[(index as usize + 7 * last) % is_done.len()];
+                let is_done = |index: u64| is_done[usize::try_from(index).unwrap().wrapping_add(7 * last) % is_done.len()];
                 let plan = Plan::new(&extensions);
                 done.extend(plan.parts_of(last).filter(|part| is_done(part.index)));
                 extensions[last].kept = Some(plan.ranges(last, |part| is_done(part.index)));

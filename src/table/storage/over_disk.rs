@@ -52,6 +52,10 @@ impl<T: OverDisk> Storage for T {
         self.before(Access::Change).map_err(StorageError::at("copy a file here", to))?;
         Disk.link(from, to)
     }
+    fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
+        self.before(Access::Change).map_err(StorageError::at("create", to))?;
+        Disk.link_new(from, to)
+    }
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.before(Access::Change).map_err(StorageError::at("sync", folder))?;
         Disk.sync_folder(folder)

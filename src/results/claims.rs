@@ -1,0 +1,108 @@
+//! Claims: which worker runs a part, or reduces, so that nothing is done twice.
+//!
+//! `run/claims/<what>.<generation>` is a link to a file with the worker's name: of several who make it, one wins. Who finds
+//! the winner dead makes the next generation. A claim stays while anybody is at work, as one who has looked before may not
+//! know yet what became of it. Who has lost some claims lists them all, and does not ask for one after the other.
+
+use crate::results::error::ResultsError;
+use crate::results::handle::Results;
+use crate::results::workers::{Living, Member};
+use crate::table::storage::StorageError;
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// The claims as they were when they were listed.
+#[derive(Debug)]
+pub struct Claims<'a> {
+    results: &'a Results<'a>,
+    member: &'a Member<'a>,
+    /// The last generation of each.
+    generations: HashMap<String, u64>,
+    own: HashSet<String>,
+}
+
+/// How a claim stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing<'a> {
+    /// Nobody has it: this generation can be made.
+    Free(u64),
+    /// This worker has it.
+    Own,
+    /// Another has it that lives.
+    Taken(&'a str),
+}
+
+impl<'a> Claims<'a> {
+    /// Lists the claims.
+    ///
+    /// # Errors
+    /// When they cannot be listed.
+    pub fn list(results: &'a Results<'a>, member: &'a Member<'a>) -> Result<Self, StorageError> {
+        results.layout().storage.ensure_folder(&results.layout().claims())?;
+        let mut claims = Self { results, member, generations: HashMap::new(), own: HashSet::new() };
+        claims.refresh()?;
+        Ok(claims)
+    }
+
+    /// Lists them again.
+    ///
+    /// # Errors
+    /// As [`Claims::list`].
+    pub fn refresh(&mut self) -> Result<(), StorageError> {
+        let names = self.results.layout().storage.list(&self.results.layout().claims())?;
+        for name in &names {
+            if let Some((what, generation)) = name.to_str().and_then(|name| name.rsplit_once('.'))
+                && let Ok(generation) = generation.parse::<u64>()
+            {
+                let last = self.generations.entry(what.to_owned()).or_default();
+                *last = generation.max(*last);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether nobody has claimed this, as far as is known.
+    #[must_use]
+    pub fn is_unclaimed(&self, what: &str) -> bool {
+        !self.generations.contains_key(what)
+    }
+
+    /// How a claim stands among workers that live.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn standing<'l>(&self, what: &str, living: &'l BTreeMap<String, Living>) -> Result<Standing<'l>, StorageError> {
+        if self.own.contains(what) {
+            return Ok(Standing::Own);
+        }
+        let Some(&generation) = self.generations.get(what) else { return Ok(Standing::Free(0)) };
+        let owner = self.owner(what, generation)?;
+        let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
+        Ok(living.map_or(Standing::Free(generation + 1), Standing::Taken))
+    }
+
+    /// Makes a claim; false if another was first.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn take(&mut self, what: &str, generation: u64) -> Result<bool, ResultsError> {
+        let layout = self.results.layout();
+        let path = layout.claims().join(format!("{what}.{generation}"));
+        let is_made = layout.storage.link_new(&self.member.claim(), &path)?;
+        // A network file system may have made it and been asked again.
+        let is_own = is_made || self.owner(what, generation)? == self.member.name();
+        self.generations.insert(what.to_owned(), generation);
+        if is_own {
+            self.own.insert(what.to_owned());
+        }
+        Ok(is_own)
+    }
+
+    /// The worker that has made a claim; empty if it is gone.
+    fn owner(&self, what: &str, generation: u64) -> Result<String, StorageError> {
+        let layout = self.results.layout();
+        match layout.storage.read(&layout.claims().join(format!("{what}.{generation}"))) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
+            name => Ok(String::from_utf8_lossy(&name?).into_owned()),
+        }
+    }
+}

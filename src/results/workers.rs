@@ -1,0 +1,440 @@
+//! Workers: the processes that are at work on a directory, known to each other by a file each.
+//!
+//! `run/workers/<name>` says host, process and threads, and is written anew every [`BEAT`] as long as the process lives;
+//! when it ends, the file goes. On its own host a process is looked up; elsewhere it lives if its file is at most
+//! [`SILENCE`] older than the newest of one's own. Both times are the file server's, so no clocks are compared. Contract:
+//! who lives is a matter of double work, and no more. Should a suspended process be taken for dead, it and its heir write
+//! the same bytes, each under staged names of its own.
+//!
+//! Who wants a directory alone, to change what is committed, joins as any other and then looks whether others are there;
+//! a run joins and then looks whether somebody wants to be alone. So of two that begin at once one sees the other, and
+//! leaves.
+
+use crate::results::commit::token;
+use crate::results::error::ResultsError;
+use crate::results::events::host;
+use crate::results::handle::Results;
+use crate::results::layout::Layout;
+use crate::table::storage::StorageError;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Time between two beats.
+pub const BEAT: Duration = if cfg!(test) { Duration::from_millis(100) } else { Duration::from_secs(5) };
+/// A worker of another host whose file is so much older than one's own is dead.
+pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(2) } else { Duration::from_mins(1) };
+/// What the names of workers, and of their staging folders, begin with.
+const PREFIX: &str = "worker-";
+/// What the name of a worker's file ends with while it is being written.
+const NEW: &str = ".new";
+/// Staged file whose links are the claims of a worker.
+const CLAIM: &str = "claim";
+
+/// What a process is there for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Task {
+    /// To run jobs, beside others.
+    Run,
+    /// To change what is committed, alone.
+    Change,
+}
+
+/// A process, as its file says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Worker {
+    /// Name of its host.
+    pub host: String,
+    /// Id of the process there.
+    pub process: u32,
+    /// Which processes it can look up: those of the same boot and name space. Empty if that is not known.
+    system: String,
+    /// When it began, in the ticks of its system: another process may get its id.
+    process_start: Option<u64>,
+    /// What it is there for.
+    pub task: Task,
+    /// Threads that run jobs.
+    pub threads: usize,
+    /// Jobs that it has finished, in a second.
+    pub jobs_per_second: f64,
+}
+
+impl Living {
+    /// What it does, in words.
+    pub(super) fn doing(&self) -> String {
+        let Worker { host, process, task, .. } = &self.worker;
+        let what = match task {
+            Task::Run => "run",
+            Task::Change => "repaired or compacted",
+        };
+        format!("is being {what} by process {process} on {host}")
+    }
+}
+
+/// Names of the workers of this process: one that died under a test leaves a file like a living one's.
+static OWN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+fn own() -> MutexGuard<'static, BTreeSet<String>> {
+    // Nothing panics while it is held.
+    OWN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Worker {
+    fn here(task: Task, threads: usize) -> Self {
+        let process = std::process::id();
+        let (system, process_start) = (system(), process_start(process));
+        Self { host: host(), process, system, process_start, task, threads, jobs_per_second: 0.0 }
+    }
+
+    /// Whether the process lives, if it is one that can be looked up.
+    fn lives_here(&self, name: &str) -> Option<bool> {
+        let can_look = !self.system.is_empty() && self.system == system() && self.process_start.is_some();
+        can_look.then(|| {
+            let is_lost = self.process == std::process::id() && !own().contains(name);
+            !is_lost && process_start(self.process) == self.process_start
+        })
+    }
+}
+
+/// The boot of the kernel and the name space of processes.
+fn system() -> String {
+    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+    let space = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+    if boot.is_empty() { String::new() } else { format!("{} {}", boot.trim(), space.display()) }
+}
+
+/// When a process began, in ticks since the boot; `None` if it has ended.
+fn process_start(process: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // Behind the name in brackets: state, ..., the 22nd field of all.
+    let mut fields = status.rsplit_once(')')?.1.split_whitespace();
+    let has_ended = matches!(fields.next()?, "Z" | "X");
+    if has_ended { None } else { fields.nth(18)?.parse().ok() }
+}
+
+/// A worker that lives, as far as another can know.
+#[derive(Clone, Debug)]
+pub struct Living {
+    /// What it says.
+    pub worker: Worker,
+    /// When it was written, by the clock of the file system.
+    pub beat: SystemTime,
+    /// Whether that is certain, as the process was looked up.
+    pub is_certain: bool,
+}
+
+/// This process among the workers of a directory, until it is dropped.
+#[derive(Debug)]
+pub struct Member<'a> {
+    layout: Layout<'a>,
+    name: String,
+    worker: Worker,
+    begin: Instant,
+    jobs: AtomicU64,
+}
+
+impl<'a> Results<'a> {
+    /// Joins the workers, and is one of them while `body` runs.
+    ///
+    /// # Errors
+    /// When the workers' files cannot be written or read, somebody changes what is committed, or, for [`Task::Change`],
+    /// anybody is at work; and what `body` says.
+    pub fn join<T, E: From<ResultsError>>(
+        &self,
+        task: Task,
+        threads: usize,
+        body: impl FnOnce(&Member<'a>) -> Result<T, E>,
+    ) -> Result<T, E> {
+        let member = Member::join(self.layout(), Worker::here(task, threads)).map_err(ResultsError::from)?;
+        member.check_peace()?;
+        std::thread::scope(|scope| {
+            let (end, ended) = channel::<()>();
+            let member = &member;
+            scope.spawn(move || {
+                while matches!(ended.recv_timeout(BEAT), Err(RecvTimeoutError::Timeout)) {
+                    // A beat that cannot be written costs double work at worst.
+                    let _ = member.beat();
+                }
+            });
+            let _end = end;
+            body(member)
+        })
+    }
+
+    /// Runs `body` while nobody else changes the directory.
+    ///
+    /// # Errors
+    /// As [`Results::join`].
+    pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
+        self.join(Task::Change, 1, |_| body())
+    }
+}
+
+impl Layout<'_> {
+    /// The workers that live, by their names. Compares beats with `now`, by the clock of the file system.
+    ///
+    /// # Errors
+    /// When the workers cannot be listed.
+    pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
+        let mut living = BTreeMap::new();
+        for name in self.storage.list(&self.workers())? {
+            let (name, path) = (name.to_string_lossy().into_owned(), self.workers().join(&name));
+            if name.ends_with(NEW) {
+                continue;
+            }
+            let read = || Some((self.storage.read(&path).ok()?, self.storage.modified(&path).ok()?));
+            // One that ends at this moment, or what a power cut left.
+            let Some((text, beat)) = read() else { continue };
+            let Ok(worker) = serde_json::from_slice::<Worker>(&text) else { continue };
+            let lives_here = worker.lives_here(&name);
+            let is_recent = || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;
+            if lives_here.unwrap_or_else(is_recent) {
+                living.insert(name, Living { worker, beat, is_certain: lives_here.is_some() });
+            }
+        }
+        Ok(living)
+    }
+}
+
+impl<'a> Member<'a> {
+    fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, StorageError> {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+        let host: String = worker.host.chars().map(plain).collect();
+        let name = format!("{PREFIX}{host}-{}-{}", worker.process, &token()[..8]);
+        own().insert(name.clone());
+        let member = Self { layout: layout.clone(), name, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
+        layout.storage.ensure_folder(&layout.workers())?;
+        // First, so that nobody takes what follows for a dead one's.
+        member.beat()?;
+        layout.storage.ensure_folder(&member.staging())?;
+        layout.storage.create(&member.claim())?.write(member.name.as_bytes())?;
+        Ok(member)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where it prepares files.
+    #[must_use]
+    pub fn staging(&self) -> PathBuf {
+        self.layout.staging(&self.name)
+    }
+
+    /// A file that holds its name.
+    pub(super) fn claim(&self) -> PathBuf {
+        self.staging().join(CLAIM)
+    }
+
+    /// A job has ended.
+    pub fn count_job(&self) {
+        self.jobs.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn beat(&self) -> Result<(), StorageError> {
+        let jobs_per_second = self.jobs.load(Ordering::Relaxed) as f64 / self.begin.elapsed().as_secs_f64();
+        let worker = Worker { jobs_per_second, ..self.worker.clone() };
+        // It always has a form as JSON: it holds texts and numbers alone.
+        let text = serde_json::to_string(&worker).unwrap_or_default();
+        let (storage, new) = (self.layout.storage, self.layout.workers().join(format!("{}{NEW}", self.name)));
+        let write = || storage.create(&new)?.write(text.as_bytes()).and_then(|()| storage.rename(&new, &self.file()));
+        match write() {
+            // Somebody who tidies up took it for a dead one's.
+            Err(error) if error.kind() == ErrorKind::NotFound => write(),
+            written => written,
+        }
+    }
+
+    fn file(&self) -> PathBuf {
+        self.layout.workers().join(&self.name)
+    }
+
+    /// The others that live.
+    ///
+    /// # Errors
+    /// When they cannot be listed.
+    pub fn others(&self) -> Result<BTreeMap<String, Living>, StorageError> {
+        let own = self.layout.storage.modified(&self.file());
+        let mut living = self.layout.living(own.unwrap_or_else(|_| SystemTime::now()))?;
+        living.remove(&self.name);
+        Ok(living)
+    }
+
+    /// Looks whether those that are there let this one work.
+    fn check_peace(&self) -> Result<(), ResultsError> {
+        let wants_peace = |other: &Living| [self.worker.task, other.worker.task].contains(&Task::Change);
+        let other = self.others()?.into_values().find(wants_peace);
+        other.map_or(Ok(()), |other| {
+            let problem = format!("{}; wait for it or stop it, then try again", other.doing());
+            Err(ResultsError::busy(self.layout.root(), problem))
+        })
+    }
+
+    /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
+    /// looked up what is done before they ended.
+    ///
+    /// # Errors
+    /// When something cannot be listed or removed.
+    pub fn tidy(&self) -> Result<(), StorageError> {
+        let (layout, storage) = (&self.layout, self.layout.storage);
+        let gone_is_fine = |removed: Result<(), StorageError>| match removed {
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            removed => removed,
+        };
+        // In this order: whoever comes later is not in these lists, and whoever came before is among the living.
+        let claims = storage.list(&layout.claims())?;
+        let mut left = storage.list(&layout.workers())?;
+        left.extend(storage.list(&layout.staging(""))?);
+        let others = self.others()?;
+        let is_dead = |name: &str| {
+            let is_new = name.ends_with(NEW) && !others.is_empty();
+            name.starts_with(PREFIX) && !is_new && name != self.name && !others.contains_key(name)
+        };
+        for name in left.iter().map(|name| name.to_string_lossy()).filter(|name| is_dead(name)) {
+            storage.remove_folder(&layout.staging(&name))?;
+            let file = layout.workers().join(&*name);
+            if storage.exists(&file)? {
+                gone_is_fine(storage.remove(&file))?;
+            }
+        }
+        if others.is_empty() {
+            claims.iter().try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Member<'_> {
+    fn drop(&mut self) {
+        // What stays is removed when the next worker begins.
+        let _ = self.layout.storage.remove_folder(&self.staging());
+        let _ = self.layout.storage.remove(&self.file());
+        own().remove(&self.name);
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::results::claims::{Claims, Standing};
+    use crate::sweep::Sweep;
+    use crate::table::storage::Disk;
+    use std::fs::{self, File};
+    use std::path::Path;
+
+    fn results(root: &Path) -> Results<'static> {
+        let sweep = Sweep::parse("name = \"test\"", Path::new("test.toml")).unwrap();
+        Results::open(&Layout::new(&Disk, root), &sweep).unwrap()
+    }
+
+    /// Leaves the file of a worker on another host, or of one here that was killed, which last beat so long ago.
+    pub fn leave(layout: &Layout<'_>, name: &str, is_here: bool, silent: Duration) {
+        let here = Worker::here(Task::Run, 3);
+        let elsewhere = Worker { host: "elsewhere".to_owned(), system: "another".to_owned(), ..here.clone() };
+        let path = layout.workers().join(name);
+        fs::create_dir_all(layout.workers()).unwrap();
+        fs::write(&path, serde_json::to_string(if is_here { &here } else { &elsewhere }).unwrap()).unwrap();
+        File::options().write(true).open(path).unwrap().set_modified(SystemTime::now() - silent).unwrap();
+    }
+
+    fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
+        results.join::<_, ResultsError>(Task::Run, 1, |member| Ok(body(member))).unwrap()
+    }
+
+    #[test]
+    fn a_worker_is_seen_while_it_lives_and_leaves_nothing() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        join(&results, |first| {
+            assert!(first.others().unwrap().is_empty());
+            join(&results, |second| {
+                let seen = &first.others().unwrap()[second.name()];
+                assert!(seen.is_certain && seen.worker.process == std::process::id());
+                assert_eq!(second.others().unwrap().into_keys().collect::<Vec<_>>(), [first.name()]);
+            });
+            assert!(first.others().unwrap().is_empty());
+        });
+        for folder in ["run/workers", "run/staging"] {
+            let left: Vec<_> =
+                fs::read_dir(root.path().join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+            assert!(left.iter().all(|path| path.ends_with("manifest")), "{left:?}");
+        }
+    }
+
+    #[test]
+    fn who_was_killed_here_is_dead_at_once_and_elsewhere_after_a_silence() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        let layout = results.layout();
+        leave(layout, "worker-here", true, Duration::ZERO);
+        leave(layout, "worker-fresh", false, Duration::ZERO);
+        leave(layout, "worker-slow", false, SILENCE / 2);
+        leave(layout, "worker-dead", false, 2 * SILENCE);
+        fs::write(layout.workers().join("worker-torn"), "{").unwrap();
+        join(&results, |member| {
+            let others = member.others().unwrap();
+            assert_eq!(others.keys().collect::<Vec<_>>(), ["worker-fresh", "worker-slow"]);
+            assert!(others.values().all(|living| !living.is_certain));
+            member.tidy().unwrap();
+        });
+        let mut left: Vec<_> =
+            fs::read_dir(layout.workers()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["worker-fresh", "worker-slow"]);
+    }
+
+    #[test]
+    fn a_member_beats_as_long_as_it_is_one() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        join(&results, |member| {
+            let beat = || results.layout().storage.modified(&member.file()).unwrap();
+            let first = beat();
+            std::thread::sleep(5 * BEAT);
+            assert!(beat() > first);
+        });
+    }
+
+    #[test]
+    fn generations_of_a_claim_rise_as_its_owners_die_and_claims_stay_while_others_are_there() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        join(&results, |first| {
+            let mut claims = Claims::list(&results, first).unwrap();
+            assert!(claims.take("part", 0).unwrap());
+            let standing =
+                |claims: &Claims<'_>, member: &Member<'_>| match claims.standing("part", &member.others().unwrap()) {
+                    Ok(Standing::Taken(owner)) => Err(owner.to_owned()),
+                    Ok(Standing::Free(generation)) => Ok(Some(generation)),
+                    Ok(Standing::Own) => Ok(None),
+                    Err(error) => panic!("{error}"),
+                };
+            assert_eq!(standing(&claims, first), Ok(None));
+            join(&results, |second| {
+                let mut others = Claims::list(&results, second).unwrap();
+                assert_eq!(standing(&others, second), Err(first.name().to_owned()));
+                assert!(!others.take("part", 0).unwrap());
+                assert!(others.take("other", 0).unwrap());
+                second.tidy().unwrap();
+            });
+            claims.refresh().unwrap();
+            assert!(!claims.is_unclaimed("other"), "its owner has ended, but others are there");
+            fs::write(results.layout().claims().join("part.1"), "worker-dead").unwrap();
+            join(&results, |third| {
+                let mut others = Claims::list(&results, third).unwrap();
+                assert_eq!(standing(&others, third), Ok(Some(2)));
+                assert!(others.take("part", 2).unwrap());
+            });
+            first.tidy().unwrap();
+            assert!(fs::read_dir(results.layout().claims()).unwrap().next().is_none(), "nobody else is there");
+        });
+    }
+}
