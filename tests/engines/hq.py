@@ -4,13 +4,12 @@ The package has no program `hq`, and its workers are threads of the server's pro
 with a server of its own that nobody uses, which is pointed to the common server before it adds its worker.
 """
 
-import subprocess
 import sys
 from pathlib import Path
 
 from hyperqueue import Job, LocalCluster
 from hyperqueue.cluster import WorkerConfig
-from processes import kill_host, wait_until
+from hosts import Host, wait_until
 
 # The link, in a server's folder, to what a worker needs to find the server.
 CURRENT = "hq-current"
@@ -27,17 +26,14 @@ class HyperQueue:
     def start_worker(self, host, cores):
         """Starts a worker on a host of that name."""
         log = (self.folder / f"{host}.log").open("wb")
-        words = ["unshare", "--uts", "bash", "-c", 'hostname "$0" && exec "$@"', host]
-        words += [sys.executable, __file__, self.folder / "server", self.folder / host, str(cores)]
-        self.workers[host] = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=log, stderr=log)
+        command = [sys.executable, __file__, self.folder / "server", self.folder / host, cores]
+        self.workers[host] = Host(host, command, log)
         file = self.folder / host / "added"
         wait_until(file.exists, 20, f"worker {host} starts")
 
     def kill_worker(self, host):
         """Kills a worker and its tasks."""
-        worker = self.workers.pop(host)
-        kill_host(worker.pid)
-        worker.wait()
+        self.workers.pop(host).kill()
 
     def submit(self, job: Job):
         """Submits a job, and returns what waits for it; that raises an exception if a task has failed."""

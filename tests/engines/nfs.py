@@ -7,7 +7,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from processes import wait_until
+from hosts import wait_until
 
 VERSIONS = ("4.2", "3")
 HOSTS = ("h1", "h2", "h3")

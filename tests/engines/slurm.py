@@ -6,7 +6,7 @@ import subprocess
 from collections import defaultdict
 from pathlib import Path
 
-from processes import kill_host, wait_until
+from hosts import Host, wait_until
 
 NODES = ["n1", "n2", "n3", "n4"]
 
@@ -60,6 +60,7 @@ class Slurm:
         # --force: as root, too, and below a folder that others may write.
         self.call("munged", "--force", f"--socket={munge}/socket", *files)
         self.call("slurmctld")
+        self.nodes = {}
         for node in NODES:
             self.start_node(node)
         wait_until(self.is_idle, 30, "all nodes are idle")
@@ -79,11 +80,12 @@ class Slurm:
 
     def start_node(self, node):
         """Starts the daemon of a node on a host of that name."""
-        self.call("unshare", "--uts", "bash", "-c", 'hostname "$0" && exec slurmd -N "$0"', node)
+        log = (self.folder / f"{node}.out").open("ab")
+        self.nodes[node] = Host(node, ["slurmd", "-D", "-N", node], log, env=self.environment, cwd=self.folder)
 
     def kill_node(self, node):
         """Kills all processes of a node."""
-        kill_host(int((self.folder / f"{node}.pid").read_text()))
+        self.nodes.pop(node).kill()
 
     def is_idle(self):
         """All nodes are up and have nothing to do."""

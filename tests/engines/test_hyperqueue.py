@@ -3,7 +3,7 @@
 import pytest
 from hq import HyperQueue
 from hyperqueue import Job
-from processes import wait_until
+from hosts import wait_until
 from sharing import PARTS, assert_each_part_ran_once, assert_same, done_parts, write_sweep
 
 BLOCKS = 100

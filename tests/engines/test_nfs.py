@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 from nfs import HOSTS, VERSIONS, Guest
-from processes import wait_until
+from hosts import wait_until
 from sharing import PARTS, assert_each_part_ran_once, assert_same, runs_of_parts, write_sweep
 
 # The guest is some 20 times slower than this machine: trivial jobs.
-BLOCKS, SLIPS = 1, 100
+BLOCKS, SLIPS = 1, 1000
 
 
 @pytest.fixture(scope="module")

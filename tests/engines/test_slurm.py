@@ -1,7 +1,7 @@
 """Slurm arrays share a sweep: whole, and with elements that are cancelled, preempted, out of time or lose their node."""
 
 import pytest
-from processes import wait_until
+from hosts import wait_until
 from sharing import PARTS, assert_each_part_ran_once, assert_same, done_parts, write_sweep
 from slurm import Slurm
 
