@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from sharing import write_sweep
+from sharing import BLOCKS, write_sweep
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,10 +22,10 @@ def program():
 
 @pytest.fixture(scope="session")
 def local_run(program, tmp_path_factory):
-    """Runs the sweep with some blocks and slips in one process, once; its results."""
+    """Runs the sweep in one process, once for each number of slips and blocks; its results."""
     done = {}
 
-    def run(blocks, slips):
+    def run(slips, blocks=BLOCKS):
         if (blocks, slips) not in done:
             folder = tmp_path_factory.mktemp("local")
             sweep = write_sweep(folder / "shared.toml", blocks, slips)

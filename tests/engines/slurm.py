@@ -91,10 +91,9 @@ class Slurm:
         """All nodes are up and have nothing to do."""
         return self.call("sinfo", "-h", "-N", "-p", "low", "-o", "%t").split() == ["idle"] * len(NODES)
 
-    def submit(self, script: Path, *options):
-        """Submits a batch script; the job's id."""
-        output = ["--open-mode=append", f"--output={self.folder}/%A-%a.out"]
-        return self.call("sbatch", "--parsable", *output, *options, script).strip()
+    def submit(self, command, *options):
+        """Submits a job with a command that takes options of sbatch; the job's id."""
+        return self.call(*command, "--parsable", *options).strip()
 
     def elements(self, job):
         """The nodes of the elements of an array that run."""

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 from nfs import HOSTS, VERSIONS, Guest
 from hosts import wait_until
-from sharing import PARTS, assert_each_part_ran_once, assert_same, runs_of_parts, write_sweep
+from sharing import assert_each_part_ran_once, assert_same, logged, write_sweep
 
 # The guest is some 20 times slower than this machine: trivial jobs.
-BLOCKS, SLIPS = 1, 1000
+TRIVIAL, SLIPS = 1, 1000
 
 
 @pytest.fixture(scope="module")
 def guest(program, tmp_path_factory):
     folder = tmp_path_factory.mktemp("nfs")
     shutil.copy(program, folder / "stickslip")
-    write_sweep(folder / "shared.toml", BLOCKS, SLIPS)
+    write_sweep(folder / "shared.toml", TRIVIAL, SLIPS)
     guest = Guest(folder, Path(os.environ["UML_PACKAGES"]))
     yield guest
     guest.power_off()
@@ -42,8 +42,8 @@ def test_three_hosts_share_a_sweep_and_run_each_part_once(guest, local_run, vers
     for command in [start(guest, host, version, name) for host in HOSTS]:
         command.wait(180)
     results = guest.fetch(name)
-    assert_each_part_ran_once(results)
-    assert_same(results, local_run(BLOCKS, SLIPS))
+    assert_each_part_ran_once(results, workers=len(HOSTS))
+    assert_same(results, local_run(SLIPS, TRIVIAL))
 
 
 def test_the_parts_of_a_killed_process_are_taken_over_by_another_host(guest, local_run):
@@ -58,5 +58,5 @@ def test_the_parts_of_a_killed_process_are_taken_over_by_another_host(guest, loc
         run.wait(240, expected=137 if host == "h2" else 0)
     for name in names.values():
         results = guest.fetch(name)
-        assert len(runs_of_parts(results)) == PARTS
-        assert_same(results, local_run(BLOCKS, SLIPS))
+        assert len(logged(results)) == len(HOSTS)
+        assert_same(results, local_run(SLIPS, TRIVIAL))
