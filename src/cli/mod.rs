@@ -1,6 +1,7 @@
 //! Flags, text and JSON output, progress, exit codes: the only code that prints.
 
 mod accuracy;
+mod batch;
 mod compact;
 mod completions;
 mod exit;
@@ -9,8 +10,11 @@ mod plan;
 mod progress;
 mod reduce;
 mod run;
+mod signals;
 mod simulate;
 mod status;
+mod threads;
+mod time;
 mod verify;
 
 use self::exit::Exit;
@@ -38,6 +42,7 @@ Exit codes: 0 done, 1 failed jobs remain, 2 bad usage or bad sweep file, 3 stopp
 enum Command {
     Plan(plan::Arguments),
     Run(run::Arguments),
+    Batch(batch::Arguments),
     Status(status::Arguments),
     Reduce(reduce::ReduceArguments),
     Plot(reduce::PlotArguments),
@@ -53,6 +58,7 @@ pub fn main() -> ExitCode {
     let ended = match Cli::parse().command {
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Batch(arguments) => batch::batch(&arguments),
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => reduce::plot(&arguments),

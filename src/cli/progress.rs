@@ -1,6 +1,7 @@
 //! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
 
 use super::output;
+use super::threads::Threads;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -21,10 +22,11 @@ pub struct Progress {
     jobs_done: u64,
     predicted: f64,
     predicted_done: f64,
+    threads: Threads,
 }
 
 impl Progress {
-    pub fn new() -> Self {
+    pub fn new(threads: Threads) -> Self {
         let now = Instant::now();
         Self {
             bar: ProgressBar::hidden(),
@@ -35,6 +37,7 @@ impl Progress {
             jobs_done: 0,
             predicted: 0.0,
             predicted_done: 0.0,
+            threads,
         }
     }
 
@@ -43,12 +46,13 @@ impl Progress {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.jobs = jobs;
                 self.predicted = predicted_cost;
+                let variable = self.threads.variable.map_or_else(String::new, |variable| format!(" ({variable})"));
                 let beside = match others {
                     0 => String::new(),
                     others => format!(", shared with {}", output::count(others as u64, "worker")),
                 };
                 self.say(&format!(
-                    "running {}, {jobs_there} there already; about {} on {}{beside}",
+                    "running {}, {jobs_there} there already; about {} on {}{variable}{beside}",
                     output::count(jobs, "job"),
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),

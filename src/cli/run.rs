@@ -2,13 +2,14 @@
 
 use super::exit::Exit;
 use super::progress::Progress;
-use super::{output, reduce};
-use anyhow::{Context, Result};
+use super::threads::{self, Threads};
+use super::{output, reduce, signals, time};
+use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 use stickslip::figure::draw_all;
 use stickslip::observe::measure;
@@ -29,8 +30,14 @@ Examples:
   stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; `merge` puts the parts together
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
-Ctrl-C and SIGTERM keep what is done; the same command resumes from there. Started several times, also on several hosts
-with a common disk, it shares the work.")]
+Started several times, also on several hosts with a common disk, it shares the work.
+
+Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2 and SIGXCPU keep what is done; the same command resumes from there. Any of them
+again changes nothing, except a second Ctrl-C, which exits at once.
+
+Batch systems say how many threads a job has in SLURM_CPUS_PER_TASK, OMP_NUM_THREADS, NCPUS, NSLOTS or
+LSB_DJOB_NUMPROC; the first that is set counts. `stickslip batch` prints a script that submits a sweep.")]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Sweep file, or results directory to resume
     #[arg(value_name = "SWEEP.toml|DIR")]
@@ -38,15 +45,19 @@ pub struct Arguments {
     /// Results directory [default: results/<name of the sweep>, or the one to resume]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads [default: all cores]
-    #[arg(long, value_name = "N", value_parser = threads)]
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
     threads: Option<NonZeroUsize>,
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// End within this time, such as 90s, 55m or 1h30m: start only what ends by then; reduction and figures come on top
-    #[arg(long, value_name = "TIME", value_parser = walltime)]
+    /// End within this time, such as 55m, 1h30m or 1:30:00: start only what ends by then; reduction and figures come on
+    /// top
+    #[arg(long, value_name = "TIME", value_parser = time::parse)]
     walltime: Option<Duration>,
+    /// One of many in a batch queue: end with 0 when the time is over or others run the rest
+    #[arg(long)]
+    worker: bool,
     /// Run failed jobs again
     #[arg(long)]
     retry_failed: bool,
@@ -56,27 +67,6 @@ pub struct Arguments {
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
-}
-
-fn threads(text: &str) -> Result<NonZeroUsize, &'static str> {
-    text.parse().map_err(|_| "must be a whole number >= 1")
-}
-
-/// A time as numbers with units.
-fn walltime(text: &str) -> Result<Duration, String> {
-    let refused = || "must be a time with units d, h, m, s, such as 55m or 1h30m".to_owned();
-    let mut seconds = 0.0;
-    for chunk in text.split_inclusive(char::is_alphabetic) {
-        let unit =
-            chunk.chars().last().and_then(|unit| Some((unit, [86_400.0, 3600.0, 60.0, 1.0]["dhms".find(unit)?])));
-        let (unit, length) = unit.ok_or_else(refused)?;
-        let number: f64 = chunk.trim_end_matches(unit).parse().map_err(|_| refused())?;
-        if number < 0.0 {
-            return Err(refused());
-        }
-        seconds += number * length;
-    }
-    Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero()).ok_or_else(refused)
 }
 
 /// Version of [`Report`] as JSON.
@@ -89,9 +79,6 @@ struct Report<'a> {
     report: &'a RunReport,
 }
 
-/// Set by the first Ctrl-C or SIGTERM.
-static STOP: AtomicBool = AtomicBool::new(false);
-
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let (sweep, default_root) = if arguments.sweep.is_dir() {
         let sweep = Results::read(&Layout::new(&Disk, &arguments.sweep))?.sweep().clone();
@@ -103,22 +90,18 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
-    ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(Exit::Stopped as u8));
-        }
-    })
-    .context("cannot catch Ctrl-C")?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
+    let stop = signals::catch()?;
     let options = Options {
-        threads: arguments.threads,
-        stop: &STOP,
+        threads: threads.count,
+        stop,
         retry_failed: arguments.retry_failed,
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let layout = Layout::new(&Disk, &root);
-    let mut progress = Progress::new();
+    let mut progress = Progress::new(threads);
     let report = stickslip::run::join(&layout, &sweep, options, |session| -> Result<RunReport> {
         let report =
             session.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
@@ -141,7 +124,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })?;
     if report.stopped {
         output::report(&resume_hint(&report, arguments.walltime.is_some()));
-        return Ok(Exit::Stopped);
+        let is_time_over = !stop.load(Ordering::Relaxed);
+        // One that could start nothing would start nothing the next time, either.
+        let has_worked = report.jobs_run + report.jobs_spilled > 0;
+        return Ok(if arguments.worker && is_time_over && has_worked { Exit::Done } else { Exit::Stopped });
     }
     if report.jobs_left > 0 {
         let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));
@@ -205,19 +191,4 @@ fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
         pairs.push(("wall time", output::duration(report.wall)));
     }
     pairs
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn walltimes_are_numbers_with_units() {
-        for (text, seconds) in [("90s", 90.0), ("55m", 3300.0), ("1h30m", 5400.0), ("0.5d", 43_200.0), ("1.5s", 1.5)] {
-            assert_eq!(walltime(text).unwrap().as_secs_f64(), seconds, "{text}");
-        }
-        for text in ["", "55", "m", "1h30", "-1h", "2h-1h", "0s", "nans", "infd", "1e300d", "5 m", "3w", "1m\u{e9}"] {
-            assert!(walltime(text).unwrap_err().contains("such as 55m"), "{text}");
-        }
-    }
 }

@@ -5,7 +5,7 @@ use super::output;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::verify::{Problem, Verification};
@@ -59,30 +59,20 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
 
 /// What repairs a directory.
 fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
-    let (root, mut commands) = (layout.root(), Vec::new());
+    let (root, mut commands) = (output::quoted(&layout.root().display().to_string()), Vec::new());
     if with_repair && verification.wants_repair() {
-        commands.push(format!("stickslip verify {} --repair", quoted(root)));
+        commands.push(format!("stickslip verify {root} --repair"));
     }
     if verification.wants_run {
-        commands.push(format!("stickslip run {}", quoted(root)));
+        commands.push(format!("stickslip run {root}"));
     }
     if verification.wants_compaction() {
-        commands.push(format!("stickslip compact {}", quoted(root)));
+        commands.push(format!("stickslip compact {root}"));
     }
     if verification.wants_reduction() {
-        commands.push(format!("stickslip reduce {}", quoted(root)));
+        commands.push(format!("stickslip reduce {root}"));
     }
     commands
-}
-
-/// A path as a shell reads it.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    if text.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
 }
 
 fn print_summary(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {

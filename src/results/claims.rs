@@ -76,6 +76,9 @@ impl<'a> Claims<'a> {
         }
         let Some(&generation) = self.generations.get(what) else { return Ok(Standing::Free(0)) };
         let owner = self.owner(what, generation)?;
+        if owner == self.member.name() {
+            return Ok(Standing::Own);
+        }
         let living = living.get_key_value(&owner).map(|(name, _)| name.as_str());
         Ok(living.map_or(Standing::Free(generation + 1), Standing::Taken))
     }

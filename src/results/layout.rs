@@ -31,7 +31,7 @@ const MANIFEST: &str = "manifest.json";
 /// Folder of the results directories that nobody placed elsewhere.
 pub(super) const RESULTS: &str = "results";
 /// Names of its folders.
-pub const RUN_FOLDERS: [&str; 6] = ["staging", "lock", "log", "workers", "claims", "spill"];
+pub const RUN_FOLDERS: [&str; 7] = ["staging", "lock", "log", "workers", "claims", "spill", "batch"];
 
 /// Paths within a results directory, and the storage on which it lies.
 #[derive(Clone)]

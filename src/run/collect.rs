@@ -5,7 +5,7 @@ use crate::results::layout::part_name;
 use crate::results::parts::Outcome;
 use crate::results::workers::Member;
 use crate::run::cpu;
-use crate::run::share::{Left, PartJob, Share, Taken, Work};
+use crate::run::share::{PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
@@ -91,14 +91,14 @@ impl<'a, 'e> Collector<'a, 'e> {
     }
 
     /// Runs jobs of the share, of which `parts` are missing, until none is left for this worker, the flag turns true, the
-    /// time is over, or something fails that is not a job. Returns what is left to others; `None` if it ended before.
+    /// time is over, or something fails that is not a job. Returns whether it took all that it could.
     pub fn run(
         &mut self,
         parts: u64,
         threads: usize,
         stop: &AtomicBool,
         kernel: &Kernel<'_>,
-    ) -> Result<Option<Left>, ResultsError> {
+    ) -> Result<bool, ResultsError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.share.results.layout().root(), problem)
@@ -107,8 +107,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let left = &Mutex::<Left>::default();
-        let jobs = Work::new(self.share, self.member, self.walltime, interrupt, left, parts)?;
+        let jobs = Work::new(self.share, self.member, self.walltime, interrupt, parts)?;
         let all_run = pool.in_place_scope(|workers| {
             workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, under_way, &sender)));
             let collected = self.collect(&receiver, under_way, stop, interrupt);
@@ -120,8 +119,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         if !all_run {
             self.spill()?;
         }
-        let left = left.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(all_run.then(|| left.clone()))
+        Ok(all_run)
     }
 
     /// Keeps the finished jobs of parts that are not whole.

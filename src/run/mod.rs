@@ -33,7 +33,7 @@ use crate::results::layout::Layout;
 use crate::results::workers::{Member, Task};
 use crate::results::{Results, ResultsError};
 use crate::run::collect::Collector;
-use crate::run::share::Share;
+use crate::run::share::{Left, Share};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Sweep};
@@ -137,7 +137,17 @@ impl Session<'_> {
             let (others, jobs_there) = (member.others()?.len(), overview.jobs_done + overview.jobs_failed - jobs_again);
             events.send(&RunEvent::started(shard, others, threads, jobs_left, jobs_there, predicted_cost))?;
             let mut collector = Collector::new(&share, member, &walltime, &mut events, &mut report);
-            let ended = collector.run(overview.parts_missing, threads, options.stop, kernel);
+            let ended = loop {
+                match collector.run(overview.parts_missing, threads, options.stop, kernel) {
+                    Ok(true) => (),
+                    ended => break ended.map(|_| None),
+                }
+                match share.left(member) {
+                    // Their worker has died since this one looked.
+                    Ok(Left { has_abandoned: true, .. }) => (),
+                    left => break left.map(Some),
+                }
+            };
             report.wall = begin.elapsed().as_secs_f64();
             let left = ended.inspect_err(|error| {
                 // The disk may be what failed: the first error counts.

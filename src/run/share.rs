@@ -15,8 +15,8 @@ use crate::sweep::Part;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::hash::{BuildHasher, RandomState};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
 /// Lost claims after which all are listed.
@@ -80,12 +80,15 @@ pub(super) struct PartJob {
     pub failed_before: bool,
 }
 
-/// What a worker leaves to others.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// What a worker leaves when it has nothing to do.
+#[derive(Debug, Default)]
 pub(super) struct Left {
+    /// Jobs of the parts that are not done.
     pub jobs: u64,
-    /// Names of the hosts that are at it.
+    /// Names of the hosts that are at them.
     pub hosts: BTreeSet<String>,
+    /// Whether nobody is at some of them.
+    pub has_abandoned: bool,
 }
 
 impl<'a> Share<'a> {
@@ -159,6 +162,23 @@ impl<'a> Share<'a> {
         Ok(unfinished.into_iter().filter(|&(position, _)| is_wanted(position)).collect())
     }
 
+    /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
+    /// nothing.
+    pub fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
+        let (others, claims) = (member.others()?, Claims::list(self.results, member)?);
+        let done = self.results.done_parts()?;
+        let mut left = Left::default();
+        for part in self.parts().filter(|part| !done.has(part)) {
+            left.jobs += part.jobs.len() as u64;
+            match claims.standing(&part_name(&part), &others)? {
+                Standing::Taken(owner) => drop(left.hosts.insert(others[owner].worker.host.clone())),
+                Standing::Free(_) => left.has_abandoned = true,
+                Standing::Own => (),
+            }
+        }
+        Ok(left)
+    }
+
     fn spilled(&self, part: &Part) -> Result<BTreeSet<usize>, ResultsError> {
         let is_spilled = self.spilled.contains(&(part.extension, part.index));
         if is_spilled { self.results.spilled(part) } else { Ok(BTreeSet::new()) }
@@ -171,7 +191,6 @@ pub(super) struct Work<'a> {
     member: &'a Member<'a>,
     walltime: &'a Walltime,
     interrupt: &'a AtomicBool,
-    left: &'a Mutex<Left>,
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
     /// The first pass.
@@ -187,7 +206,6 @@ impl<'a> Work<'a> {
         member: &'a Member<'a>,
         walltime: &'a Walltime,
         interrupt: &'a AtomicBool,
-        left: &'a Mutex<Left>,
         parts: u64,
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
@@ -199,7 +217,6 @@ impl<'a> Work<'a> {
             member,
             walltime,
             interrupt,
-            left,
             claims: Claims::list(share.results, member)?,
             others,
             pass: Box::new(pass),
@@ -255,16 +272,14 @@ impl<'a> Work<'a> {
             let others = self.member.others()?;
             self.claims.refresh()?;
             let done = self.share.results.done_parts()?;
-            let (mut left, mut is_certain) = (Left::default(), true);
+            let mut is_certain = true;
             for part in self.share.parts().filter(|part| !done.has(part)) {
                 match self.claims.standing(&part_name(&part), &others)? {
                     Standing::Own => (),
                     Standing::Taken(owner) => {
-                        let Living { worker, beat, is_certain: is_known } = &others[owner];
+                        let Living { beat, is_certain: is_known, .. } = &others[owner];
                         let has_beaten = beats.entry(owner.to_owned()).or_insert(*beat) != beat;
                         is_certain &= *is_known || has_beaten;
-                        left.jobs += part.jobs.len() as u64;
-                        left.hosts.insert(worker.host.clone());
                     }
                     Standing::Free(generation) => {
                         if self.take(part, generation, Vec::new())? {
@@ -276,7 +291,6 @@ impl<'a> Work<'a> {
                 }
             }
             if is_certain {
-                *locked(self.left) = left;
                 break;
             }
             for _ in 0..LOOK.as_millis() / POLL.as_millis() {
@@ -339,9 +353,4 @@ impl Iterator for Work<'_> {
         }
         None
     }
-}
-
-fn locked(left: &Mutex<Left>) -> MutexGuard<'_, Left> {
-    // Nothing panics while it is held.
-    left.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -135,6 +135,15 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("run good.toml --shard 0/2", &["--shard", "1 <= K <= N, such as 2/8"]),
         ("run good.toml --shard half", &["--shard", "1 <= K <= N, such as 2/8"]),
         ("run good.toml --fast", &["--fast"]),
+        ("run good.toml --walltime 55", &["--walltime", "write 55m for minutes or 55s for seconds"]),
+        // Scripts.
+        ("batch pbs good.toml", &["pbs", "slurm, hyperqueue"]),
+        ("batch slurm good.toml", &["--workers <N>", "--threads <N>", "--time <TIME>"]),
+        ("batch slurm missing.toml --workers 4 --threads 2 --time 1h", &["missing.toml: cannot be read"]),
+        ("batch slurm good.toml --workers 0 --threads 2 --time 1h", &["--workers"]),
+        ("batch slurm good.toml --workers 4 --threads 2 --time 90", &["write 90m for minutes or 90s for seconds"]),
+        ("batch slurm good.toml --workers 4 --threads 2 --time 30s", &["must be at least 1m"]),
+        ("batch slurm good.toml --workers 4 --threads 2 --time 1h --starts 3", &["--starts 3: must be >= --workers"]),
         // Directories that belong to something else.
         (
             "run good.toml --out theirs",

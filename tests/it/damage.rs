@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Parts of 4096 and 4 cheap jobs, extended by one of 10; some slips have precursors.
+/// Two parts of a job, extended by one; some slips have precursors.
 fn sweep(name: &str, seeds: u64) -> String {
     format!(
         "name = \"{name}\"\n[model]\nN = 2\nNs = 1\n[axes]\nseed = {{ count = {seeds} }}\n\
-         [record]\nslips = 1\ndiscard = 0\nprecursors = true\n"
+         [record]\nslips = 300\ndiscard = 0\nprecursors = true\n"
     )
 }
 
@@ -79,52 +79,52 @@ fn other_compacted(root: &Path) -> PathBuf {
 }
 
 const PARTS: &[Damage] = &[
-    damage("a jobs file cut in half", "tables/jobs/part-000-000001.parquet", 4, |root| {
+    damage("a jobs file cut in half", "tables/jobs/part-000-000001.parquet", 1, |root| {
         change(&path(root, "jobs", SECOND), |bytes| bytes.truncate(bytes.len() / 2));
     }),
-    damage("a slips file without its last byte", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("a slips file without its last byte", "tables/slips/part-000-000001.parquet", 1, |root| {
         change(&path(root, "slips", SECOND), |bytes| bytes.truncate(bytes.len() - 1));
     }),
-    damage("an empty precursors file", "tables/precursors/part-000-000001.parquet", 4, |root| {
+    damage("an empty precursors file", "tables/precursors/part-000-000001.parquet", 1, |root| {
         fs::write(path(root, "precursors", SECOND), "").unwrap();
     }),
-    damage("a bit of the data", "tables/slips/part-000-000000.parquet", 4096, |root| {
+    damage("a bit of the data", "tables/slips/part-000-000000.parquet", 1, |root| {
         flip(&path(root, "slips", FIRST), |length| length / 3);
     }),
-    damage("a bit of the footer", "tables/jobs/part-001-000000.parquet", 10, |root| {
+    damage("a bit of the footer", "tables/jobs/part-001-000000.parquet", 1, |root| {
         flip(&path(root, "jobs", EXTENSION), |length| length - 300);
     }),
-    damage("a bit of the first bytes", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("a bit of the first bytes", "tables/slips/part-000-000001.parquet", 1, |root| {
         flip(&path(root, "slips", SECOND), |_| 1);
     }),
-    damage("a bit of the last bytes", "tables/jobs/part-000-000001.parquet", 4, |root| {
+    damage("a bit of the last bytes", "tables/jobs/part-000-000001.parquet", 1, |root| {
         flip(&path(root, "jobs", SECOND), |length| length - 1);
     }),
-    damage("a bit of the length of the footer", "tables/jobs/part-000-000001.parquet", 4, |root| {
+    damage("a bit of the length of the footer", "tables/jobs/part-000-000001.parquet", 1, |root| {
         flip(&path(root, "jobs", SECOND), |length| length - 7);
     }),
-    damage("bytes at the end", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("bytes at the end", "tables/slips/part-000-000001.parquet", 1, |root| {
         change(&path(root, "slips", SECOND), |bytes| bytes.extend([0; 100]));
     }),
-    damage("a hole of zeros", "tables/jobs/part-000-000000.parquet", 4096, |root| {
+    damage("a hole of zeros", "tables/jobs/part-000-000000.parquet", 1, |root| {
         change(&path(root, "jobs", FIRST), |bytes| bytes[4096..8192].fill(0));
     }),
-    damage("another text in the file's place", "tables/slips/part-001-000000.parquet", 10, |root| {
+    damage("another text in the file's place", "tables/slips/part-001-000000.parquet", 1, |root| {
         fs::write(path(root, "slips", EXTENSION), "Permission denied\n").unwrap();
     }),
-    damage("a missing slips file", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("a missing slips file", "tables/slips/part-000-000001.parquet", 1, |root| {
         fs::remove_file(path(root, "slips", SECOND)).unwrap();
     }),
-    damage("a missing precursors file", "tables/precursors/part-001-000000.parquet", 10, |root| {
+    damage("a missing precursors file", "tables/precursors/part-001-000000.parquet", 1, |root| {
         fs::remove_file(path(root, "precursors", EXTENSION)).unwrap();
     }),
-    damage("a missing jobs file", "tables/jobs/part-000-000001.parquet", 4, |root| {
+    damage("a missing jobs file", "tables/jobs/part-000-000001.parquet", 1, |root| {
         fs::remove_file(path(root, "jobs", SECOND)).unwrap();
     }),
-    damage("a missing part", "tables/jobs/part-001-000000.parquet", 10, |root| {
+    damage("a missing part", "tables/jobs/part-001-000000.parquet", 1, |root| {
         in_all_tables(|table| fs::remove_file(path(root, table, EXTENSION)).unwrap());
     }),
-    damage("a missing table", "tables/precursors/part-000-000000.parquet", 4110, |root| {
+    damage("a missing table", "tables/precursors/part-000-000000.parquet", 3, |root| {
         fs::remove_dir_all(root.join("tables/precursors")).unwrap();
     }),
     damage("a copy under another name", "tables/slips/part-000-000001 (copy).parquet", 0, |root| {
@@ -136,22 +136,22 @@ const PARTS: &[Damage] = &[
     damage("a part of an extension that there is not", "tables/jobs/part-002-000000.parquet", 0, |root| {
         fs::copy(path(root, "jobs", SECOND), path(root, "jobs", "part-002-000000.parquet")).unwrap();
     }),
-    damage("names of two parts swapped", "tables/jobs/part-000-000000.parquet", 4100, |root| {
+    damage("names of two parts swapped", "tables/jobs/part-000-000000.parquet", 2, |root| {
         in_all_tables(|table| swap(&path(root, table, FIRST), &path(root, table, SECOND)));
     }),
-    damage("names of two slips files swapped", "tables/slips/part-000-000001.parquet", 4100, |root| {
+    damage("names of two slips files swapped", "tables/slips/part-000-000001.parquet", 2, |root| {
         swap(&path(root, "slips", FIRST), &path(root, "slips", SECOND));
     }),
-    damage("names of parts of two extensions swapped", "tables/slips/part-001-000000.parquet", 14, |root| {
+    damage("names of parts of two extensions swapped", "tables/slips/part-001-000000.parquet", 2, |root| {
         swap(&path(root, "slips", EXTENSION), &path(root, "slips", SECOND));
     }),
-    damage("a file in the folder of another table", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("a file in the folder of another table", "tables/slips/part-000-000001.parquet", 1, |root| {
         fs::copy(path(root, "jobs", SECOND), path(root, "slips", SECOND)).unwrap();
     }),
-    damage("a file moved to the folder of another table", "tables/precursors/part-000-000001.parquet", 4, |root| {
+    damage("a file moved to the folder of another table", "tables/precursors/part-000-000001.parquet", 1, |root| {
         fs::rename(path(root, "slips", SECOND), path(root, "precursors", SECOND)).unwrap();
     }),
-    damage("a part of another sweep", "tables/slips/part-000-000001.parquet", 4, |root| {
+    damage("a part of another sweep", "tables/slips/part-000-000001.parquet", 1, |root| {
         in_all_tables(|table| {
             fs::copy(path(&other(root), table, FIRST), path(root, table, SECOND)).unwrap();
         });
@@ -163,7 +163,7 @@ const PARTS: &[Damage] = &[
         fs::create_dir(path(root, "slips", "old")).unwrap();
         fs::copy(path(root, "slips", SECOND), path(root, "slips/old", SECOND)).unwrap();
     }),
-    damage("a folder in a file's place", "tables/jobs/part-000-000001.parquet", 4, |root| {
+    damage("a folder in a file's place", "tables/jobs/part-000-000001.parquet", 1, |root| {
         fs::remove_file(path(root, "jobs", SECOND)).unwrap();
         fs::create_dir(path(root, "jobs", SECOND)).unwrap();
     }),
@@ -177,7 +177,7 @@ const PARTS: &[Damage] = &[
     damage("a bit of the manifest's texts", "run/manifest.json", 0, |root| {
         let path = root.join("run/manifest.json");
         let text = fs::read_to_string(&path).unwrap();
-        fs::write(path, text.replace("count = 4110", "count = 4111")).unwrap();
+        fs::write(path, text.replace("count = 3", "count = 4")).unwrap();
     }),
     damage("a missing manifest", "run/manifest.json", 0, |root| {
         fs::remove_file(root.join("run/manifest.json")).unwrap();
@@ -200,32 +200,32 @@ const PARTS: &[Damage] = &[
 ];
 
 const COMPACTED: &[Damage] = &[
-    damage("a bit of compacted slips", "tables/slips/compact-000-000000-000001-", 4100, |root| {
+    damage("a bit of compacted slips", "tables/slips/compact-000-000000-000001-", 2, |root| {
         flip(&compacted(root, "slips"), |length| length / 2);
     }),
-    damage("compacted jobs cut in half", "tables/jobs/compact-000-000000-000001-", 4100, |root| {
+    damage("compacted jobs cut in half", "tables/jobs/compact-000-000000-000001-", 2, |root| {
         change(&compacted(root, "jobs"), |bytes| bytes.truncate(bytes.len() / 2));
     }),
-    damage("missing compacted precursors", "tables/precursors/compact-000-000000-000001-", 4100, |root| {
+    damage("missing compacted precursors", "tables/precursors/compact-000-000000-000001-", 2, |root| {
         fs::remove_file(compacted(root, "precursors")).unwrap();
     }),
-    damage("missing compacted jobs", "tables/jobs/compact-000-000000-000001-", 4100, |root| {
+    damage("missing compacted jobs", "tables/jobs/compact-000-000000-000001-", 2, |root| {
         fs::remove_file(compacted(root, "jobs")).unwrap();
     }),
-    damage("all compacted files of a sweep missing", "tables/jobs/part-000-000000.parquet", 4100, |root| {
+    damage("all compacted files of a sweep missing", "tables/jobs/part-000-000000.parquet", 2, |root| {
         in_all_tables(|table| fs::remove_file(compacted(root, table)).unwrap());
     }),
-    damage("all tables missing", "tables/jobs/part-001-000000.parquet", 4110, |root| {
+    damage("all tables missing", "tables/jobs/part-001-000000.parquet", 3, |root| {
         fs::remove_dir_all(root.join("tables")).unwrap();
     }),
-    damage("compacted files in each other's place", "tables/slips/compact-000-000000-000001-", 4100, |root| {
+    damage("compacted files in each other's place", "tables/slips/compact-000-000000-000001-", 2, |root| {
         swap(&compacted(root, "slips"), &compacted(root, "precursors"));
         let (slips, precursors) = (compacted(root, "slips"), compacted(root, "precursors"));
         let names = [&slips, &precursors].map(|path| path.file_name().unwrap().to_owned());
         fs::rename(&slips, slips.with_file_name(&names[1])).unwrap();
         fs::rename(&precursors, precursors.with_file_name(&names[0])).unwrap();
     }),
-    damage("a compacted file under the name of other parts", "tables/slips/compact-000-000000-000000-", 4100, |root| {
+    damage("a compacted file under the name of other parts", "tables/slips/compact-000-000000-000000-", 2, |root| {
         let path = compacted(root, "jobs");
         let name = path.file_name().unwrap().to_str().unwrap().replace("000000-000001", "000000-000000");
         fs::rename(&path, path.with_file_name(name)).unwrap();
@@ -269,9 +269,9 @@ fn json(text: &str) -> Value {
 /// A directory `parts`, and `compacted`, which is the same compacted; and both of another sweep.
 fn folder() -> Folder {
     let folder = Folder::new();
-    folder.write("a.toml", &sweep("damaged", 4100));
-    folder.write("b.toml", &sweep("damaged", 4110));
-    folder.write("c.toml", &sweep("other", 20));
+    folder.write("a.toml", &sweep("damaged", 2));
+    folder.write("b.toml", &sweep("damaged", 3));
+    folder.write("c.toml", &sweep("other", 1));
     folder.ends(0, "run a.toml --out parts --no-reduce");
     folder.ends(0, "run b.toml --out parts");
     folder.ends(0, "run c.toml --out other --no-reduce");
@@ -327,15 +327,15 @@ fn every_kind_of_damage_is_found_named_and_repaired_by_what_is_printed() {
 #[test]
 fn what_is_not_yet_done_is_no_damage() {
     let folder = Folder::new();
-    folder.write("a.toml", &sweep("unfinished", 4100));
+    folder.write("a.toml", &sweep("unfinished", 2));
     folder.ends(0, "run a.toml --out r --shard 2/2 --no-reduce");
     // As a run leaves it that is killed between two files of a part.
     folder.ends(0, "run a.toml --out other --no-reduce");
     fs::copy(path(&folder.path("other"), "slips", FIRST), path(&folder.path("r"), "slips", FIRST)).unwrap();
     let text = folder.ends(0, "verify r").stdout;
-    assert!(text.contains("not yet done  1 part, 4096 jobs\ndamaged       nothing\n"), "{text}");
+    assert!(text.contains("not yet done  1 part, 1 job\ndamaged       nothing\n"), "{text}");
     let report = json(&folder.ends(0, "verify r --json").stdout);
-    assert_eq!((report["parts"].as_u64(), report["jobs"].as_u64()), (Some(1), Some(4)));
+    assert_eq!((report["parts"].as_u64(), report["jobs"].as_u64()), (Some(1), Some(1)));
     assert!(report["commands"].as_array().unwrap().is_empty(), "{report}");
     // Readers see that file, so it must be whole nevertheless.
     flip(&path(&folder.path("r"), "slips", FIRST), |length| length / 2);

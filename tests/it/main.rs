@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod bad_input;
+mod batch;
 mod compaction;
 mod damage;
 mod deterministic_rows;
@@ -22,6 +23,6 @@ mod program;
 mod ramp;
 mod regimes;
 mod runs;
-mod shards;
+mod sharing;
 mod simulate;
 mod statistics;

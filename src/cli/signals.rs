@@ -1,0 +1,41 @@
+//! Signals that end a run early: the first of them stops it cleanly, and what is done is kept.
+//!
+//! Batch systems warn with one signal and follow with others, and some send the same one twice. So only a second SIGINT,
+//! which is Ctrl-C, exits at once. SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
+
+use super::exit::Exit;
+use anyhow::{Context, Result};
+use signal_hook::consts::signal::{SIGINT, SIGTERM};
+#[cfg(unix)]
+use signal_hook::consts::signal::{SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
+use signal_hook::flag::{register, register_conditional_shutdown};
+use std::io;
+use std::sync::atomic::AtomicBool;
+
+#[cfg(unix)]
+const STOPPING: &[i32] = &[SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU];
+#[cfg(not(unix))]
+const STOPPING: &[i32] = &[SIGINT, SIGTERM];
+
+/// Set by the first signal that stops.
+static STOP: AtomicBool = AtomicBool::new(false);
+/// Set by the first SIGINT.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Set when a file would pass the limit on its size; the write then fails, and its error is reported.
+#[cfg(unix)]
+static FILE_TOO_LARGE: AtomicBool = AtomicBool::new(false);
+
+/// Catches the signals; the flag turns true with the first.
+pub fn catch() -> Result<&'static AtomicBool> {
+    register_all().context("cannot catch signals")?;
+    Ok(&STOP)
+}
+
+fn register_all() -> io::Result<()> {
+    // Before the flag that it looks at, so that the first SIGINT does not exit.
+    register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
+    register(SIGINT, &INTERRUPTED)?;
+    #[cfg(unix)]
+    register(SIGXFSZ, &FILE_TOO_LARGE)?;
+    STOPPING.iter().try_for_each(|&signal| register(signal, &STOP).map(|_| ()))
+}
