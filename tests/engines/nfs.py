@@ -71,9 +71,11 @@ class Guest:
         """Runs a command on a host of the guest, which must succeed, and returns what it prints."""
         return self.start(host, command).wait()
 
-    def fetch(self, name):
-        """Copies a folder of the server's disk out of the guest; where it is."""
-        self.run("server", f"cp -r /mnt/disk/{name} /run/sandbox/")
+    def fetch(self, name, folders="."):
+        """Copies a folder of the server's disk, or some folders in it, out of the guest; where it is."""
+        to = f"/run/sandbox/{name}"
+        # Files that vanish meanwhile are claims or staged ones.
+        self.run("server", f"rm -rf {to}; mkdir {to}; cd /mnt/disk/{name} && cp -r --parents {folders} {to}/ || true")
         return self.folder / name
 
     def power_off(self):

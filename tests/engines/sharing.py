@@ -41,6 +41,13 @@ def logged(results: Path) -> list[list[dict]]:
     return [events for events in logs if any(event["event"] == "part_committed" for event in events)]
 
 
+def abandoned(results: Path, host: str) -> set[str]:
+    """The parts that processes of a host have claimed and not committed."""
+    claims = [claim for claim in results.glob("run/claims/*") if claim.read_text().startswith(f"worker-{host}-")]
+    done = {file.stem for file in results.glob("tables/jobs/*")}
+    return {claim.stem for claim in claims} - done
+
+
 def contents(results: Path) -> dict[str, bytes]:
     """The bytes of all that is not of the run itself: tables, reduced data and figures."""
     files = [file for file in results.rglob("*") if file.is_file()]

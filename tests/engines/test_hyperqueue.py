@@ -8,7 +8,7 @@ from hosts import wait_until
 from hq import HyperQueue
 from hyperqueue import Job
 from hyperqueue.ffi.protocol import ResourceRequest
-from sharing import BLOCKS, PARTS, assert_each_part_ran_once, assert_same, done_parts, write_sweep
+from sharing import BLOCKS, PARTS, abandoned, assert_each_part_ran_once, assert_same, done_parts, write_sweep
 
 TASKS = 6
 
@@ -66,6 +66,7 @@ def test_the_parts_of_a_killed_worker_are_taken_over(hyperqueue, program, local_
     wait = submit(hyperqueue, program, tmp_path)
     wait_until(lambda: done_parts(results) >= 8, 60, "eight parts are done")
     hyperqueue.kill_worker("w2")
+    assert abandoned(results, "w2")
     wait()
     assert done_parts(results) == PARTS
     assert_same(results, local_run(SLIPS))

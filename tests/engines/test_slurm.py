@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 from hosts import wait_until
-from sharing import BLOCKS, PARTS, assert_each_part_ran_once, assert_same, done_parts, write_sweep
+from sharing import BLOCKS, PARTS, abandoned, assert_each_part_ran_once, assert_same, done_parts, write_sweep
 from slurm import Slurm
 
 ELEMENTS = range(1, 9)
@@ -85,6 +85,7 @@ def test_the_parts_of_a_node_that_dies_are_taken_over(slurm, array, local_run):
     array = array()
     job, nodes = array.submit_and_wait(parts=8)
     slurm.kill_node("n3")
+    assert abandoned(array.results, "n3")
     wait_until(lambda: slurm.start_requeued(job), 60, "Slurm finds the node dead")
     outcomes = slurm.wait_for(job, 240)
     slurm.start_node("n3")
