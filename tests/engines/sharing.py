@@ -1,0 +1,71 @@
+"""A sweep of 64 parts, and what must hold of its results however many processes shared it."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+SWEEP = """
+name = "shared"
+
+[model]
+N = {blocks}
+
+[axes]
+V0   = {{ log = [1e-5, 2e-4], points = 8 }}
+seed = {{ count = 8 }}
+
+[record]
+slips = {slips}
+"""
+
+PARTS = 64
+
+# A number of blocks with which ten slips of all jobs take some 1.3 s of CPU time.
+BLOCKS = 100
+
+
+def write_sweep(file: Path, blocks: int, slips: int) -> Path:
+    """Writes the sweep; its cost goes with the number of blocks and slips."""
+    file.write_text(SWEEP.format(blocks=blocks, slips=slips))
+    return file
+
+
+def done_parts(results: Path) -> int:
+    """The number of parts that are done."""
+    return len(list(results.glob("tables/jobs/part-*")))
+
+
+def logged(results: Path) -> list[list[dict]]:
+    """The events in the log of each process that ran jobs."""
+    logs = [[json.loads(line) for line in log.read_text().splitlines()] for log in results.glob("run/log/*.jsonl")]
+    return [events for events in logs if any(event["event"] == "part_committed" for event in events)]
+
+
+def abandoned(results: Path, host: str) -> set[str]:
+    """The parts that processes of a host have claimed and not committed."""
+    claims = [claim for claim in results.glob("run/claims/*") if claim.read_text().startswith(f"worker-{host}-")]
+    done = {file.stem for file in results.glob("tables/jobs/*")}
+    return {claim.stem for claim in claims} - done
+
+
+def contents(results: Path) -> dict[str, bytes]:
+    """The bytes of all that is not of the run itself: tables, reduced data and figures."""
+    files = [file for file in results.rglob("*") if file.is_file()]
+    names = [file.relative_to(results) for file in files]
+    return {str(name): file.read_bytes() for name, file in zip(names, files) if name.parts[0] != "run"}
+
+
+def assert_same(shared: Path, local: Path):
+    """The results have the bytes of a local run with one process."""
+    found, expected = contents(shared), contents(local)
+    assert sorted(found) == sorted(expected)
+    assert [name for name in found if found[name] != expected[name]] == []
+
+
+def assert_each_part_ran_once(results: Path, workers: int):
+    """No part was run twice, all are in the logs, and at least this many processes had a share."""
+    logs = logged(results)
+    runs = Counter(event["part"] for events in logs for event in events if event["event"] == "part_committed")
+    assert {part: count for part, count in runs.items() if count > 1} == {}
+    assert len(runs) == PARTS
+    assert len(logs) >= workers

@@ -1,0 +1,70 @@
+"""Hosts that mount a disk over NFS 4.2, or 3 without locks, share a sweep."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from nfs import HOSTS, VERSIONS, Guest
+from hosts import wait_until
+from sharing import abandoned, assert_each_part_ran_once, assert_same, write_sweep
+
+# System calls of the guest are some 20 times slower than this machine's: one block, and slips for some 9 s of CPU time.
+TRIVIAL, SLIPS = 1, 4000
+
+
+@pytest.fixture(scope="module")
+def guest(program, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nfs")
+    shutil.copy(program, folder / "stickslip")
+    write_sweep(folder / "shared.toml", TRIVIAL, SLIPS)
+    guest = Guest(folder, Path(os.environ["UML_PACKAGES"]))
+    yield guest
+    guest.power_off()
+
+
+def test_three_hosts_mount_both_versions(guest):
+    mounts = (guest.folder / "mounts").read_text()
+    assert " /mnt/4.2 nfs4 " in mounts and "vers=4.2" in mounts
+    assert " /mnt/3 nfs " in mounts and "vers=3" in mounts and "local_lock=all" in mounts
+
+
+def start(guest, host, version, name):
+    """Starts a run of the sweep on a host; its process id goes to a file."""
+    program = "/run/sandbox/stickslip run /run/sandbox/shared.toml"
+    pid = f"/run/sandbox/{name}-{host}.pid"
+    return guest.start(host, f"echo $$ > {pid}; exec {program} --out /mnt/{version}/{name} --threads 1")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_three_hosts_share_a_sweep_and_run_each_part_once(guest, local_run, version):
+    name = f"together-{version}"
+    for command in [start(guest, host, version, name) for host in HOSTS]:
+        command.wait(180)
+    results = guest.fetch(name)
+    assert_each_part_ran_once(results, workers=len(HOSTS))
+    assert_same(results, local_run(SLIPS, TRIVIAL))
+
+
+def test_the_parts_of_a_killed_process_are_taken_over_by_another_host(guest, local_run):
+    # Both versions at once: a silent process of another host counts as dead after a minute.
+    names = {version: f"killed-{version}" for version in VERSIONS}
+    runs = {(host, version): start(guest, host, version, names[version]) for host in HOSTS for version in VERSIONS}
+    left = list(names.values())
+
+    def kill_where_parts_are_done():
+        counts = guest.run("server", "; ".join(f"ls /mnt/disk/{name}/tables/jobs 2>/dev/null | wc -l" for name in left))
+        for name, count in zip(list(left), counts.split()):
+            if int(count) >= 4:
+                guest.run("h2", f"kill -9 $(cat /run/sandbox/{name}-h2.pid)")
+                assert abandoned(guest.fetch(name, "run/claims tables/jobs"), "h2")
+                left.remove(name)
+        return not left
+
+    wait_until(kill_where_parts_are_done, 90, "four parts are done")
+    for (host, version), run in runs.items():
+        run.wait(240, expected=137 if host == "h2" else 0)
+    for name in names.values():
+        results = guest.fetch(name)
+        assert_each_part_ran_once(results, workers=len(HOSTS))
+        assert_same(results, local_run(SLIPS, TRIVIAL))
