@@ -26,9 +26,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Time between two beats.
-pub const BEAT: Duration = if cfg!(test) { Duration::from_millis(100) } else { Duration::from_secs(5) };
+pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
 /// A worker of another host whose file is so much older than one's own is dead.
-pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(2) } else { Duration::from_mins(1) };
+pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(4) } else { Duration::from_mins(1) };
 /// What the names of workers, and of their staging folders, begin with.
 const PREFIX: &str = "worker-";
 /// What the name of a worker's file ends with while it is being written.
@@ -398,7 +398,7 @@ pub(crate) mod tests {
         join(&results, |member| {
             let beat = || results.layout().storage.modified(&member.file()).unwrap();
             let first = beat();
-            std::thread::sleep(5 * BEAT);
+            std::thread::sleep(2 * BEAT);
             assert!(beat() > first);
         });
     }
