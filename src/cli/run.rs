@@ -102,9 +102,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
-    let report = stickslip::run::join(&layout, &sweep, options, |session| -> Result<RunReport> {
+    let report = stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
         let report =
-            session.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
+            joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);
             })?;
         if arguments.json {
@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         }
         let is_complete = report.jobs_left == 0 && !report.stopped;
         if is_complete && !arguments.no_reduce {
-            if arguments.shard.is_some() || session.takes_reduction()? {
+            if arguments.shard.is_some() || joined.takes_reduction()? {
                 reduce_and_draw(&layout, arguments)?;
             } else {
                 output::report("all jobs are done; another worker reduces them");

@@ -77,7 +77,7 @@ impl Events<'_> {
 }
 
 /// A worker at the results of a sweep.
-pub struct Session<'a> {
+pub struct Joined<'a> {
     results: &'a Results<'a>,
     member: &'a Member<'a>,
     begin: Instant,
@@ -93,19 +93,19 @@ pub fn join<T, E: From<ResultsError>>(
     layout: &Layout<'_>,
     sweep: &Sweep,
     options: Options<'_>,
-    body: impl FnOnce(&Session<'_>) -> Result<T, E>,
+    body: impl FnOnce(&Joined<'_>) -> Result<T, E>,
 ) -> Result<T, E> {
     let begin = Instant::now();
     let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
     let results = Results::open(layout, sweep)?;
     results.join(Task::Run, threads, |member| {
-        let ended = body(&Session { results: &results, member, begin, threads, options })?;
+        let ended = body(&Joined { results: &results, member, begin, threads, options })?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })
 }
 
-impl Session<'_> {
+impl Joined<'_> {
     /// The directory.
     #[must_use]
     pub const fn results(&self) -> &Results<'_> {
@@ -181,10 +181,10 @@ impl Session<'_> {
     }
 }
 
-/// Runs the jobs of a sweep that are not yet in a directory: a [`Session`] of this alone.
+/// Runs the jobs of a sweep that are not yet in a directory: a [`Joined`] of this alone.
 ///
 /// # Errors
-/// As [`join`] and [`Session::run`].
+/// As [`join`] and [`Joined::run`].
 pub fn run(
     layout: &Layout<'_>,
     sweep: &Sweep,
@@ -192,5 +192,5 @@ pub fn run(
     kernel: &Kernel<'_>,
     display: &mut dyn FnMut(&RunEvent),
 ) -> Result<RunReport, ResultsError> {
-    join(layout, sweep, options, |session| session.run(kernel, display))
+    join(layout, sweep, options, |joined| joined.run(kernel, display))
 }
