@@ -8,7 +8,8 @@ SWEEP = """
 name = "shared"
 
 [model]
-N = {blocks}
+N  = {blocks}
+V0 = 2e-5
 
 [axes]
 seed = {{ count = 64 }}
