@@ -39,7 +39,7 @@ def rayleigh_p(angles: ArrayLike) -> float:
 
 
 def rayleigh_p_of(count: int, length: ArrayLike) -> numpy.ndarray:
-    """The same of so many angles by their resultant length."""
+    """The same, from the number of angles and their resultant length."""
     return numpy.exp(numpy.sqrt(1 + 4 * count + 4 * count**2 * (1 - numpy.square(length))) - (1 + 2 * count))
 
 

@@ -66,7 +66,7 @@ const MIN_TIME: Duration = Duration::from_mins(1);
 /// reduction and figures, which come on top.
 const MARGIN_SHARE: u32 = 10;
 const MAX_MARGIN: Duration = Duration::from_mins(2);
-/// Slurm sends its warning so many seconds before the end, or up to a minute earlier: after the worker's own stop, which
+/// Seconds before the end at which Slurm sends its warning, or up to a minute earlier: after the worker's own stop, which
 /// is no failure, if the margin is whole.
 const WARNING: u32 = 15;
 

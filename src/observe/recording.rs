@@ -21,7 +21,7 @@ fields! {
         DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
             "Minimum drop of the shear force to look for; none: drops are not looked for";
         Energies("energies") energies: bool = false, "", flag,
-            "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at several times the cost";
+            "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at some ten times the cost";
         GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", positive,
             "Distance `V0 t` of the drive without a slip after which a job ends, with the outcome `no slips`; none: 20 typical intervals between slips and two periods";
     }

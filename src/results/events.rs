@@ -119,14 +119,12 @@ pub struct RunReport {
     /// Jobs that are still to be run, by other workers if this one was not stopped.
     pub jobs_left: u64,
     /// Jobs finished of parts that are not done; they are kept.
-    #[serde(default)]
     pub jobs_spilled: u64,
     /// Parts committed.
     pub parts_committed: u64,
     /// Whether the run was stopped, or its time did not suffice, before all was done.
     pub stopped: bool,
     /// Hosts of the workers that run the jobs which are left.
-    #[serde(default)]
     pub hosts: Vec<String>,
     /// Predicted wall time of the cheapest part that was not started for want of time, in s.
     pub time_wanted: Option<f64>,

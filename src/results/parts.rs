@@ -170,8 +170,9 @@ impl Results<'_> {
         outcomes: &BTreeMap<usize, Outcome>,
         spilled: &BTreeSet<usize>,
     ) -> Result<(), ResultsError> {
+        let is_finished = |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
         let from = (!spilled.is_empty()).then_some(Place::Spill);
-        self.write(staging, part, outcomes, spilled, from, Place::Spill)
+        self.write(staging, part, outcomes, is_finished, from, Place::Spill)
     }
 
     /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have, in the tables
@@ -187,10 +188,13 @@ impl Results<'_> {
         outcomes: &BTreeMap<usize, Outcome>,
         spilled: &BTreeSet<usize>,
     ) -> Result<(), ResultsError> {
+        if !spilled.is_empty() && self.done_parts()?.has(part) {
+            // This worker was taken for dead, and its heir has used up what was spilled.
+            return Ok(());
+        }
         let keeps = outcomes.len() < part.jobs.len();
         let from = if spilled.is_empty() { Place::Tables } else { Place::Spill };
-        let others: BTreeSet<usize> = (0..part.jobs.len()).collect();
-        self.write(staging, part, outcomes, &others, keeps.then_some(from), Place::Tables)?;
+        self.write(staging, part, outcomes, |_| true, keeps.then_some(from), Place::Tables)?;
         if !spilled.is_empty() {
             // Jobs first: what is spilled without them is nothing.
             for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
@@ -200,19 +204,18 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// Writes files of a part: new rows of jobs with an outcome, the old ones of the `kept` others.
+    /// Writes files of a part with some of its jobs: new rows of those with an outcome, the old ones of the others.
     fn write(
         &self,
         staging: &Path,
         part: &Part,
         outcomes: &BTreeMap<usize, Outcome>,
-        kept: &BTreeSet<usize>,
+        is_written: impl Fn(&usize) -> bool,
         from: Option<Place>,
         to: Place,
     ) -> Result<(), ResultsError> {
         let sweep = &self.extensions()[part.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
-        let is_written = |position: &usize| outcomes.contains_key(position) || kept.contains(position);
         let positions = (0..part.jobs.len()).filter(is_written);
         let jobs: Jobs<'_> = positions.map(|position| (label(position), outcomes.get(&position))).collect();
         let places = (from, to);

@@ -1,7 +1,7 @@
 //! Workers: the processes that are at work on a directory, known to each other by a file each.
 //!
-//! `run/workers/<name>` says host, process and threads, and is written anew every [`BEAT`] as long as the process lives;
-//! when it ends, the file goes. On its own host a process is looked up; elsewhere it lives if its file is at most
+//! `run/workers/<name>` says host, process and threads, and is rewritten every [`BEAT`] while the process lives
+//! and removed when it ends. On its own host a process is looked up; elsewhere it lives if its file is at most
 //! [`SILENCE`] older than the newest of one's own. Both times are the file server's, so no clocks are compared. Contract:
 //! who lives is a matter of double work, and no more. Should a suspended process be taken for dead, it and its heir write
 //! the same bytes, each under staged names of its own.
@@ -27,8 +27,10 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Time between two beats.
 pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
-/// A worker of another host whose file is so much older than one's own is dead.
+/// A worker of another host is dead if its file is older than one's own by this time.
 pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(4) } else { Duration::from_mins(1) };
+/// Name of the thread that beats.
+pub(crate) const BEAT_THREAD: &str = "beat";
 /// What the names of workers, and of their staging folders, begin with.
 const PREFIX: &str = "worker-";
 /// What the name of a worker's file ends with while it is being written.
@@ -71,7 +73,7 @@ impl Living {
         let Worker { host, process, task, .. } = &self.worker;
         let what = match task {
             Task::Run => "run",
-            Task::Change => "repaired or compacted",
+            Task::Change => "repaired, compacted or merged",
         };
         format!("is being {what} by process {process} on {host}")
     }
@@ -156,12 +158,15 @@ impl<'a> Results<'a> {
         std::thread::scope(|scope| {
             let (end, ended) = channel::<()>();
             let member = &member;
-            scope.spawn(move || {
+            let beats = move || {
                 while matches!(ended.recv_timeout(BEAT), Err(RecvTimeoutError::Timeout)) {
                     // A beat that cannot be written costs double work at worst.
                     let _ = member.beat();
                 }
-            });
+            };
+            let thread = std::thread::Builder::new().name(BEAT_THREAD.to_owned());
+            // Without beats, workers of other hosts take this one for dead: double work.
+            let _ = thread.spawn_scoped(scope, beats);
             let _end = end;
             body(member)
         })

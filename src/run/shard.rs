@@ -66,12 +66,6 @@ impl Shard {
             number == self.number
         })
     }
-
-    /// Name of its lock and of its staging folder.
-    #[must_use]
-    pub fn writer(&self) -> String {
-        format!("shard-{}-of-{}", self.number, self.count)
-    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::results::workers::{Living, Member};
 use crate::results::{Results, ResultsError};
 use crate::run::shard::Shard;
 use crate::run::walltime::Walltime;
-use crate::sweep::Part;
+use crate::sweep::{Extension, Part};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::hash::{BuildHasher, RandomState};
@@ -129,7 +129,7 @@ impl<'a> Share<'a> {
             overview.jobs_kept += part.jobs.iter().filter(|job| !self.results.wants(&part, job)).count() as u64;
             overview.jobs_done += part.jobs.len() as u64;
             overview.predicted_cost_done += part.cost;
-            for (position, why) in if looks { self.unfinished(&self.done, &part)? } else { BTreeMap::new() } {
+            for (position, why) in if looks { self.unfinished(&part)? } else { BTreeMap::new() } {
                 let cost = part.jobs[position].cost;
                 overview.jobs_done -= 1;
                 match why {
@@ -151,13 +151,13 @@ impl<'a> Share<'a> {
 
     /// Whether a part that is done may have jobs to be run.
     fn may_run_again(&self) -> bool {
-        let max_time = |extension: &crate::sweep::Extension| extension.sweep.recording().max_time;
+        let max_time = |extension: &Extension| extension.sweep.recording().max_time;
         self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
     /// The jobs of a part that is done which may run again and are asked for.
-    fn unfinished(&self, done: &DoneParts, part: &Part) -> Result<BTreeMap<usize, Unfinished>, ResultsError> {
-        let unfinished = self.results.unfinished(done, part)?.unwrap_or_default();
+    fn unfinished(&self, part: &Part) -> Result<BTreeMap<usize, Unfinished>, ResultsError> {
+        let unfinished = self.results.unfinished(&self.done, part)?.unwrap_or_default();
         let is_wanted = |position: usize| self.results.wants(part, &part.jobs[position]);
         Ok(unfinished.into_iter().filter(|&(position, _)| is_wanted(position)).collect())
     }
@@ -171,7 +171,9 @@ impl<'a> Share<'a> {
         for part in self.parts().filter(|part| !done.has(part)) {
             left.jobs += part.jobs.len() as u64;
             match claims.standing(&part_name(&part), &others)? {
-                Standing::Taken(owner) => drop(left.hosts.insert(others[owner].worker.host.clone())),
+                Standing::Taken(owner) => {
+                    left.hosts.insert(others[owner].worker.host.clone());
+                }
                 Standing::Free(_) => left.has_abandoned = true,
                 Standing::Own => (),
             }
@@ -206,12 +208,14 @@ impl<'a> Work<'a> {
         member: &'a Member<'a>,
         walltime: &'a Walltime,
         interrupt: &'a AtomicBool,
-        parts: u64,
+        parts_missing: u64,
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
         let random = RandomState::new().hash_one(member.name());
-        let first = if others.is_empty() { 0 } else { usize::try_from(random % parts.max(1)).unwrap_or_default() };
-        let pass = share.parts().skip(first).chain(share.parts().take(first));
+        let first = if others.is_empty() { 0 } else { random % parts_missing.max(1) };
+        let first = usize::try_from(first).unwrap_or_default();
+        let parts = || share.parts().filter(|part| !share.done.has(part) || share.may_run_again());
+        let pass = parts().skip(first).chain(parts().take(first));
         Ok(Self {
             share,
             member,
@@ -245,14 +249,11 @@ impl<'a> Work<'a> {
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and
     /// nobody is at it.
     fn take_unclaimed(&mut self, part: Part) -> Result<bool, ResultsError> {
-        let (done, name) = (&self.share.done, part_name(&part));
-        if !done.has(&part) {
+        let name = part_name(&part);
+        if !self.share.done.has(&part) {
             return Ok(self.claims.is_unclaimed(&name) && self.take(part, 0, Vec::new())?);
         }
-        if !self.share.may_run_again() {
-            return Ok(false);
-        }
-        let unfinished = self.share.unfinished(done, &part)?.into_iter();
+        let unfinished = self.share.unfinished(&part)?.into_iter();
         let again = unfinished.map(|(position, why)| (position, why != Unfinished::Cut));
         let again: Vec<_> = again.filter(|&(_, failed)| self.share.retry_failed || !failed).collect();
         if again.is_empty() {

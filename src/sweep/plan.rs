@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
 pub const PART_COST: f64 = 5.0;
-/// A sweep has at least so many parts, if it has as many jobs: enough for some dozens of workers.
+/// Least number of parts of a sweep with jobs of equal cost, if it has as many jobs: enough for some dozens of workers.
 const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
 /// A sweep has hardly more parts than twice this: names in a folder stay few.
 const MANY_PARTS: f64 = 20_000.0;

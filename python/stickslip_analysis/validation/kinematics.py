@@ -47,7 +47,7 @@ def random_load_share(eta: float) -> float:
 
 @cache
 def locked_by_chance(eta: float, slips: int, draws: int) -> tuple[float, float]:
-    """Of drawn sets of so many such slips, independent: the share that count as locked, and the mean locking index."""
+    """The share of ``draws`` sets of ``slips`` such slips, drawn independently, that count as locked; mean locking index."""
     phases = random_load_phases(eta, numpy.random.default_rng(2011).random((draws, slips)))
     lengths = abs(numpy.exp(1j * phases).mean(axis=1))
     locked = (rayleigh_p_of(slips, lengths) < LOCKED_P) & (lengths > LOCKED_LENGTH)

@@ -4,6 +4,7 @@
 //! is synced, the names in a folder when the folder is.
 
 use super::fault::{Fault, Operation};
+use crate::results::workers::BEAT_THREAD;
 use crate::table::storage::{Lock, Sink, Storage, StorageError, StoredFile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -194,12 +195,16 @@ impl FaultyDisk {
 
 impl State {
     fn meet(&mut self, operation: Operation) -> Verdict {
+        // How many beats there are depends on the machine; none is counted, nor fails while the disk works.
+        let is_beat = std::thread::current().name() == Some(BEAT_THREAD);
         match self.mode {
             Mode::Dead => return Verdict::Refused(libc::EIO),
             Mode::Full if operation.needs_space() => return Verdict::Refused(libc::ENOSPC),
             _ => {}
         }
-        let Some((_, _, fault)) = self.armed.filter(|(armed, _, _)| *armed == operation) else { return Verdict::Done };
+        let Some((_, _, fault)) = self.armed.filter(|(armed, _, _)| *armed == operation && !is_beat) else {
+            return Verdict::Done;
+        };
         if self.left > 0 {
             self.left -= 1;
             return Verdict::Done;

@@ -222,7 +222,7 @@ fn who_changes_what_is_committed_and_runs_keep_each_other_out() {
     let begin = |seeds| run(&Layout::new(&Disk, root.path()), &sweep(seeds), options(&stop), &kernel, &mut |_| ());
     let results = Results::read(&Layout::new(&Disk, root.path())).unwrap();
     let error = results.exclusively(|| Ok(begin(SEEDS + 1).unwrap_err())).unwrap();
-    assert!(error.to_string().contains("being repaired or compacted"), "{error}");
+    assert!(error.to_string().contains("being repaired, compacted or merged"), "{error}");
     let beside_a_run = || {
         for ended in [
             compact(&Layout::new(&Disk, root.path())).map(|_| ()),
