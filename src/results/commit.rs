@@ -7,7 +7,6 @@
 use crate::results::layout::Layout;
 use crate::table::storage::{Lock, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
-use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -31,7 +30,7 @@ impl<'a> Commit<'a> {
     /// When the folder cannot be made.
     pub fn begin(storage: &'a dyn Storage, staging: &Path) -> Result<Self, StorageError> {
         storage.ensure_folder(staging)?;
-        Ok(Self { storage, staging: staging.to_owned(), token: token(), staged: Vec::new() })
+        Ok(Self { storage, staging: staging.to_owned(), token: format!("{:016x}", own_number()), staged: Vec::new() })
     }
 
     /// Creates the next file, which is to be written, and synced, before it goes to its target.
@@ -94,9 +93,11 @@ impl Drop for Commit<'_> {
     }
 }
 
-/// A text that no other process or commit has.
-pub(super) fn token() -> String {
-    format!("{:016x}", RandomState::new().hash_one(std::process::id()))
+/// A number that no other process or commit has.
+#[cfg(not(test))]
+pub(super) fn own_number() -> u64 {
+    use std::hash::{BuildHasher, RandomState};
+    RandomState::new().hash_one(std::process::id())
 }
 
 /// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
@@ -117,10 +118,26 @@ pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) use tests::own_number;
+
+#[cfg(test)]
+pub(crate) mod tests {
     use super::*;
     use crate::table::storage::Disk;
+    use std::cell::Cell;
     use std::fs;
+    use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher, RandomState};
+
+    thread_local! {
+        /// The last number that this thread was given, if its numbers are to be known beforehand.
+        pub static KNOWN_NUMBER: Cell<Option<u64>> = const { Cell::new(None) };
+    }
+
+    pub fn own_number() -> u64 {
+        let known = KNOWN_NUMBER.get().map(|last| BuildHasherDefault::<DefaultHasher>::default().hash_one(last));
+        KNOWN_NUMBER.set(known);
+        known.unwrap_or_else(|| RandomState::new().hash_one(std::process::id()))
+    }
 
     #[test]
     fn published_files_are_whole_and_staging_is_empty() {

@@ -10,7 +10,7 @@
 //! a run joins and then looks whether somebody wants to be alone. So of two that begin at once one sees the other, and
 //! leaves.
 
-use crate::results::commit::token;
+use crate::results::commit::own_number;
 use crate::results::error::ResultsError;
 use crate::results::events::host;
 use crate::results::handle::Results;
@@ -136,6 +136,8 @@ pub struct Living {
 pub struct Member<'a> {
     layout: Layout<'a>,
     name: String,
+    /// A number that no other has.
+    number: u64,
     worker: Worker,
     begin: Instant,
     jobs: AtomicU64,
@@ -211,9 +213,11 @@ impl<'a> Member<'a> {
     fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, StorageError> {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
         let host: String = worker.host.chars().map(plain).collect();
-        let name = format!("{PREFIX}{host}-{}-{}", worker.process, &token()[..8]);
+        let number = own_number();
+        let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
         own().insert(name.clone());
-        let member = Self { layout: layout.clone(), name, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
+        let member =
+            Self { layout: layout.clone(), name, number, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
         layout.storage.ensure_folder(&layout.workers())?;
         // First, so that nobody takes what follows for a dead one's.
         member.beat()?;
@@ -226,6 +230,12 @@ impl<'a> Member<'a> {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// A random number of its own.
+    #[must_use]
+    pub const fn number(&self) -> u64 {
+        self.number
     }
 
     /// Where it prepares files.

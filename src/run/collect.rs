@@ -1,4 +1,5 @@
-//! The collector: hands jobs to the workers, puts their outcomes together into parts, and commits them.
+//! The collector: hands jobs to the threads, puts their outcomes together into parts, and commits them. It alone uses the
+//! disk.
 
 use crate::results::ResultsError;
 use crate::results::layout::part_name;
@@ -10,13 +11,12 @@ use crate::run::walltime::Walltime;
 use crate::run::{Events, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
-use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::any::Any;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -28,18 +28,17 @@ const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Durati
 /// that its time has doubled.
 const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
 const LONG_BY_PREDICTION: f64 = 20.0;
-/// Outcomes that may wait for the collector, for each thread.
-const WAITING_PER_THREAD: usize = 4;
+/// Jobs are handed out ahead of those that run while all that are out are predicted to take less than this, in s for each
+/// thread, so that threads have work during a commit; and so many at most.
+const AHEAD: f64 = 0.5;
+const MAX_AHEAD: usize = 256;
 
-/// What the workers send.
-enum Message {
-    Ended {
-        job: PartJob,
-        outcome: Outcome,
-        time: JobTime,
-    },
-    /// The plan could not be continued, since a part could not be looked up.
-    Broken(ResultsError),
+/// What becomes of a job.
+struct Ended {
+    job: PartJob,
+    /// `None` if it was interrupted.
+    outcome: Option<Outcome>,
+    time: JobTime,
 }
 
 /// What a job took, in s.
@@ -74,9 +73,12 @@ pub(super) struct Collector<'a, 'e> {
     member: &'a Member<'a>,
     staging: PathBuf,
     walltime: &'a Walltime,
+    threads: usize,
+    /// Set from outside when the run is to stop.
+    stop: &'a AtomicBool,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
-    open: HashMap<(usize, u64), OpenPart>,
+    open: BTreeMap<(usize, u64), OpenPart>,
 }
 
 impl<'a, 'e> Collector<'a, 'e> {
@@ -84,21 +86,28 @@ impl<'a, 'e> Collector<'a, 'e> {
         share: &'a Share<'a>,
         member: &'a Member<'a>,
         walltime: &'a Walltime,
+        threads: usize,
+        stop: &'a AtomicBool,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { share, member, staging: member.staging(), walltime, events, report, open: HashMap::new() }
+        Self {
+            share,
+            member,
+            staging: member.staging(),
+            walltime,
+            threads,
+            stop,
+            events,
+            report,
+            open: BTreeMap::new(),
+        }
     }
 
     /// Runs jobs of the share, of which `parts` are missing, until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
-    pub fn run(
-        &mut self,
-        parts: u64,
-        threads: usize,
-        stop: &AtomicBool,
-        kernel: &Kernel<'_>,
-    ) -> Result<bool, ResultsError> {
+    pub fn run(&mut self, parts: u64, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+        let threads = self.threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.share.results.layout().root(), problem)
@@ -106,14 +115,18 @@ impl<'a, 'e> Collector<'a, 'e> {
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
-        let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let jobs = Work::new(self.share, self.member, self.walltime, interrupt, parts)?;
+        let (sender, receiver) = channel();
+        let work = Work::new(self.share, self.member, self.walltime, parts)?;
         let all_run = pool.in_place_scope(|workers| {
-            workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, under_way, &sender)));
-            let collected = self.collect(&receiver, under_way, stop, interrupt);
+            let hand_out = |job: PartJob| {
+                let sender = sender.clone();
+                workers.spawn(move |_| {
+                    // That nobody listens any more means that the run has ended.
+                    let _ = sender.send(run_job(job, kernel, interrupt, under_way));
+                });
+            };
+            let collected = self.collect(work, hand_out, &receiver, under_way, interrupt);
             interrupt.store(true, Ordering::Relaxed);
-            // Frees workers that wait to send.
-            drop(receiver);
             collected
         })?;
         if !all_run {
@@ -124,8 +137,7 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     /// Keeps the finished jobs of parts that are not whole.
     fn spill(&mut self) -> Result<(), ResultsError> {
-        let open: Vec<OpenPart> = self.open.drain().map(|(_, open)| open).collect();
-        for open in &open {
+        for open in std::mem::take(&mut self.open).values() {
             let Taken { part, spilled, again, .. } = &*open.of;
             if *again {
                 self.commit(open)?;
@@ -139,13 +151,17 @@ impl<'a, 'e> Collector<'a, 'e> {
         Ok(())
     }
 
+    /// Hands out jobs and takes their outcomes until no more come. Returns whether it took all that it could.
     fn collect(
         &mut self,
-        receiver: &Receiver<Message>,
+        mut work: Work<'_>,
+        hand_out: impl Fn(PartJob),
+        ended: &Receiver<Ended>,
         under_way: &AllUnderWay,
-        stop: &AtomicBool,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
+        let threads = self.threads;
+        let (mut jobs_out, mut cost_out) = (0, 0.0);
         let mut is_out_of_time = false;
         let mut last_tick = Instant::now();
         loop {
@@ -154,20 +170,33 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
-            let must_end = stop.load(Ordering::Relaxed) || self.walltime.is_over();
+            let must_end = self.stop.load(Ordering::Relaxed) || self.walltime.is_over();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
+            }
+            let is_interrupted = interrupt.load(Ordering::Relaxed);
+            let has_room = |jobs, cost| jobs < threads || (jobs < threads * MAX_AHEAD && cost < threads as f64 * AHEAD);
+            while !is_interrupted
+                && has_room(jobs_out, cost_out)
+                && let Some(job) = work.next()?
+            {
+                jobs_out += 1;
+                cost_out += job.cost();
+                hand_out(job);
             }
             if !is_out_of_time && self.walltime.refused().is_some() {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
-            match receiver.recv_timeout(STOP_POLL) {
-                Ok(Message::Ended { job, outcome, time }) => self.take(&job, outcome, time)?,
-                Ok(Message::Broken(error)) => return Err(error),
-                Err(RecvTimeoutError::Timeout) => (),
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Ok(!interrupt.load(Ordering::Relaxed) && self.walltime.refused().is_none());
+            if jobs_out == 0 && (is_interrupted || work.has_ended()) {
+                return Ok(!is_interrupted && !is_out_of_time);
+            }
+            // A sender is kept, so an error means that there is nothing yet.
+            if let Ok(Ended { job, outcome, time }) = ended.recv_timeout(STOP_POLL) {
+                jobs_out -= 1;
+                cost_out -= job.cost();
+                if let Some(outcome) = outcome {
+                    self.take(&job, outcome, time)?;
                 }
             }
         }
@@ -251,30 +280,19 @@ fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs one job and sends its outcome. That nobody listens any more means that the run has ended.
-fn work(
-    job: Result<PartJob, ResultsError>,
-    kernel: &Kernel<'_>,
-    interrupt: &AtomicBool,
-    under_way: &AllUnderWay,
-    sender: &SyncSender<Message>,
-) {
-    let message = match job {
-        Err(error) => Message::Broken(error),
-        Ok(job) => {
-            let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
-            let long_after =
-                Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
-            let key = (job.of.part.extension, job.of.part.index, job.position);
-            locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
-            let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
-            locked(under_way).remove(&key);
-            let Some(outcome) = outcome else { return };
-            let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
-            Message::Ended { job, outcome, time }
-        }
-    };
-    let _ = sender.send(message);
+/// Runs one job.
+fn run_job(job: PartJob, kernel: &Kernel<'_>, interrupt: &AtomicBool, under_way: &AllUnderWay) -> Ended {
+    if interrupt.load(Ordering::Relaxed) {
+        return Ended { job, outcome: None, time: JobTime::default() };
+    }
+    let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
+    let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
+    let key = (job.of.part.extension, job.of.part.index, job.position);
+    locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
+    let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
+    locked(under_way).remove(&key);
+    let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
+    Ended { job, outcome, time }
 }
 
 /// `None` for a job that was interrupted.

@@ -1,12 +1,11 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! share.rs   parts that are not there, claimed -> their jobs, lazily
-//!            -> rayon -> kernel -> bounded channel ->
-//!            walltime.rs: those that end in time
-//! collect.rs on the calling thread: outcomes -> whole parts -> Results::commit, and events for the log and a display
+//! share.rs    parts that are not there, claimed -> their jobs, lazily (walltime.rs: those that end in time)
+//! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
+//! All but the kernel is done on the calling thread.
 //! What is done is what is committed, so a killed run resumes by looking which part files are missing. The same command,
 //! started several times, shares the parts.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
@@ -136,9 +135,10 @@ impl Joined<'_> {
             let (shard, predicted_cost) = (options.shard.to_string(), overview.predicted_cost_missing + cost_again);
             let (others, jobs_there) = (member.others()?.len(), overview.jobs_done + overview.jobs_failed - jobs_again);
             events.send(&RunEvent::started(shard, others, threads, jobs_left, jobs_there, predicted_cost))?;
-            let mut collector = Collector::new(&share, member, &walltime, &mut events, &mut report);
+            let mut collector =
+                Collector::new(&share, member, &walltime, threads, options.stop, &mut events, &mut report);
             let ended = loop {
-                match collector.run(overview.parts_missing, threads, options.stop, kernel) {
+                match collector.run(overview.parts_missing, kernel) {
                     Ok(true) => (),
                     ended => break ended.map(|_| None),
                 }

@@ -14,17 +14,13 @@ use crate::run::walltime::Walltime;
 use crate::sweep::{Extension, Part};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
-use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
 /// Time between two looks at workers who may have died.
-const LOOK: Duration = Duration::from_millis(500);
-/// How often to look whether the run is to stop in between.
-const POLL: Duration = Duration::from_millis(20);
+const LOOK: Duration = if cfg!(test) { Duration::from_millis(10) } else { Duration::from_millis(500) };
 
 /// The parts of a shard, as they were when it was looked up which are done.
 pub(super) struct Share<'a> {
@@ -78,6 +74,13 @@ pub(super) struct PartJob {
     pub position: usize,
     /// Whether it has failed before.
     pub failed_before: bool,
+}
+
+impl PartJob {
+    /// Its predicted cost.
+    pub fn cost(&self) -> f64 {
+        self.of.part.jobs[self.position].cost
+    }
 }
 
 /// What a worker leaves when it has nothing to do.
@@ -192,13 +195,15 @@ pub(super) struct Work<'a> {
     share: &'a Share<'a>,
     member: &'a Member<'a>,
     walltime: &'a Walltime,
-    interrupt: &'a AtomicBool,
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
     /// The first pass.
-    pass: Box<dyn Iterator<Item = Part> + Send + 'a>,
+    pass: Box<dyn Iterator<Item = Part> + 'a>,
     losses: u32,
     jobs: VecDeque<PartJob>,
+    /// When it last looked for parts of dead workers, and the beats that it saw first.
+    last_look: Option<Instant>,
+    beats: HashMap<String, SystemTime>,
     has_ended: bool,
 }
 
@@ -207,12 +212,10 @@ impl<'a> Work<'a> {
         share: &'a Share<'a>,
         member: &'a Member<'a>,
         walltime: &'a Walltime,
-        interrupt: &'a AtomicBool,
         parts_missing: u64,
     ) -> Result<Self, ResultsError> {
         let others = member.others()?;
-        let random = RandomState::new().hash_one(member.name());
-        let first = if others.is_empty() { 0 } else { random % parts_missing.max(1) };
+        let first = if others.is_empty() { 0 } else { member.number() % parts_missing.max(1) };
         let first = usize::try_from(first).unwrap_or_default();
         let parts = || share.parts().filter(|part| !share.done.has(part) || share.may_run_again());
         let pass = parts().skip(first).chain(parts().take(first));
@@ -220,30 +223,44 @@ impl<'a> Work<'a> {
             share,
             member,
             walltime,
-            interrupt,
             claims: Claims::list(share.results, member)?,
             others,
             pass: Box::new(pass),
             losses: 0,
             jobs: VecDeque::new(),
+            last_look: None,
+            beats: HashMap::new(),
             has_ended: false,
         })
     }
 
-    fn is_interrupted(&self) -> bool {
-        self.interrupt.load(Ordering::Relaxed)
+    /// The next job; `None` if there is none for this worker now.
+    pub fn next(&mut self) -> Result<Option<PartJob>, ResultsError> {
+        if self.jobs.is_empty() && !self.has_ended {
+            self.take_next()?;
+        }
+        Ok(self.jobs.pop_front())
     }
 
-    /// Takes the next part with jobs to run; false if there is none for this worker.
-    fn take_next(&mut self) -> Result<bool, ResultsError> {
-        while !self.is_interrupted()
-            && let Some(part) = self.pass.next()
-        {
+    /// Whether there will be no more jobs for this worker.
+    pub const fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    /// Takes the next part with jobs to run, if there is one.
+    fn take_next(&mut self) -> Result<(), ResultsError> {
+        while let Some(part) = self.pass.next() {
             if self.take_unclaimed(part)? {
-                return Ok(true);
+                return Ok(());
             }
         }
-        self.take_abandoned()
+        if self.walltime.refused().is_some() {
+            self.has_ended = true;
+        } else if self.last_look.is_none_or(|last| last.elapsed() >= LOOK) {
+            self.last_look = Some(Instant::now());
+            self.has_ended = self.take_abandoned()?;
+        }
+        Ok(())
     }
 
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and
@@ -265,42 +282,32 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Takes a part that is not done and whose claim is a dead worker's; waits until it is clear who lives.
+    /// Takes a part that is not done and whose claim is a dead worker's. Returns whether there is none, and it is certain
+    /// that the owners of all others live.
     fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
-        let mut beats: HashMap<String, SystemTime> = HashMap::new();
-        while !self.is_interrupted() && self.walltime.refused().is_none() {
-            // In this order: who has ended has committed before.
-            let others = self.member.others()?;
-            self.claims.refresh()?;
-            let done = self.share.results.done_parts()?;
-            let mut is_certain = true;
-            for part in self.share.parts().filter(|part| !done.has(part)) {
-                match self.claims.standing(&part_name(&part), &others)? {
-                    Standing::Own => (),
-                    Standing::Taken(owner) => {
-                        let Living { beat, is_certain: is_known, .. } = &others[owner];
-                        let has_beaten = beats.entry(owner.to_owned()).or_insert(*beat) != beat;
-                        is_certain &= *is_known || has_beaten;
-                    }
-                    Standing::Free(generation) => {
-                        if self.take(part, generation, Vec::new())? {
-                            return Ok(true);
-                        }
-                        // It went to another, or does not end in time.
-                        is_certain = false;
-                    }
+        // In this order: who has ended has committed before.
+        let others = self.member.others()?;
+        self.claims.refresh()?;
+        let done = self.share.results.done_parts()?;
+        let mut is_certain = true;
+        for part in self.share.parts().filter(|part| !done.has(part)) {
+            match self.claims.standing(&part_name(&part), &others)? {
+                Standing::Own => (),
+                Standing::Taken(owner) => {
+                    let Living { beat, is_certain: is_known, .. } = &others[owner];
+                    let has_beaten = self.beats.entry(owner.to_owned()).or_insert(*beat) != beat;
+                    is_certain &= *is_known || has_beaten;
                 }
-            }
-            if is_certain {
-                break;
-            }
-            for _ in 0..LOOK.as_millis() / POLL.as_millis() {
-                if !self.is_interrupted() {
-                    std::thread::sleep(POLL);
+                Standing::Free(generation) => {
+                    // If it goes to another, or does not end in time, the next look decides.
+                    is_certain = false;
+                    if self.take(part, generation, Vec::new())? {
+                        break;
+                    }
                 }
             }
         }
-        Ok(false)
+        Ok(is_certain)
     }
 
     /// Claims a part, if its jobs would end in time: all that are not spilled, or these `again`, each with whether it has
@@ -332,26 +339,5 @@ impl<'a> Work<'a> {
         let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
         self.jobs.extend(jobs.into_iter().map(job));
         Ok(true)
-    }
-}
-
-impl Iterator for Work<'_> {
-    type Item = Result<PartJob, ResultsError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        while !self.is_interrupted() {
-            if let Some(job) = self.jobs.pop_front() {
-                return Some(Ok(job));
-            }
-            if self.has_ended {
-                break;
-            }
-            let taken = self.take_next();
-            self.has_ended = !matches!(taken, Ok(true));
-            if let Err(error) = taken {
-                return Some(Err(error));
-            }
-        }
-        None
     }
 }

@@ -5,7 +5,7 @@
 //! ended; of earlier runs in the directory before the first; and 1 before any. Should a job take longer after all, it
 //! is interrupted at the end, and whole parts are kept.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 /// Least time set aside for ending, in s: for the last commits and for those who wait.
@@ -18,7 +18,7 @@ pub(super) struct Walltime {
     /// When the run must have ended; `None`: whenever it likes.
     end: Option<Instant>,
     threads: f64,
-    state: Mutex<State>,
+    state: Cell<State>,
 }
 
 /// Times in s.
@@ -48,14 +48,14 @@ impl Walltime {
             State { earlier_pace, predicted: 0.0, measured: 0.0, under_way: 0.0, slowest_commit: 0.0, refused: None };
         // A time beyond what the clock holds never comes.
         let end = longest.and_then(|longest| begin.checked_add(longest));
-        Self { end, threads: threads as f64, state: Mutex::new(state) }
+        Self { end, threads: threads as f64, state: Cell::new(state) }
     }
 
     /// Whether jobs of these predicted costs may be started together. They then count as under way.
     pub fn admits(&self, costs: impl Iterator<Item = f64>) -> bool {
         let Some(left) = self.left() else { return true };
         let (sum, largest) = costs.fold((0.0, 0.0_f64), |(sum, largest), cost| (sum + cost, largest.max(cost)));
-        let mut state = self.state();
+        let mut state = self.state.get();
         let shared = (state.under_way + sum) / self.threads;
         let needed = state.pace().unwrap_or(1.0) * shared.max(largest);
         let is_probe = state.pace().is_none() && state.under_way == 0.0 && left > 0.0;
@@ -65,27 +65,28 @@ impl Walltime {
         } else {
             state.refused = Some(state.refused.map_or(needed, |least| least.min(needed)));
         }
+        self.state.set(state);
         admitted
     }
 
     /// Jobs of these predicted costs are not started after all.
     pub fn withdraw(&self, cost: f64) {
-        let mut state = self.state();
-        state.under_way = (state.under_way - cost).max(0.0);
+        self.state.update(|state| State { under_way: (state.under_way - cost).max(0.0), ..state });
     }
 
     /// A job has ended.
     pub fn ended(&self, predicted: f64, measured: f64) {
-        let mut state = self.state();
-        state.predicted += predicted;
-        state.measured += measured;
-        state.under_way = (state.under_way - predicted).max(0.0);
+        self.withdraw(predicted);
+        self.state.update(|state| State {
+            predicted: state.predicted + predicted,
+            measured: state.measured + measured,
+            ..state
+        });
     }
 
     /// A part was committed, which took so long, in s.
     pub fn committed(&self, seconds: f64) {
-        let mut state = self.state();
-        state.slowest_commit = state.slowest_commit.max(seconds);
+        self.state.update(|state| State { slowest_commit: state.slowest_commit.max(seconds), ..state });
     }
 
     /// Whether what is under way must be given up.
@@ -95,18 +96,14 @@ impl Walltime {
 
     /// Least time that a part would have needed which was not started for want of it, in s.
     pub fn refused(&self) -> Option<f64> {
-        self.state().refused
+        self.state.get().refused
     }
 
     /// Time left but for what is set aside, in s.
     fn left(&self) -> Option<f64> {
         let end = self.end?;
-        let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.state().slowest_commit);
+        let reserve = MIN_RESERVE.max(COMMITS_IN_RESERVE * self.state.get().slowest_commit);
         Some(end.saturating_duration_since(Instant::now()).as_secs_f64() - reserve)
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
