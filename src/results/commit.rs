@@ -101,7 +101,8 @@ pub(super) fn own_number() -> u64 {
 }
 
 /// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
-/// file system without locks lets in all: their files are then whole, but may be of one and of the other.
+/// file system without locks lets in all, and nothing is removed: their files are then whole, but may be of one and of the
+/// other.
 ///
 /// # Errors
 /// When another does not end within minutes, or a file operation fails.
@@ -113,7 +114,9 @@ pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
         let held = io::Error::new(io::ErrorKind::WouldBlock, "another process holds it; try again when it has ended");
         return Err(StorageError::at("lock", &file)(held));
     }
-    layout.storage.clear_folder(&layout.staging(writer))?;
+    if matches!(lock, Lock::Ours(_)) {
+        layout.storage.clear_folder(&layout.staging(writer))?;
+    }
     Ok(lock)
 }
 

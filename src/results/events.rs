@@ -3,6 +3,7 @@
 //! The log is lines of JSON in `run/log/`, one file for each run, so that runs on several hosts do not write into each
 //! other's. Tables never depend on it.
 
+use crate::results::commit::own_number;
 use crate::results::handle::Results;
 use crate::results::layout::TableFile;
 use crate::table::file::PROGRAM;
@@ -225,7 +226,8 @@ impl Results<'_> {
         self.layout().storage.ensure_folder(&folder)?;
         let plain: String =
             host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
-        let path = folder.join(format!("{:.3}-{plain}-{}.jsonl", now(), std::process::id()));
+        let (process, number) = (std::process::id(), own_number());
+        let path = folder.join(format!("{:.3}-{plain}-{process}-{number:016x}.jsonl", now()));
         Ok(Log(self.layout().storage.create(&path)?))
     }
 

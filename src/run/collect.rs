@@ -21,7 +21,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often the collector looks at the stop flag.
-const STOP_POLL: Duration = Duration::from_millis(20);
+const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
 /// How often it lets the display know that time passes.
 const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
 /// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
@@ -178,7 +178,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             let has_room = |jobs, cost| jobs < threads || (jobs < threads * MAX_AHEAD && cost < threads as f64 * AHEAD);
             while !is_interrupted
                 && has_room(jobs_out, cost_out)
-                && let Some(job) = work.next()?
+                && let Some(job) = work.next(jobs_out > 0)?
             {
                 jobs_out += 1;
                 cost_out += job.cost();

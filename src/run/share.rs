@@ -19,8 +19,9 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
-/// Time between two looks at workers who may have died.
-const LOOK: Duration = if cfg!(test) { Duration::from_millis(10) } else { Duration::from_millis(500) };
+/// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
+const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
+const LOOK_BUSY: Duration = Duration::from_secs(5);
 
 /// The parts of a shard, as they were when it was looked up which are done.
 pub(super) struct Share<'a> {
@@ -201,7 +202,7 @@ pub(super) struct Work<'a> {
     pass: Box<dyn Iterator<Item = Part> + 'a>,
     losses: u32,
     jobs: VecDeque<PartJob>,
-    /// When it last looked for parts of dead workers, and the beats that it saw first.
+    /// When it last looked for parts of dead workers, or began to, and the beats that it saw first.
     last_look: Option<Instant>,
     beats: HashMap<String, SystemTime>,
     has_ended: bool,
@@ -234,10 +235,10 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// The next job; `None` if there is none for this worker now.
-    pub fn next(&mut self) -> Result<Option<PartJob>, ResultsError> {
+    /// The next job; `None` if there is none now for this worker, which may be busy with others.
+    pub fn next(&mut self, is_busy: bool) -> Result<Option<PartJob>, ResultsError> {
         if self.jobs.is_empty() && !self.has_ended {
-            self.take_next()?;
+            self.take_next(is_busy)?;
         }
         Ok(self.jobs.pop_front())
     }
@@ -248,15 +249,16 @@ impl<'a> Work<'a> {
     }
 
     /// Takes the next part with jobs to run, if there is one.
-    fn take_next(&mut self) -> Result<(), ResultsError> {
+    fn take_next(&mut self, is_busy: bool) -> Result<(), ResultsError> {
         while let Some(part) = self.pass.next() {
             if self.take_unclaimed(part)? {
                 return Ok(());
             }
         }
+        let last_look = *self.last_look.get_or_insert_with(Instant::now);
         if self.walltime.refused().is_some() {
             self.has_ended = true;
-        } else if self.last_look.is_none_or(|last| last.elapsed() >= LOOK) {
+        } else if last_look.elapsed() >= if is_busy { LOOK_BUSY } else { LOOK } {
             self.last_look = Some(Instant::now());
             self.has_ended = self.take_abandoned()?;
         }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How often to look whether a lock is free.
-const LOCK_POLL: Duration = Duration::from_millis(20);
+const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 });
 
 /// Where the bytes of a file go.
 pub trait Sink: Write + Send {

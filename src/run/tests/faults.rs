@@ -6,7 +6,7 @@ use super::*;
 use crate::reduce::reduce;
 
 /// Few jobs a part, by the predicted cost: 8 jobs in two parts with the first two seeds.
-fn small_sweep(seeds: u64) -> Sweep {
+pub fn small_sweep(seeds: u64) -> Sweep {
     let text = format!(
         "name = \"small\"\n[axes]\nV0 = [1e-4, 2e-4]\nseed = {{ count = {seeds} }}\n\
          [record]\nslips = 90\nprecursors = true\n[solver]\nmethod = \"fixed-step\"\ndt = 4.68e-7\n"
@@ -66,7 +66,7 @@ fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<Run
 }
 
 /// Tables, reduced data, manifest and sweeps, without logs, locks and leftovers.
-fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
+pub fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
     let is_result = |path: &Path| {
         !["run/log", "run/lock", "run/staging", "run/workers", "run/claims"]
             .iter()
@@ -75,7 +75,7 @@ fn results(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<&Path, &[u8]> {
     files.iter().filter(|(path, _)| is_result(path)).map(|(path, bytes)| (path.as_path(), bytes.as_slice())).collect()
 }
 
-fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let (mut files, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
     while let Some(below) = folders.pop() {
         for entry in fs::read_dir(below).unwrap() {

@@ -3,7 +3,10 @@
 mod fault;
 mod faults;
 mod faulty_disk;
+mod host;
 mod maintenance;
+mod schedule;
+mod schedules;
 
 use super::*;
 use crate::model::Parameters;

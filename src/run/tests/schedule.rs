@@ -1,0 +1,117 @@
+//! A schedule: processes do one operation on the disk at a time, in an order that a seed decides. One of them may be
+//! killed at an operation.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::{Condvar, Mutex, MutexGuard};
+
+struct State {
+    random: ChaCha8Rng,
+    /// How often each process is chosen, compared with the others: some are slow.
+    weights: Vec<u64>,
+    running: BTreeSet<usize>,
+    waiting: BTreeSet<usize>,
+    turn: Option<usize>,
+    /// Who is killed, and how many operations it does before.
+    kill: Option<(usize, u64)>,
+    killed: BTreeSet<usize>,
+    /// Who did what.
+    log: Vec<(usize, &'static str)>,
+}
+
+impl State {
+    /// Gives the next turn, once every process that runs waits for one.
+    fn choose(&mut self) {
+        if self.turn.is_some() || self.waiting.is_empty() || self.waiting != self.running {
+            return;
+        }
+        let total: u64 = self.waiting.iter().map(|&process| self.weights[process]).sum();
+        let mut left = self.random.next_u64() % total;
+        self.turn = self.waiting.iter().copied().find(|&process| {
+            let weight = self.weights[process];
+            let is_it = left < weight;
+            left = left.saturating_sub(weight);
+            is_it
+        });
+    }
+}
+
+/// Gives turns to processes.
+pub struct Schedule {
+    state: Mutex<State>,
+    turned: Condvar,
+}
+
+impl Schedule {
+    /// Of so many processes, of which one may be killed before an operation of its own below `kill_before`.
+    pub fn new(seed: u64, processes: usize, kill_before: Option<u64>) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let weights = (0..processes).map(|_| 1 << (random.next_u64() % 8)).collect();
+        let kill =
+            kill_before.map(|below| ((random.next_u64() % processes as u64) as usize, random.next_u64() % below));
+        let state = State {
+            random,
+            weights,
+            running: (0..processes).collect(),
+            waiting: BTreeSet::new(),
+            turn: None,
+            kill,
+            killed: BTreeSet::new(),
+            log: Vec::new(),
+        };
+        Self { state: Mutex::new(state), turned: Condvar::new() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap()
+    }
+
+    /// Waits until a process may do its next operation, and says which. An error if it was killed.
+    pub fn turn(&self, process: usize, action: &'static str) -> io::Result<()> {
+        self.outside(process)?;
+        let mut state = self.state();
+        state.waiting.insert(process);
+        state.choose();
+        self.turned.notify_all();
+        let mut state = self.turned.wait_while(state, |state| state.turn != Some(process)).unwrap();
+        state.turn = None;
+        state.waiting.remove(&process);
+        state.log.push((process, action));
+        if let Some((_, left)) = state.kill.as_mut().filter(|(victim, _)| *victim == process) {
+            if *left == 0 {
+                state.kill = None;
+                state.killed.insert(process);
+            } else {
+                *left -= 1;
+            }
+        }
+        drop(state);
+        self.outside(process)
+    }
+
+    /// Whether a process may still do something outside its turns.
+    pub fn outside(&self, process: usize) -> io::Result<()> {
+        if self.state().killed.contains(&process) { Err(io::Error::other("the process was killed")) } else { Ok(()) }
+    }
+
+    /// A process has ended; says whether it was killed.
+    pub fn end(&self, process: usize) -> bool {
+        let mut state = self.state();
+        state.running.remove(&process);
+        state.choose();
+        self.turned.notify_all();
+        state.killed.contains(&process)
+    }
+
+    /// Operations so far.
+    pub fn now(&self) -> u64 {
+        self.state().log.len() as u64
+    }
+
+    /// Who did what.
+    pub fn log(self) -> Vec<(usize, &'static str)> {
+        self.state.into_inner().unwrap().log
+    }
+}

@@ -1,0 +1,279 @@
+//! Several processes on one directory, whose operations on the disk are interleaved as a seed decides, with caches as of
+//! a network file system or without. Whatever the order, and whoever is killed: nothing is lost, done twice, moved or
+//! reported as damaged, and the end is the same bytes.
+
+use super::faults::{files_below, results, small_sweep};
+use super::host::Host;
+use super::schedule::Schedule;
+use super::*;
+use crate::reduce::{ReduceError, reduce};
+use crate::results::commit::tests::KNOWN_NUMBER;
+use crate::results::tables::Names;
+use crate::results::verify::{Remedy, Verification};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::LazyLock;
+
+/// Jobs of 2 V0 each, a few to a part.
+const SEEDS: u64 = 8;
+/// Fewer, for what was there before.
+const FEWER: u64 = 5;
+/// Schedules in the usual tests.
+const SCHEDULES: u64 = 150;
+/// Environment variable with another number of them, and the first seed.
+const WANTED: &str = "STICKSLIP_SCHEDULES";
+/// Operations of a process within which it is killed.
+const KILL_BEFORE: u64 = 250;
+/// Parts of a compacted file.
+const PARTS_PER_FILE: u64 = 2;
+
+/// What is in the directory before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum There {
+    Nothing,
+    /// A run was stopped in the middle of a part.
+    StoppedRun,
+    /// All jobs of the sweep with fewer seeds.
+    FewerJobs,
+    /// The same, compacted.
+    Compacted,
+    AllJobs,
+}
+
+/// What a process does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Process {
+    Run,
+    /// A run that is stopped after some jobs.
+    StoppedRun,
+    Compact,
+    Repair,
+    Verify,
+    Reduce,
+    Read,
+}
+
+/// How often each job was run, by seed and velocity.
+type Runs = Mutex<BTreeMap<(u64, u64), usize>>;
+
+/// Jobs after which a run is stopped: in the middle of a part.
+const STOP_AFTER: u64 = 3;
+
+impl Process {
+    const ALL: [Self; 7] =
+        [Self::Run, Self::StoppedRun, Self::Compact, Self::Repair, Self::Verify, Self::Reduce, Self::Read];
+
+    fn act(self, layout: &Layout<'_>, runs: &Runs) -> anyhow::Result<()> {
+        match self {
+            Self::Run => run_some(layout, SEEDS, None, runs).map(|_| ()),
+            Self::StoppedRun => run_some(layout, SEEDS, Some(STOP_AFTER), runs).map(|_| ()),
+            Self::Compact => Ok(Results::read(layout)?.compact_by(PARTS_PER_FILE).map(|_| ())?),
+            Self::Repair => assert_sound(&Results::repair(layout)?),
+            Self::Verify => assert_sound(&Results::verify(layout)?),
+            Self::Reduce => Ok(reduce(&Results::read(layout)?).map(|_| ())?),
+            Self::Read => {
+                for batch in layout.dataset("jobs")?.rows::<Names>() {
+                    batch?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Nothing is damaged; at worst, what was reduced is to be reduced again.
+fn assert_sound(verification: &Verification) -> anyhow::Result<()> {
+    let mut problems = verification.problems.iter().filter(|problem| problem.remedy != Remedy::Reduce);
+    problems.next().map_or(Ok(()), |problem| Err(anyhow::anyhow!("{problem:?}")))
+}
+
+fn run_some(layout: &Layout<'_>, seeds: u64, stop_after: Option<u64>, runs: &Runs) -> anyhow::Result<RunReport> {
+    let (stop, begun) = (AtomicBool::new(false), AtomicU64::new(0));
+    let kernel = |job: &Job, interrupt: &AtomicBool| {
+        if stop_after.is_some_and(|most| begun.fetch_add(1, Ordering::Relaxed) >= most) {
+            while !interrupt.load(Ordering::Relaxed) {
+                std::thread::yield_now();
+            }
+            return Err(SimulationError::Interrupted { time: 0.0 });
+        }
+        let key = (job.parameters.seed, job.parameters.drive_velocity.to_bits());
+        *runs.lock().unwrap().entry(key).or_default() += 1;
+        Ok(measure(&job.parameters))
+    };
+    let mut done = 0;
+    let report = run(layout, &small_sweep(seeds), options(&stop, 1), &kernel, &mut |event| {
+        done += u64::from(matches!(event, RunEvent::JobDone { .. }));
+        stop.store(stop_after.is_some_and(|most| done >= most), Ordering::Relaxed);
+    })?;
+    Ok(report)
+}
+
+impl There {
+    const ALL: [Self; 5] = [Self::Nothing, Self::StoppedRun, Self::FewerJobs, Self::Compacted, Self::AllJobs];
+
+    fn prepare(self, layout: &Layout<'_>) -> anyhow::Result<()> {
+        let runs = Runs::default();
+        match self {
+            Self::Nothing => (),
+            Self::StoppedRun => {
+                assert!(run_some(layout, SEEDS, Some(STOP_AFTER), &runs)?.jobs_spilled > 0);
+            }
+            Self::FewerJobs | Self::Compacted => {
+                run_some(layout, FEWER, None, &runs)?;
+                if self == Self::Compacted {
+                    assert!(Results::read(layout)?.compact_by(PARTS_PER_FILE)?.changed);
+                }
+            }
+            Self::AllJobs => {
+                run_some(layout, SEEDS, None, &runs)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A folder where syncs cost nothing, if there is such a place.
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap()
+}
+
+fn write_files(root: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
+    for (path, bytes) in files {
+        fs::create_dir_all(root.join(path).parent().unwrap()).unwrap();
+        fs::write(root.join(path), bytes).unwrap();
+    }
+}
+
+/// Completes a directory alone: runs, compacts, reduces; its files, and the jobs that were missing.
+fn complete(root: &Path, runs: &Runs) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
+    let layout = Layout::new(&Disk, root);
+    let report = run_some(&layout, SEEDS, None, runs)?;
+    anyhow::ensure!((report.jobs_failed, report.jobs_left) == (0, 0), "{report:?}");
+    let results = Results::read(&layout)?;
+    results.compact_by(PARTS_PER_FILE)?;
+    reduce(&results)?;
+    anyhow::ensure!(Results::verify(&layout)?.whole, "it is not whole");
+    Ok(files_below(root))
+}
+
+/// A directory before, and how it must end.
+struct Trial {
+    before: BTreeMap<PathBuf, Vec<u8>>,
+    after: BTreeMap<PathBuf, Vec<u8>>,
+    /// The jobs that were missing, each once.
+    missing: BTreeMap<(u64, u64), usize>,
+}
+
+static TRIALS: LazyLock<BTreeMap<There, Trial>> = LazyLock::new(|| {
+    let trial = |there: There| {
+        let (folder, runs) = (folder(), Runs::default());
+        let root = folder.path().join("small");
+        fs::create_dir(&root).unwrap();
+        there.prepare(&Layout::new(&Disk, &root)).unwrap();
+        let before = files_below(&root);
+        let after = complete(&root, &runs).unwrap();
+        (there, Trial { before, after, missing: runs.into_inner().unwrap() })
+    };
+    There::ALL.map(trial).into()
+});
+
+/// Whether a process may end with this error, though nothing has befallen it.
+fn is_allowed(error: &anyhow::Error, there: There) -> bool {
+    if let Some(error) = error.downcast_ref::<ResultsError>() {
+        return error.kind == ErrorKind::Busy || (error.kind == ErrorKind::Refused && there == There::Nothing);
+    }
+    matches!(error.downcast_ref::<ReduceError>(), Some(ReduceError::NoJobs { .. }))
+}
+
+/// Goes through one schedule; who did what.
+fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut below = |most: usize| (random.next_u64() % most as u64) as usize;
+    let there = There::ALL[below(There::ALL.len())];
+    let mut processes = vec![Process::Run];
+    processes.extend((0..1 + below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
+    let (has_caches, is_killing) = (below(2) == 0, below(3) == 0);
+    let case = format!(
+        "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}",
+        if has_caches { ", with caches" } else { "" },
+        if is_killing { ", one is killed" } else { "" }
+    );
+    let trial = &TRIALS[&there];
+    let (folder, runs) = (folder(), Runs::default());
+    let root = folder.path().join("small");
+    write_files(&root, &trial.before);
+    let schedule = Schedule::new(seed, processes.len(), is_killing.then_some(KILL_BEFORE));
+    let is_any_killed = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..processes.len())
+            .map(|number| {
+                let (schedule, runs, root, process) = (&schedule, &runs, &root, processes[number]);
+                scope.spawn(move || {
+                    KNOWN_NUMBER.set(Some(seed.wrapping_mul(31) + number as u64));
+                    let host = Host::new(schedule, number, has_caches);
+                    let acted = catch_unwind(AssertUnwindSafe(|| process.act(&Layout::new(&host, root), runs)));
+                    (acted, schedule.end(number))
+                })
+            })
+            .collect();
+        let mut is_any_killed = false;
+        for (thread, process) in threads.into_iter().zip(&processes) {
+            let (acted, is_killed) = thread.join().unwrap();
+            is_any_killed |= is_killed;
+            let acted = acted.unwrap_or_else(|_| panic!("{case}: {process:?} panicked"));
+            if let Err(error) = acted
+                && !is_killed
+            {
+                assert!(is_allowed(&error, there), "{case}: {process:?} ends with: {error:#}");
+            }
+        }
+        is_any_killed
+    });
+    let completed = complete(&root, &runs).unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
+    let differing: Vec<_> = completed.iter().filter(|(path, bytes)| trial.after.get(*path) != Some(bytes)).collect();
+    let differing: Vec<_> = differing.iter().map(|(path, _)| path).collect();
+    assert!(results(&completed) == results(&trial.after), "{case}: {differing:?}");
+    if !is_any_killed {
+        assert_eq!(runs.into_inner().unwrap(), trial.missing, "{case}");
+    }
+    schedule.log()
+}
+
+/// How many schedules are wanted, and the first seed: `COUNT` or `COUNT:FIRST`.
+fn wanted() -> (u64, u64) {
+    let wanted = std::env::var(WANTED).unwrap_or_else(|_| SCHEDULES.to_string());
+    let (count, first) = wanted.split_once(':').unwrap_or((&wanted, "0"));
+    (count.parse().unwrap(), first.parse().unwrap())
+}
+
+#[test]
+fn whatever_the_order_of_operations_of_several_processes_nothing_is_lost_or_done_twice() {
+    let (count, first) = wanted();
+    let next = AtomicU64::new(first);
+    let failures = AtomicU64::new(0);
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    if seed >= first + count {
+                        break;
+                    }
+                    // Says what is wrong as it panics.
+                    failures.fetch_add(u64::from(catch_unwind(|| go_through(seed)).is_err()), Ordering::Relaxed);
+                }
+            });
+        }
+    });
+    assert_eq!(failures.into_inner(), 0, "failures in {count} schedules");
+}
+
+#[test]
+fn a_schedule_is_reproduced_from_its_seed() {
+    for seed in [1, 2, 3] {
+        let once = go_through(seed);
+        assert!(once.len() > 50, "{}", once.len());
+        assert_eq!(once, go_through(seed), "seed {seed}");
+    }
+}
