@@ -37,7 +37,7 @@ ReturnToService=2
 SlurmdTimeout=15
 KillWait=5
 NodeName=n[1-4] NodeHostname=localhost NodeAddr=127.0.0.1 Port=[17001-17004] CPUs=2
-NodeName=n5 NodeHostname=localhost NodeAddr=127.0.0.1 Port=17005 CPUs=64
+NodeName=n5 NodeHostname=localhost NodeAddr=127.0.0.1 Port=17005 CPUs=160
 PartitionName=low Nodes=n[1-4] PriorityTier=1 PreemptMode=REQUEUE
 PartitionName=high Nodes=n[1-4] PriorityTier=10 PreemptMode=OFF
 PartitionName=short Nodes=n5 Default=YES
@@ -48,7 +48,7 @@ class Slurm:
     """A running Slurm.
 
     The partitions `low` and `high` have the nodes of two cores, and jobs of `high` preempt those of `low`, which are
-    requeued. The partition `short`, the default, has a node that claims to have 64 cores.
+    requeued. The partition `short`, the default, has a node that claims to have 160 cores.
     """
 
     def __init__(self, folder: Path):
