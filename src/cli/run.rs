@@ -9,7 +9,6 @@ use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use stickslip::figure::draw_all;
 use stickslip::observe::measure;
@@ -55,7 +54,8 @@ pub struct Arguments {
     /// top
     #[arg(long, value_name = "TIME", value_parser = time::parse)]
     walltime: Option<Duration>,
-    /// One of many in a batch queue: end with 0 when the time is over or others run the rest
+    /// One of many in a batch queue: end with 0 when others run the rest, or after some work when the time is over, by
+    /// --walltime or by SIGUSR1, SIGUSR2 or SIGXCPU
     #[arg(long)]
     worker: bool,
     /// Run failed jobs again
@@ -91,10 +91,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
-    let stop = signals::catch()?;
     let options = Options {
         threads: threads.count,
-        stop,
+        stop: signals::catch()?,
         retry_failed: arguments.retry_failed,
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
@@ -124,10 +123,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     })?;
     if report.stopped {
         output::report(&resume_hint(&report, arguments.walltime.is_some()));
-        let is_time_over = !stop.load(Ordering::Relaxed);
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
-        return Ok(if arguments.worker && is_time_over && has_worked { Exit::Done } else { Exit::Stopped });
+        return Ok(if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped });
     }
     if report.jobs_left > 0 {
         let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));

@@ -1,7 +1,8 @@
 //! Signals that end a run early: the first of them stops it cleanly, and what is done is kept.
 //!
 //! Batch systems warn with one signal and follow with others, and some send the same one twice. So only a second SIGINT,
-//! which is Ctrl-C, exits at once. SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
+//! which is Ctrl-C, exits at once. SIGINT and SIGTERM cancel a run; the others warn that its time is over.
+//! SIGHUP keeps its usual effect: it ends the program unless `nohup` started it.
 
 use super::exit::Exit;
 use anyhow::{Context, Result};
@@ -10,15 +11,18 @@ use signal_hook::consts::signal::{SIGINT, SIGTERM};
 use signal_hook::consts::signal::{SIGUSR1, SIGUSR2, SIGXCPU, SIGXFSZ};
 use signal_hook::flag::{register, register_conditional_shutdown};
 use std::io;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 #[cfg(unix)]
-const STOPPING: &[i32] = &[SIGINT, SIGTERM, SIGUSR1, SIGUSR2, SIGXCPU];
+const WARNING: &[i32] = &[SIGUSR1, SIGUSR2, SIGXCPU];
 #[cfg(not(unix))]
-const STOPPING: &[i32] = &[SIGINT, SIGTERM];
+const WARNING: &[i32] = &[];
+const CANCELLING: &[i32] = &[SIGINT, SIGTERM];
 
 /// Set by the first signal that stops.
 static STOP: AtomicBool = AtomicBool::new(false);
+/// Set by the first signal that cancels.
+static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Set by the first SIGINT.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Set when a file would pass the limit on its size; the write then fails, and its error is reported.
@@ -31,11 +35,18 @@ pub fn catch() -> Result<&'static AtomicBool> {
     Ok(&STOP)
 }
 
+/// Whether a signal came that cancels, alone or with others.
+pub fn is_cancelled() -> bool {
+    CANCELLED.load(Ordering::Relaxed)
+}
+
 fn register_all() -> io::Result<()> {
     // Before the flag that it looks at, so that the first SIGINT does not exit.
     register_conditional_shutdown(SIGINT, Exit::Stopped as i32, &INTERRUPTED)?;
     register(SIGINT, &INTERRUPTED)?;
     #[cfg(unix)]
     register(SIGXFSZ, &FILE_TOO_LARGE)?;
-    STOPPING.iter().try_for_each(|&signal| register(signal, &STOP).map(|_| ()))
+    // Before the flag that stops, so that whoever stops finds it set.
+    CANCELLING.iter().try_for_each(|&signal| register(signal, &CANCELLED).map(drop))?;
+    CANCELLING.iter().chain(WARNING).try_for_each(|&signal| register(signal, &STOP).map(drop))
 }

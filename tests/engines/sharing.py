@@ -1,6 +1,7 @@
 """A sweep of 64 jobs of equal cost, so of 64 parts, and what must hold of its results however many processes shared it."""
 
 import json
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -20,14 +21,31 @@ slips = {slips}
 
 PARTS = 64
 
-# A number of blocks with which ten slips of all jobs take some 1.3 s of CPU time.
+# A number of blocks with which ten slips of all jobs take some 2 s of CPU time.
 BLOCKS = 100
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "clusters.md"
 
 
 def write_sweep(file: Path, blocks: int, slips: int) -> Path:
     """Writes the sweep; its cost goes with the number of blocks and slips."""
     file.write_text(SWEEP.format(blocks=blocks, slips=slips))
     return file
+
+
+def screens(section: str) -> list[str]:
+    """The commands of each screen in a section of the page on clusters."""
+    text = PAGE.read_text().split(f"\n## {section}\n")[1].split("\n## ")[0]
+    found = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    assert found, f"{PAGE}: the section {section} has no screen"
+    return found
+
+
+def prepare_screen(screen: str, folder: Path, slips: int) -> str:
+    """Writes the sweep that a screen names into a folder; the commands to run there, which write nowhere else."""
+    (folder / "sweeps").mkdir(parents=True)
+    write_sweep(folder / "sweeps" / "fig3.toml", BLOCKS, slips)
+    return screen.replace("/scratch/", f"{folder}/scratch/")
 
 
 def done_parts(results: Path) -> int:
@@ -41,11 +59,20 @@ def logged(results: Path) -> list[list[dict]]:
     return [events for events in logs if any(event["event"] == "part_committed" for event in events)]
 
 
+def claimed(results: Path, host: str) -> set[str]:
+    """The parts that processes of a host have claimed, in a run that has not ended."""
+    claims = results.glob("run/claims/*")
+    return {claim.stem for claim in claims if claim.read_text().startswith(f"worker-{host}-")}
+
+
+def committed(results: Path, host: str) -> set[str]:
+    """Those of them that are done."""
+    return claimed(results, host) & {file.stem for file in results.glob("tables/jobs/*")}
+
+
 def abandoned(results: Path, host: str) -> set[str]:
-    """The parts that processes of a host have claimed and not committed."""
-    claims = [claim for claim in results.glob("run/claims/*") if claim.read_text().startswith(f"worker-{host}-")]
-    done = {file.stem for file in results.glob("tables/jobs/*")}
-    return {claim.stem for claim in claims} - done
+    """Those of them that are not done."""
+    return claimed(results, host) - {file.stem for file in results.glob("tables/jobs/*")}
 
 
 def contents(results: Path) -> dict[str, bytes]:

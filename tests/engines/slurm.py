@@ -1,4 +1,4 @@
-"""Slurm with four nodes, without systemd, cgroups or accounting; all its files are in one folder."""
+"""Slurm with four small nodes and a large one, without systemd, cgroups or accounting; its files are in one folder."""
 
 import os
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hosts import Host, wait_until
 
-NODES = ["n1", "n2", "n3", "n4"]
+NODES = ["n1", "n2", "n3", "n4", "n5"]
 
 CONFIGURATION = """
 ClusterName=engines
@@ -37,13 +37,19 @@ ReturnToService=2
 SlurmdTimeout=15
 KillWait=5
 NodeName=n[1-4] NodeHostname=localhost NodeAddr=127.0.0.1 Port=[17001-17004] CPUs=2
-PartitionName=low Nodes=ALL Default=YES PriorityTier=1 PreemptMode=REQUEUE
-PartitionName=high Nodes=ALL PriorityTier=10 PreemptMode=OFF
+NodeName=n5 NodeHostname=localhost NodeAddr=127.0.0.1 Port=17005 CPUs=160
+PartitionName=low Nodes=n[1-4] PriorityTier=1 PreemptMode=REQUEUE
+PartitionName=high Nodes=n[1-4] PriorityTier=10 PreemptMode=OFF
+PartitionName=short Nodes=n5 Default=YES
 """
 
 
 class Slurm:
-    """A running Slurm. Jobs of the partition `high` preempt those of `low`, which are requeued."""
+    """A running Slurm.
+
+    The partitions `low` and `high` have the nodes of two cores, and jobs of `high` preempt those of `low`, which are
+    requeued. The partition `short`, the default, has a node that claims to have 160 cores.
+    """
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -89,7 +95,7 @@ class Slurm:
 
     def is_idle(self):
         """All nodes are up and have nothing to do."""
-        return self.call("sinfo", "-h", "-N", "-p", "low", "-o", "%t").split() == ["idle"] * len(NODES)
+        return self.call("sinfo", "-h", "-N", "-p", "low,short", "-o", "%t").split() == ["idle"] * len(NODES)
 
     def submit(self, command, *options):
         """Submits a job with a command that takes options of sbatch; the job's id."""
@@ -112,12 +118,12 @@ class Slurm:
         """No element of an array waits or runs."""
         return job not in self.call("squeue", "-h", "-o", "%F").split()
 
-    def wait_for(self, job, seconds):
-        """Waits until an array has ended, and returns the states in which its elements did, in order of time."""
+    def wait_for(self, job, seconds, field="JobState"):
+        """Waits until an array has ended, and returns a field of its elements' outcomes, in order of time."""
         wait_until(lambda: self.has_ended(job), seconds, f"job {job} ends")
         outcomes = defaultdict(list)
         for line in (self.folder / "outcomes").read_text().splitlines():
             fields = dict(re.findall(r"(\w+)=(\S*)", line))
             if fields.get("ArrayJobId", fields["JobId"]) == job:
-                outcomes[int(fields.get("ArrayTaskId", 0))].append(fields["JobState"])
+                outcomes[int(fields.get("ArrayTaskId", 0))].append(fields[field])
         return dict(sorted(outcomes.items()))

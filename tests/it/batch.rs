@@ -3,6 +3,7 @@
 use crate::program::{Ended, FAILING, Folder, MANY, PROGRAM, wait};
 use std::fs;
 use std::process::{Child, Command};
+use std::time::Duration;
 
 /// Two jobs of a moment.
 const SMALL: &str = "name = \"small\"\n[model]\nN = 3\nNs = 4\n[axes]\nseed = { count = 2 }\n[record]\nslips = 2\n";
@@ -151,28 +152,50 @@ fn send(child: &Child, signals: &[&str]) {
 }
 
 #[test]
-fn signals_of_batch_systems_stop_a_run_and_what_is_done_is_kept() {
+fn signals_stop_a_run_and_those_that_warn_a_worker_of_its_end_are_no_failure() {
     let folder = Folder::new();
     folder.write("many.toml", MANY);
-    let command = "run many.toml --no-reduce --out r --threads 1 --worker --walltime 1h";
+    let run = "run many.toml --no-reduce --out r --threads 1";
+    let worker = format!("{run} --worker --walltime 1h");
     let mut parts = 0;
-    for signals in [&["USR1"][..], &["INT"], &["USR1", "TERM", "TERM"], &["XCPU", "USR2", "INT", "TERM", "USR1"]] {
+    for (command, signals, expected) in [
+        (&worker[..], &["USR1"][..], 0),
+        (&worker, &["XCPU", "USR2", "USR2"], 0),
+        (&worker, &["INT"], 3),
+        (&worker, &["USR1", "TERM", "TERM"], 3),
+        (&worker, &["XCPU", "USR2", "INT", "TERM", "USR1"], 3),
+        (run, &["USR1"], 3),
+    ] {
         let mut child = folder.start(command);
         folder.wait_for_parts("r", parts + 1, &mut child);
         send(&child, signals);
         let (code, _, stderr) = wait(child);
-        assert_eq!(code, Some(3), "{signals:?}: {stderr}");
-        assert!(stderr.contains("The same command resumes."), "{signals:?}: {stderr}");
+        assert_eq!(code, Some(expected), "{command}, {signals:?}: {stderr}");
+        assert!(stderr.contains("The same command resumes."), "{command}, {signals:?}: {stderr}");
         let kept = folder.parts("r", "jobs").len();
-        assert!(kept > parts, "{signals:?}");
+        assert!(kept > parts, "{command}, {signals:?}");
         parts = kept;
     }
-    let mut child = folder.start(command);
+    let mut child = folder.start(&worker);
     folder.wait_for_parts("r", parts + 1, &mut child);
     send(&child, &["INT", "INT"]);
     assert_eq!(wait(child).0, Some(3), "a second Ctrl-C exits at once");
-    let ended = folder.ends(0, command);
+    let ended = folder.ends(0, &worker);
     assert!(!ended.stderr.contains("28000 jobs"), "parts were kept: {}", ended.stderr);
+}
+
+#[test]
+fn a_worker_that_is_warned_before_it_has_finished_a_job_has_failed() {
+    let folder = Folder::new();
+    folder.write("long.toml", &SMALL.replace("slips = 2", "slips = 100000000"));
+    let mut child = folder.start("run long.toml --no-reduce --out r --worker");
+    let has_begun = || folder.path("r/run/log").read_dir().is_ok_and(|mut logs| logs.next().is_some());
+    while !has_begun() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    send(&child, &["USR1"]);
+    let (code, _, stderr) = wait(child);
+    assert_eq!(code, Some(3), "{stderr}");
 }
 
 #[test]
