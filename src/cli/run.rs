@@ -1,6 +1,7 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
 use super::exit::Exit;
+use super::planning::Planning;
 use super::progress::Progress;
 use super::threads::{self, Threads};
 use super::{output, reduce, signals, time};
@@ -80,6 +81,8 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let stop = signals::catch()?;
+    let planning = Planning::watch(stop, arguments.walltime)?;
     let (sweep, default_root) = if arguments.sweep.is_dir() {
         let sweep = Results::read(&Layout::new(&Disk, &arguments.sweep))?.sweep().clone();
         (sweep, arguments.sweep.clone())
@@ -91,7 +94,6 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
-    let stop = signals::catch()?;
     let options = Options {
         threads: threads.count,
         stop,
@@ -103,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
     let report = stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
+        drop(planning);
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);

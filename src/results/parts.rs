@@ -12,7 +12,7 @@ use crate::results::layout::{Layout, TableFile};
 use crate::results::tables::{
     self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
 };
-use crate::sweep::Part;
+use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Batch, Dataset, DatasetError, TableWriter};
 use crate::table::storage::StorageError;
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 pub type Outcome = Result<Measurements, String>;
 
 /// The parts that are done, as the names in `tables/jobs` said at one instant.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DoneParts {
     /// Parts with files of their own, by extension and number.
     own: HashSet<(usize, u64)>,
@@ -35,7 +35,7 @@ pub struct DoneParts {
 impl DoneParts {
     /// Whether a part is done.
     #[must_use]
-    pub fn has(&self, part: &Part) -> bool {
+    pub fn has(&self, part: &Outline) -> bool {
         self.is_compacted(part) || self.own.contains(&(part.extension, part.index))
     }
 
@@ -47,7 +47,7 @@ impl DoneParts {
 
     /// Whether the rows of a part are in a compacted file.
     #[must_use]
-    pub fn is_compacted(&self, part: &Part) -> bool {
+    pub fn is_compacted(&self, part: &Outline) -> bool {
         let before = self.compacted.range((part.extension, 0)..=(part.extension, part.index)).next_back();
         before.is_some_and(|(_, &last)| part.index <= last)
     }
@@ -84,7 +84,7 @@ impl Results<'_> {
 
     /// The file of a part in a table.
     #[must_use]
-    pub fn part_file(&self, table: &str, part: &Part) -> PathBuf {
+    pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 
@@ -95,7 +95,7 @@ impl Results<'_> {
     pub fn unfinished(
         &self,
         done: &DoneParts,
-        part: &Part,
+        part: &Outline,
     ) -> Result<Option<BTreeMap<usize, Unfinished>>, ResultsError> {
         if !done.has(part) {
             return Ok(None);
@@ -118,10 +118,10 @@ impl Results<'_> {
                 rows += 1;
             }
         }
-        if rows == part.jobs.len() {
+        if rows == part.job_count {
             Ok(Some(unfinished))
         } else {
-            Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.jobs.len())))
+            Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.job_count)))
         }
     }
 
@@ -155,7 +155,7 @@ impl Results<'_> {
         Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(part, position))).collect())
     }
 
-    fn spilled_file(&self, table: &str, part: &Part) -> PathBuf {
+    fn spilled_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().spill().join(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 

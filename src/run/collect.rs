@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 const STOP_POLL: Duration = Duration::from_millis(20);
 /// How often it lets the display know that time passes.
 const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
+/// How often it looks what others have done.
+const LOOK_AT_OTHERS: Duration = Duration::from_secs(10);
 /// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
 /// that its time has doubled.
 const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
@@ -90,15 +92,9 @@ impl<'a, 'e> Collector<'a, 'e> {
         Self { share, member, staging: member.staging(), walltime, events, report, open: HashMap::new() }
     }
 
-    /// Runs jobs of the share, of which `parts` are missing, until none is left for this worker, the flag turns true, the
+    /// Runs jobs of the share until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
-    pub fn run(
-        &mut self,
-        parts: u64,
-        threads: usize,
-        stop: &AtomicBool,
-        kernel: &Kernel<'_>,
-    ) -> Result<bool, ResultsError> {
+    pub fn run(&mut self, threads: usize, stop: &AtomicBool, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.share.results.layout().root(), problem)
@@ -107,7 +103,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = sync_channel(threads * WAITING_PER_THREAD);
-        let jobs = Work::new(self.share, self.member, self.walltime, interrupt, parts)?;
+        let jobs = Work::new(self.share, self.member, self.walltime, interrupt)?;
         let all_run = pool.in_place_scope(|workers| {
             workers.spawn(move |_| jobs.par_bridge().for_each(|job| work(job, kernel, interrupt, under_way, &sender)));
             let collected = self.collect(&receiver, under_way, stop, interrupt);
@@ -147,8 +143,15 @@ impl<'a, 'e> Collector<'a, 'e> {
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
         let mut is_out_of_time = false;
-        let mut last_tick = Instant::now();
+        let [mut last_tick, mut last_look] = [Instant::now(); 2];
         loop {
+            if last_look.elapsed() >= LOOK_AT_OTHERS {
+                last_look = Instant::now();
+                let (jobs, cost) = self.share.done_since()?;
+                let jobs = jobs.saturating_sub(self.report.jobs_run);
+                let predicted_cost = (cost - self.report.predicted_cost).max(0.0);
+                self.events.send(&RunEvent::OthersDone { jobs, predicted_cost })?;
+            }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
                 self.report_long_jobs(under_way)?;
