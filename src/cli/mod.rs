@@ -8,6 +8,7 @@ mod exit;
 mod merge;
 mod output;
 mod plan;
+mod planning;
 mod progress;
 mod reduce;
 mod run;

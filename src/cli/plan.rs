@@ -1,7 +1,8 @@
 //! `stickslip plan`: what would run. Nothing is written.
 
 use super::exit::Exit;
-use super::output;
+use super::planning::Planning;
+use super::{output, signals};
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
@@ -92,6 +93,7 @@ struct Axis {
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
+    let planning = Planning::watch(signals::catch()?, None)?;
     let sweep = Sweep::from_file(&arguments.sweep)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
@@ -110,6 +112,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         threads,
         directory: Directory::of(&sweep, root)?,
     };
+    drop(planning);
     if arguments.json {
         output::json(&report)?;
     } else {

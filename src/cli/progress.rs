@@ -22,6 +22,8 @@ pub struct Progress {
     jobs_done: u64,
     predicted: f64,
     predicted_done: f64,
+    others_jobs: u64,
+    others_predicted: f64,
     threads: Threads,
 }
 
@@ -37,6 +39,8 @@ impl Progress {
             jobs_done: 0,
             predicted: 0.0,
             predicted_done: 0.0,
+            others_jobs: 0,
+            others_predicted: 0.0,
             threads,
         }
     }
@@ -44,6 +48,7 @@ impl Progress {
     pub fn show(&mut self, event: &RunEvent) {
         match event {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
+                self.begin = Instant::now();
                 self.jobs = jobs;
                 self.predicted = predicted_cost;
                 let variable = self.threads.variable.map_or_else(String::new, |variable| format!(" ({variable})"));
@@ -66,6 +71,9 @@ impl Progress {
             }
             RunEvent::JobDone { predicted_cost, .. } => self.advance(*predicted_cost),
             RunEvent::Tick => self.draw(),
+            &RunEvent::OthersDone { jobs, predicted_cost } => {
+                (self.others_jobs, self.others_predicted) = (jobs, predicted_cost);
+            }
             RunEvent::JobTakesLong { command, predicted_cost, wall } => self.say(&format!(
                 "1 job has run {}, {:.0} times its prediction: {command}",
                 output::duration(*wall),
@@ -97,16 +105,21 @@ impl Progress {
         self.draw();
     }
 
-    /// Draws the bar, or says a line if the last is long ago.
+    /// Draws the bar, which counts the jobs of all workers since this one began, or says a line if the last is long ago.
     fn draw(&mut self) {
-        let share = if self.predicted > 0.0 { (self.predicted_done / self.predicted).min(1.0) } else { 1.0 };
+        let done = self.predicted_done + self.others_predicted;
+        let share = if self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 };
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = if share > 0.0 {
             output::duration(elapsed * (1.0 - share) / share) + " left"
         } else {
             "time left unknown".to_owned()
         };
-        let text = format!("{} of {} jobs, {left}", self.jobs_done, self.jobs);
+        let others = match self.others_jobs {
+            0 => String::new(),
+            others => format!(" ({others} by others)"),
+        };
+        let text = format!("{} of {} jobs{others}, {left}", self.jobs_done + self.others_jobs, self.jobs);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
         self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
         self.bar.set_message(text.clone());

@@ -1,6 +1,7 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
 use super::exit::Exit;
+use super::planning::Planning;
 use super::progress::Progress;
 use super::threads::{self, Threads};
 use super::{output, reduce, signals, time};
@@ -80,6 +81,8 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
+    let stop = signals::catch()?;
+    let planning = Planning::watch(stop, arguments.walltime)?;
     let (sweep, default_root) = if arguments.sweep.is_dir() {
         let sweep = Results::read(&Layout::new(&Disk, &arguments.sweep))?.sweep().clone();
         (sweep, arguments.sweep.clone())
@@ -102,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
     let report = stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
+        drop(planning);
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);

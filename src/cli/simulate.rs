@@ -294,7 +294,7 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
         let text = match (key, given(key)) {
             (_, Some(text)) => text,
             // With a time alone, slips do not end the run.
-            (RecordingKey::Slips, None) if given(RecordingKey::MaxTime).is_some() => "1000000000",
+            (RecordingKey::Slips, None) if given(RecordingKey::MaxTime).is_some() => "10000000",
             (RecordingKey::Slips, None) => "20",
             (RecordingKey::Discard, None) => "5",
             _ => continue,

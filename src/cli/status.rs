@@ -1,7 +1,8 @@
 //! `stickslip status`: how far a results directory is.
 
 use super::exit::Exit;
-use super::output;
+use super::planning::Planning;
+use super::{output, signals};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -30,7 +31,9 @@ pub struct Arguments {
 }
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
+    let planning = Planning::watch(signals::catch()?, None)?;
     let status = stickslip::run::status(&Results::read(&Layout::new(&Disk, &arguments.directory))?)?;
+    drop(planning);
     let overview = status.overview;
     if arguments.json {
         output::json(&status)?;

@@ -62,6 +62,12 @@ macro_rules! range {
     (test size) => {
         |number| (1.0..=1e5).contains(&number)
     };
+    (words held) => {
+        "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each"
+    };
+    (test held) => {
+        |number| (1.0..=1e7).contains(&number)
+    };
     (words count) => {
         "a whole number from 1 to 2^53 - 1"
     };

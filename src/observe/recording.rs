@@ -8,7 +8,7 @@ fields! {
     /// What a job records: how many slips, from where, and which tables.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Recording by RecordingKey {
-        Slips("slips") slips: u64 = 40, "", count, "Slips to record after start-up; then the job ends";
+        Slips("slips") slips: u64 = 40, "", held, "Slips to record after start-up; then the job ends";
         Discard("discard") discard: u64 = 5, "", count_or_zero, "Slips of start-up, not recorded";
         MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
             "Model time at which a job ends even without its slips; its outcome is then `time limit`, and a longer one in the same directory runs it again";
@@ -72,6 +72,16 @@ impl RecordingKey {
 mod tests {
     use super::*;
     use crate::documented::assert_table_documented;
+    use crate::observe::{Precursor, Slip};
+
+    #[test]
+    fn slips_and_precursors_take_as_much_memory_as_is_said() {
+        assert_eq!(size_of::<Slip>(), 320);
+        assert_eq!(size_of::<Precursor>(), 136);
+        assert!(
+            RecordingKey::Slips.description().allowed.contains("10000000: a job holds them in memory, 320 bytes each")
+        );
+    }
 
     #[test]
     fn documented_keys_are_those_of_a_recording() {

@@ -56,6 +56,13 @@ pub enum RunEvent {
     },
     /// Time passes.
     Tick,
+    /// What other workers have committed since the run began.
+    OthersDone {
+        /// Number of jobs.
+        jobs: u64,
+        /// Predicted cost of these jobs.
+        predicted_cost: f64,
+    },
     /// A job failed; the others continue.
     JobFailed {
         /// Its id.
@@ -154,7 +161,7 @@ impl RunEvent {
 
     /// Whether the log keeps it: a line for each job, or each second, would be millions.
     const fn is_logged(&self) -> bool {
-        !matches!(self, Self::JobDone { .. } | Self::Tick)
+        !matches!(self, Self::JobDone { .. } | Self::OthersDone { .. } | Self::Tick)
     }
 }
 

@@ -5,6 +5,7 @@ use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
 use crate::results::manifest::{self, Manifest};
 use crate::results::missing::no_results;
+use crate::results::parts::DoneParts;
 use crate::results::tables;
 use crate::sweep::{Extension, Job, Part, Plan, Sweep};
 use crate::table::file::Footer;
@@ -28,13 +29,17 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
     pub fn open(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
-        if let (results, None) = Self::compare(layout, sweep)? {
+        let before = Found::look(layout, sweep)?;
+        let results = Self::new(layout, before.extensions(sweep));
+        if before.is_of(sweep) {
             return Ok(results);
         }
         let _alone = alone(layout, manifest::WRITER)?;
         // Another run may have written the manifest before the lock was ours.
-        let (results, unwritten) = Self::compare(layout, sweep)?;
-        if let Some(manifest) = unwritten {
+        let found = Found::look(layout, sweep)?;
+        let is_as_before = (&found.manifest, &found.done) == (&before.manifest, &before.done);
+        let results = if is_as_before { results } else { Self::new(layout, found.extensions(sweep)) };
+        if !found.is_of(sweep) {
             if let Some(other) = layout.living(SystemTime::now())?.into_values().next() {
                 let problem = format!(
                     "{}, for another sweep file; wait for it or stop it, or choose another directory with --out",
@@ -44,7 +49,7 @@ impl<'a> Results<'a> {
             }
             // It is of parts that are no more.
             layout.storage.remove_folder(&layout.spill())?;
-            manifest.write(layout)?;
+            Manifest::new(&results.extensions).write(layout)?;
         }
         Ok(results)
     }
@@ -54,7 +59,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When the directory holds something else, or cannot be read.
     pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
-        Ok(Self::compare(layout, sweep)?.0)
+        Ok(Self::new(layout, Found::look(layout, sweep)?.extensions(sweep)))
     }
 
     /// Reads a directory as it is.
@@ -69,39 +74,6 @@ impl<'a> Results<'a> {
 
     pub(super) fn new(layout: &Layout<'a>, extensions: Vec<Extension>) -> Self {
         Self { layout: layout.clone(), extensions }
-    }
-
-    /// The directory as it will be once it is opened with a sweep, and the manifest that is to be written for that.
-    fn compare(layout: &Layout<'a>, sweep: &Sweep) -> Result<(Self, Option<Manifest>), ResultsError> {
-        // In this order: another run may write the manifest in between, and none removes it.
-        let is_fresh = is_fresh(layout)?;
-        let Some((manifest, mut extensions)) = manifest::read_with_sweeps(layout)? else {
-            if is_fresh {
-                let extensions = vec![Extension::new(sweep, &[])];
-                let manifest = Manifest::new(&extensions);
-                return Ok((Self::new(layout, extensions), Some(manifest)));
-            }
-            let problem =
-                "is neither empty nor a results directory (there is no run/manifest.json); choose another with --out";
-            return Err(ResultsError::refused(layout.root(), problem));
-        };
-        let before = Self::new(layout, extensions.clone());
-        let done = before.done_parts()?;
-        let mut differences = manifest.difference(&Manifest::new(&extensions));
-        differences.extend(before.sweep().difference(sweep).iter().map(ToString::to_string));
-        if before.sweep().recording().max_time != sweep.recording().max_time && done.any_is_compacted() {
-            differences.push("record.max_time: jobs that it ended cannot run again once they are compacted".to_owned());
-        }
-        manifest::refuse(layout, &differences, "choose another directory with --out, or undo the change")?;
-        if before.sweep().text() == sweep.text() {
-            return Ok((before, None));
-        }
-        // What is done stays where it is; what is not belongs to the new sweep, or to none.
-        let last = extensions.len() - 1;
-        extensions[last].kept = Some(before.plan().ranges(last, |part| done.has(part)));
-        extensions.push(Extension::new(sweep, &extensions));
-        let manifest = Manifest::new(&extensions);
-        Ok((Self::new(layout, extensions), Some(manifest)))
     }
 
     /// Where it and everything in it lie.
@@ -170,6 +142,57 @@ impl<'a> Results<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// What a directory holds that a sweep can be run in: its extensions, and which parts are done; none if it is fresh.
+struct Found {
+    manifest: Option<Manifest>,
+    extensions: Vec<Extension>,
+    done: DoneParts,
+}
+
+impl Found {
+    /// Looks into a directory.
+    fn look(layout: &Layout<'_>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        // In this order: another run may write the manifest in between, and none removes it.
+        let is_fresh = is_fresh(layout)?;
+        let Some((manifest, extensions)) = manifest::read_with_sweeps(layout)? else {
+            if is_fresh {
+                return Ok(Self { manifest: None, extensions: Vec::new(), done: DoneParts::default() });
+            }
+            let problem =
+                "is neither empty nor a results directory (there is no run/manifest.json); choose another with --out";
+            return Err(ResultsError::refused(layout.root(), problem));
+        };
+        let before = Results::new(layout, extensions);
+        let done = before.done_parts()?;
+        let mut differences = manifest.difference(&Manifest::new(&before.extensions));
+        differences.extend(before.sweep().difference(sweep).iter().map(ToString::to_string));
+        if before.sweep().recording().max_time != sweep.recording().max_time && done.any_is_compacted() {
+            differences.push("record.max_time: jobs that it ended cannot run again once they are compacted".to_owned());
+        }
+        manifest::refuse(layout, &differences, "choose another directory with --out, or undo the change")?;
+        Ok(Self { manifest: Some(manifest), extensions: before.extensions, done })
+    }
+
+    /// Whether this sweep was the one asked for last.
+    fn is_of(&self, sweep: &Sweep) -> bool {
+        self.extensions.last().is_some_and(|last| last.sweep.text() == sweep.text())
+    }
+
+    /// The extensions once the directory is opened with this sweep. Walks through the plan where they are others.
+    fn extensions(&self, sweep: &Sweep) -> Vec<Extension> {
+        let mut extensions = self.extensions.clone();
+        if self.is_of(sweep) {
+            return extensions;
+        }
+        if let Some(last) = extensions.len().checked_sub(1) {
+            // What is done stays where it is; what is not belongs to the new sweep, or to none.
+            extensions[last].kept = Some(Plan::new(&extensions).ranges(last, |part| self.done.has(part)));
+        }
+        extensions.push(Extension::new(sweep, &extensions));
+        extensions
     }
 }
 

@@ -15,7 +15,7 @@
 //! folders: a stray file of any name there breaks some reader.
 
 use crate::results::tables;
-use crate::sweep::{Part, Sweep};
+use crate::sweep::{Outline, Sweep};
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
 use crate::table::storage::{Storage, StorageError};
 use std::fmt;
@@ -187,7 +187,7 @@ const CHECKSUM_CHARACTERS: usize = 16;
 
 /// Name of a part, which is that of its file in every table.
 #[must_use]
-pub fn part_name(part: &Part) -> String {
+pub fn part_name(part: &Outline) -> String {
     part_name_of(part.extension, part.index)
 }
 

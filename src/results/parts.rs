@@ -12,11 +12,12 @@ use crate::results::layout::{Layout, TableFile};
 use crate::results::tables::{
     self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
 };
-use crate::sweep::Part;
+use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Batch, Dataset, DatasetError, TableWriter};
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +25,7 @@ use std::path::{Path, PathBuf};
 pub type Outcome = Result<Measurements, String>;
 
 /// The parts that are done, as the names in `tables/jobs` said at one instant.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DoneParts {
     /// Parts with files of their own, by extension and number.
     own: HashSet<(usize, u64)>,
@@ -35,7 +36,7 @@ pub struct DoneParts {
 impl DoneParts {
     /// Whether a part is done.
     #[must_use]
-    pub fn has(&self, part: &Part) -> bool {
+    pub fn has(&self, part: &Outline) -> bool {
         self.is_compacted(part) || self.own.contains(&(part.extension, part.index))
     }
 
@@ -47,7 +48,7 @@ impl DoneParts {
 
     /// Whether the rows of a part are in a compacted file.
     #[must_use]
-    pub fn is_compacted(&self, part: &Part) -> bool {
+    pub fn is_compacted(&self, part: &Outline) -> bool {
         let before = self.compacted.range((part.extension, 0)..=(part.extension, part.index)).next_back();
         before.is_some_and(|(_, &last)| part.index <= last)
     }
@@ -84,7 +85,7 @@ impl Results<'_> {
 
     /// The file of a part in a table.
     #[must_use]
-    pub fn part_file(&self, table: &str, part: &Part) -> PathBuf {
+    pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 
@@ -95,7 +96,7 @@ impl Results<'_> {
     pub fn unfinished(
         &self,
         done: &DoneParts,
-        part: &Part,
+        part: &Outline,
     ) -> Result<Option<BTreeMap<usize, Unfinished>>, ResultsError> {
         if !done.has(part) {
             return Ok(None);
@@ -118,10 +119,10 @@ impl Results<'_> {
                 rows += 1;
             }
         }
-        if rows == part.jobs.len() {
+        if rows == part.job_count {
             Ok(Some(unfinished))
         } else {
-            Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.jobs.len())))
+            Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.job_count)))
         }
     }
 
@@ -135,7 +136,7 @@ impl Results<'_> {
         Ok(files.map(|file| (file.extension, file.first)).collect())
     }
 
-    /// Positions of the jobs of a part that are spilled. None if a file is damaged: they then run again.
+    /// Positions of the jobs of a part that are spilled. None if a file is damaged or gone: they then run again.
     ///
     /// # Errors
     /// When a file cannot be read.
@@ -148,6 +149,10 @@ impl Results<'_> {
                     Ok(rows) if table == tables::JOBS => ids.extend(rows.into_iter().map(|row| row.job_id)),
                     Ok(_) => (),
                     Err(DatasetError::Damaged { .. }) => return Ok(BTreeSet::new()),
+                    // Another worker has just committed the part.
+                    Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
+                        return Ok(BTreeSet::new());
+                    }
                     Err(error) => return Err(error.into()),
                 }
             }
@@ -155,7 +160,7 @@ impl Results<'_> {
         Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(part, position))).collect())
     }
 
-    fn spilled_file(&self, table: &str, part: &Part) -> PathBuf {
+    fn spilled_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().spill().join(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 

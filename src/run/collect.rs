@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 const STOP_POLL: Duration = Duration::from_millis(if cfg!(test) { 2 } else { 20 });
 /// How often it lets the display know that time passes.
 const TICK: Duration = if cfg!(test) { Duration::from_millis(20) } else { Duration::from_secs(1) };
+/// How often it looks what others have done.
+const LOOK_AT_OTHERS: Duration = Duration::from_secs(10);
 /// A job is reported as long once it has run for this time and this multiple of its predicted cost, and again each time
 /// that its time has doubled.
 const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
@@ -104,9 +106,9 @@ impl<'a, 'e> Collector<'a, 'e> {
         }
     }
 
-    /// Runs jobs of the share, of which `parts` are missing, until none is left for this worker, the flag turns true, the
+    /// Runs jobs of the share until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
-    pub fn run(&mut self, parts: u64, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
+    pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let threads = self.threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
@@ -116,7 +118,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
-        let work = Work::new(self.share, self.member, self.walltime, parts)?;
+        let work = Work::new(self.share, self.member, self.walltime)?;
         let all_run = pool.in_place_scope(|workers| {
             let hand_out = |job: PartJob| {
                 let sender = sender.clone();
@@ -163,8 +165,15 @@ impl<'a, 'e> Collector<'a, 'e> {
         let threads = self.threads;
         let (mut jobs_out, mut cost_out) = (0, 0.0);
         let mut is_out_of_time = false;
-        let mut last_tick = Instant::now();
+        let [mut last_tick, mut last_look] = [Instant::now(); 2];
         loop {
+            if last_look.elapsed() >= LOOK_AT_OTHERS {
+                last_look = Instant::now();
+                let (jobs, cost) = self.share.done_since()?;
+                let jobs = jobs.saturating_sub(self.report.jobs_run);
+                let predicted_cost = (cost - self.report.predicted_cost).max(0.0);
+                self.events.send(&RunEvent::OthersDone { jobs, predicted_cost })?;
+            }
             if last_tick.elapsed() >= TICK {
                 last_tick = Instant::now();
                 self.report_long_jobs(under_way)?;

@@ -1,7 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! share.rs    parts that are not there, claimed -> their jobs, lazily (walltime.rs: those that end in time)
+//! share.rs    parts that are not there, in outline, claimed -> their jobs (walltime.rs: those that end in time)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
@@ -22,8 +22,7 @@ mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
 pub use shard::{Shard, ShardError};
-pub use share::Overview;
-pub use status::{Failure, MAX_FAILURES, Present, Status, status};
+pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status};
 
 use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
@@ -35,7 +34,7 @@ use crate::run::collect::Collector;
 use crate::run::share::{Left, Share};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
-use crate::sweep::{Job, Sweep};
+use crate::sweep::{Job, Outline, Sweep};
 use crate::table::storage::StorageError;
 use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicBool;
@@ -78,6 +77,8 @@ impl Events<'_> {
 /// A worker at the results of a sweep.
 pub struct Joined<'a> {
     results: &'a Results<'a>,
+    /// Those of its shard.
+    parts: &'a [Outline],
     member: &'a Member<'a>,
     begin: Instant,
     threads: usize,
@@ -97,20 +98,15 @@ pub fn join<T, E: From<ResultsError>>(
     let begin = Instant::now();
     let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
     let results = Results::open(layout, sweep)?;
+    let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
     results.join(Task::Run, threads, |member| {
-        let ended = body(&Joined { results: &results, member, begin, threads, options })?;
+        let ended = body(&Joined { results: &results, parts: &parts, member, begin, threads, options })?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })
 }
 
 impl Joined<'_> {
-    /// The directory.
-    #[must_use]
-    pub const fn results(&self) -> &Results<'_> {
-        self.results
-    }
-
     /// Runs jobs of the sweep that are not yet in the directory, beside the other workers, until none is left for this one.
     ///
     /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
@@ -118,11 +114,11 @@ impl Joined<'_> {
     /// # Errors
     /// When the disk fails. What was committed is kept, and the same command resumes from there.
     pub fn run(&self, kernel: &Kernel<'_>, display: &mut dyn FnMut(&RunEvent)) -> Result<RunReport, ResultsError> {
-        let Self { results, member, begin, threads, options } = *self;
+        let Self { results, parts, member, begin, threads, options } = *self;
         results.sync_names()?;
         member.tidy()?;
-        let share = Share::look_up(results, options.shard, options.retry_failed)?;
-        let overview = share.overview()?;
+        let share = Share::look_up(results, parts, options.retry_failed)?;
+        let overview = share.overview(false, |_, _, _| ())?;
         let (jobs_again, cost_again) =
             if options.retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
         let jobs_left = overview.jobs_missing + jobs_again;
@@ -138,7 +134,7 @@ impl Joined<'_> {
             let mut collector =
                 Collector::new(&share, member, &walltime, threads, options.stop, &mut events, &mut report);
             let ended = loop {
-                match collector.run(overview.parts_missing, kernel) {
+                match collector.run(kernel) {
                     Ok(true) => (),
                     ended => break ended.map(|_| None),
                 }
@@ -160,8 +156,8 @@ impl Joined<'_> {
             }
         }
         if report.jobs_left == 0 && member.others()?.is_empty() {
-            report.jobs_failed =
-                Share::look_up(results, options.shard, false)?.overview_with_failures(|_, _, _| ())?.jobs_failed;
+            let overview = Share::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
+            report.jobs_failed = overview.jobs_failed;
         }
         events.send(&RunEvent::Finished(report.clone()))?;
         Ok(report)

@@ -4,7 +4,7 @@
 //! function of the plan alone, so each part belongs to one shard of N whatever the others do; an extension deals on,
 //! and changes nothing that was dealt before; no two shards differ by more than the costliest part.
 
-use crate::sweep::Part;
+use crate::sweep::Outline;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fmt;
@@ -50,7 +50,7 @@ impl fmt::Display for Shard {
 
 impl Shard {
     /// Its own of all parts of a plan. Memory: a few bytes for each of the N.
-    pub fn parts<P: Iterator<Item = Part>>(self, plan: P) -> impl Iterator<Item = Part> + use<P> {
+    pub fn parts<P: Iterator<Item = Outline>>(self, plan: P) -> impl Iterator<Item = Outline> + use<P> {
         // Costs are >= 0, so their bits have their order.
         let mut loads: BinaryHeap<Reverse<(u64, u64)>> = BinaryHeap::new();
         plan.filter(move |part| {
@@ -74,14 +74,12 @@ mod tests {
 
     use proptest::prelude::*;
 
-    fn plan(costs: &[f64]) -> impl Iterator<Item = Part> {
-        let parts = costs.iter().enumerate().map(|(index, &cost)| Part {
-            extension: index / 7,
-            index: index as u64,
-            jobs: Vec::new(),
-            cost,
-        });
-        parts.collect::<Vec<_>>().into_iter()
+    fn plan(costs: &[f64]) -> impl Iterator<Item = Outline> {
+        let part = |(index, &cost): (usize, &f64)| {
+            let point = index as u64;
+            Outline { extension: index / 7, index: point, points: point..=point, job_count: 1, cost }
+        };
+        costs.iter().enumerate().map(part).collect::<Vec<_>>().into_iter()
     }
 
     fn shards(count: u64) -> impl Iterator<Item = Shard> {
@@ -98,8 +96,8 @@ mod tests {
             let before = &costs[..before.min(costs.len())];
             let (mut all, mut loads) = (Vec::new(), Vec::new());
             for shard in shards(count) {
-                let own: Vec<Part> = shard.parts(plan(&costs)).collect();
-                let earlier: Vec<Part> = shard.parts(plan(before)).collect();
+                let own: Vec<Outline> = shard.parts(plan(&costs)).collect();
+                let earlier: Vec<Outline> = shard.parts(plan(before)).collect();
                 prop_assert!(own.starts_with(&earlier));
                 loads.push(own.iter().map(|part| part.cost).sum::<f64>());
                 all.extend(own);

@@ -9,13 +9,12 @@ use crate::results::layout::part_name;
 use crate::results::parts::{DoneParts, Unfinished};
 use crate::results::workers::{Living, Member};
 use crate::results::{Results, ResultsError};
-use crate::run::shard::Shard;
 use crate::run::walltime::Walltime;
-use crate::sweep::{Extension, Part};
-use serde::Serialize;
+use crate::sweep::{Extension, Outline, Part};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
+use std::vec::IntoIter;
 
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
@@ -23,38 +22,19 @@ const LOSSES: u32 = 3;
 const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
 const LOOK_BUSY: Duration = Duration::from_secs(5);
 
-/// The parts of a shard, as they were when it was looked up which are done.
+/// Parts that are a worker's to take, and which of them were done when that was looked up.
 pub(super) struct Share<'a> {
     pub results: &'a Results<'a>,
-    shard: Shard,
+    /// In plan order.
+    pub parts: &'a [Outline],
     /// Whether failed jobs are to be run again.
     retry_failed: bool,
-    done: DoneParts,
+    pub done: DoneParts,
     spilled: HashSet<(usize, u64)>,
 }
 
-/// How far the parts of a share are. Costs are predicted CPU times, in s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Overview {
-    /// Jobs that are done, without the failed ones.
-    pub jobs_done: u64,
-    /// Jobs that failed and are asked for.
-    pub jobs_failed: u64,
-    /// Of those done, jobs that the sweep which was asked for last does not have, failed or not; their data are kept.
-    pub jobs_kept: u64,
-    /// Jobs that are missing, or are asked for and were ended by a shorter `max_time`.
-    pub jobs_missing: u64,
-    /// Parts that are committed.
-    pub parts_done: u64,
-    /// Parts that are missing.
-    pub parts_missing: u64,
-    /// Cost of all jobs that are done or failed.
-    pub predicted_cost_done: f64,
-    /// Cost of the failed jobs.
-    pub predicted_cost_failed: f64,
-    /// Cost of the missing jobs.
-    pub predicted_cost_missing: f64,
-}
+/// Positions of the jobs of a part that may run again.
+pub(super) type Again = BTreeMap<usize, Unfinished>;
 
 /// A part that this worker has taken.
 #[derive(Debug)]
@@ -96,74 +76,44 @@ pub(super) struct Left {
 }
 
 impl<'a> Share<'a> {
-    /// Looks up which parts are done.
-    pub fn look_up(results: &'a Results<'a>, shard: Shard, retry_failed: bool) -> Result<Self, ResultsError> {
+    /// Looks up which of these parts are done.
+    pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
         let (done, spilled) = (results.done_parts()?, results.spilled_parts()?);
-        Ok(Self { results, shard, retry_failed, done, spilled })
+        Ok(Self { results, parts, retry_failed, done, spilled })
     }
 
-    fn parts(&self) -> impl Iterator<Item = Part> + Send + use<'a> {
-        self.shard.parts(self.results.plan().parts())
-    }
-
-    /// Looks at every part by its name, and into those of which jobs may run again.
-    pub fn overview(&self) -> Result<Overview, ResultsError> {
-        self.look_into(self.may_run_again(), |_, _, _| ())
-    }
-
-    /// Looks into every part, and visits the jobs that failed, with the reasons.
-    pub fn overview_with_failures(&self, visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
-        self.look_into(true, visit)
-    }
-
-    fn look_into(&self, looks: bool, mut visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
-        let mut overview = Overview::default();
-        for part in self.parts() {
-            if !self.done.has(&part) {
-                let spilled = self.spilled(&part)?;
-                let spilled_cost: f64 = spilled.iter().map(|&position| part.jobs[position].cost).sum();
-                overview.parts_missing += 1;
-                overview.jobs_missing += (part.jobs.len() - spilled.len()) as u64;
-                overview.predicted_cost_missing += part.cost - spilled_cost;
-                overview.jobs_done += spilled.len() as u64;
-                overview.predicted_cost_done += spilled_cost;
-                continue;
-            }
-            overview.parts_done += 1;
-            overview.jobs_kept += part.jobs.iter().filter(|job| !self.results.wants(&part, job)).count() as u64;
-            overview.jobs_done += part.jobs.len() as u64;
-            overview.predicted_cost_done += part.cost;
-            for (position, why) in if looks { self.unfinished(&part)? } else { BTreeMap::new() } {
-                let cost = part.jobs[position].cost;
-                overview.jobs_done -= 1;
-                match why {
-                    Unfinished::Failed(reason) => {
-                        overview.jobs_failed += 1;
-                        overview.predicted_cost_failed += cost;
-                        visit(&part, position, &reason);
-                    }
-                    Unfinished::Cut => {
-                        overview.jobs_missing += 1;
-                        overview.predicted_cost_missing += cost;
-                        overview.predicted_cost_done -= cost;
-                    }
-                }
-            }
-        }
-        Ok(overview)
+    /// The part of an outline.
+    pub fn part(&self, outline: &Outline) -> Part {
+        self.results.plan().part(outline)
     }
 
     /// Whether a part that is done may have jobs to be run.
-    fn may_run_again(&self) -> bool {
+    pub fn may_run_again(&self) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
         self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
-    /// The jobs of a part that is done which may run again and are asked for.
-    fn unfinished(&self, part: &Part) -> Result<BTreeMap<usize, Unfinished>, ResultsError> {
-        let unfinished = self.results.unfinished(&self.done, part)?.unwrap_or_default();
-        let is_wanted = |position: usize| self.results.wants(part, &part.jobs[position]);
-        Ok(unfinished.into_iter().filter(|&(position, _)| is_wanted(position)).collect())
+    /// A part that is done, with those of its jobs that may run again and are asked for; `None` if no job may.
+    pub fn unfinished(&self, part: &Outline) -> Result<Option<(Part, Again)>, ResultsError> {
+        let unfinished = self.results.unfinished(&self.done, part)?.filter(|unfinished| !unfinished.is_empty());
+        Ok(unfinished.map(|mut unfinished| {
+            let part = self.part(part);
+            unfinished.retain(|&position, _| self.results.wants(&part, &part.jobs[position]));
+            (part, unfinished)
+        }))
+    }
+
+    /// Positions of the jobs of a part that an earlier run has spilled.
+    pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
+        let is_spilled = self.spilled.contains(&(part.extension, part.index));
+        if is_spilled { self.results.spilled(&self.part(part)) } else { Ok(BTreeSet::new()) }
+    }
+
+    /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
+    pub fn done_since(&self) -> Result<(u64, f64), ResultsError> {
+        let done = self.results.done_parts()?;
+        let new = self.parts.iter().filter(|part| done.has(part) && !self.done.has(part));
+        Ok(new.fold((0, 0.0), |(jobs, cost), part| (jobs + part.job_count as u64, cost + part.cost)))
     }
 
     /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
@@ -172,9 +122,9 @@ impl<'a> Share<'a> {
         let (others, claims) = (member.others()?, Claims::list(self.results, member)?);
         let done = self.results.done_parts()?;
         let mut left = Left::default();
-        for part in self.parts().filter(|part| !done.has(part)) {
-            left.jobs += part.jobs.len() as u64;
-            match claims.standing(&part_name(&part), &others)? {
+        for part in self.parts.iter().filter(|part| !done.has(part)) {
+            left.jobs += part.job_count as u64;
+            match claims.standing(&part_name(part), &others)? {
                 Standing::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
@@ -183,11 +133,6 @@ impl<'a> Share<'a> {
             }
         }
         Ok(left)
-    }
-
-    fn spilled(&self, part: &Part) -> Result<BTreeSet<usize>, ResultsError> {
-        let is_spilled = self.spilled.contains(&(part.extension, part.index));
-        if is_spilled { self.results.spilled(part) } else { Ok(BTreeSet::new()) }
     }
 }
 
@@ -199,7 +144,7 @@ pub(super) struct Work<'a> {
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
     /// The first pass.
-    pass: Box<dyn Iterator<Item = Part> + 'a>,
+    pass: IntoIter<&'a Outline>,
     losses: u32,
     jobs: VecDeque<PartJob>,
     /// When it last looked for parts of dead workers, or began to, and the beats that it saw first.
@@ -209,24 +154,21 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    pub fn new(
-        share: &'a Share<'a>,
-        member: &'a Member<'a>,
-        walltime: &'a Walltime,
-        parts_missing: u64,
-    ) -> Result<Self, ResultsError> {
-        let others = member.others()?;
-        let first = if others.is_empty() { 0 } else { member.number() % parts_missing.max(1) };
-        let first = usize::try_from(first).unwrap_or_default();
-        let parts = || share.parts().filter(|part| !share.done.has(part) || share.may_run_again());
-        let pass = parts().skip(first).chain(parts().take(first));
+    pub fn new(share: &'a Share<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
+        let (others, claims) = (member.others()?, Claims::list(share.results, member)?);
+        let parts = share.parts.iter().filter(|part| !share.done.has(part) || share.may_run_again());
+        let mut pass: Vec<&Outline> = parts.collect();
+        if !others.is_empty() && !pass.is_empty() {
+            let place = member.number() % pass.len() as u64;
+            pass.rotate_left(usize::try_from(place).unwrap_or_default());
+        }
         Ok(Self {
             share,
             member,
             walltime,
-            claims: Claims::list(share.results, member)?,
+            claims,
             others,
-            pass: Box::new(pass),
+            pass: pass.into_iter(),
             losses: 0,
             jobs: VecDeque::new(),
             last_look: None,
@@ -267,20 +209,17 @@ impl<'a> Work<'a> {
 
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and
     /// nobody is at it.
-    fn take_unclaimed(&mut self, part: Part) -> Result<bool, ResultsError> {
-        let name = part_name(&part);
-        if !self.share.done.has(&part) {
-            return Ok(self.claims.is_unclaimed(&name) && self.take(part, 0, Vec::new())?);
+    fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
+        let name = part_name(outline);
+        if !self.share.done.has(outline) {
+            return Ok(self.claims.is_unclaimed(&name) && self.take_missing(outline, 0)?);
         }
-        let unfinished = self.share.unfinished(&part)?.into_iter();
-        let again = unfinished.map(|(position, why)| (position, why != Unfinished::Cut));
+        let Some((part, unfinished)) = self.share.unfinished(outline)? else { return Ok(false) };
+        let again = unfinished.into_iter().map(|(position, why)| (position, why != Unfinished::Cut));
         let again: Vec<_> = again.filter(|&(_, failed)| self.share.retry_failed || !failed).collect();
-        if again.is_empty() {
-            return Ok(false);
-        }
         match self.claims.standing(&name, &self.others)? {
-            Standing::Free(generation) => self.take(part, generation, again),
-            Standing::Own | Standing::Taken(_) => Ok(false),
+            Standing::Free(generation) if !again.is_empty() => self.take(part, BTreeSet::new(), again, generation),
+            _ => Ok(false),
         }
     }
 
@@ -292,8 +231,8 @@ impl<'a> Work<'a> {
         self.claims.refresh()?;
         let done = self.share.results.done_parts()?;
         let mut is_certain = true;
-        for part in self.share.parts().filter(|part| !done.has(part)) {
-            match self.claims.standing(&part_name(&part), &others)? {
+        for part in self.share.parts.iter().filter(|part| !done.has(part)) {
+            match self.claims.standing(&part_name(part), &others)? {
                 Standing::Own => (),
                 Standing::Taken(owner) => {
                     let Living { beat, is_certain: is_known, .. } = &others[owner];
@@ -303,7 +242,7 @@ impl<'a> Work<'a> {
                 Standing::Free(generation) => {
                     // If it goes to another, or does not end in time, the next look decides.
                     is_certain = false;
-                    if self.take(part, generation, Vec::new())? {
+                    if self.take_missing(part, generation)? {
                         break;
                     }
                 }
@@ -312,18 +251,22 @@ impl<'a> Work<'a> {
         Ok(is_certain)
     }
 
-    /// Claims a part, if its jobs would end in time: all that are not spilled, or these `again`, each with whether it has
-    /// failed before.
-    fn take(&mut self, part: Part, generation: u64, again: Vec<(usize, bool)>) -> Result<bool, ResultsError> {
-        let is_again = !again.is_empty();
-        let (spilled, jobs) = if is_again {
-            (BTreeSet::new(), again)
-        } else {
-            let spilled = self.share.spilled(&part)?;
-            let left = (0..part.jobs.len()).filter(|position| !spilled.contains(position));
-            let jobs = left.map(|position| (position, false)).collect();
-            (spilled, jobs)
-        };
+    /// Takes the jobs of a part that is not done, but for those that are spilled.
+    fn take_missing(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
+        let spilled = self.share.spilled(outline)?;
+        let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
+        let jobs = left.map(|position| (position, false)).collect();
+        self.take(self.share.part(outline), spilled, jobs, generation)
+    }
+
+    /// Claims a part, if these of its jobs would end in time; each with whether it has failed before.
+    fn take(
+        &mut self,
+        part: Part,
+        spilled: BTreeSet<usize>,
+        jobs: Vec<(usize, bool)>,
+        generation: u64,
+    ) -> Result<bool, ResultsError> {
         let costs = || jobs.iter().map(|&(position, _)| part.jobs[position].cost);
         if !self.walltime.admits(costs()) {
             return Ok(false);
@@ -337,7 +280,8 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
-        let taken = Arc::new(Taken { part, spilled, again: is_again, together: jobs.len() });
+        let again = self.share.done.has(&part);
+        let taken = Arc::new(Taken { part, spilled, again, together: jobs.len() });
         let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
         self.jobs.extend(jobs.into_iter().map(job));
         Ok(true)

@@ -1,10 +1,11 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
 use crate::results::events::RunEvent;
+use crate::results::parts::Unfinished;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
-use crate::run::shard::Shard;
-use crate::run::share::{Overview, Share};
+use crate::run::share::Share;
+use crate::sweep::{Job, Outline, Part};
 use serde::Serialize;
 use std::time::SystemTime;
 
@@ -12,6 +13,29 @@ use std::time::SystemTime;
 const FORMAT: u32 = 2;
 /// Failed jobs that are listed one by one, at most.
 pub const MAX_FAILURES: usize = 10;
+
+/// How far the parts of a share are. Costs are predicted CPU times, in s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Overview {
+    /// Jobs that are done, without the failed ones.
+    pub jobs_done: u64,
+    /// Jobs that failed and are asked for.
+    pub jobs_failed: u64,
+    /// Of those done, jobs that the sweep which was asked for last does not have, failed or not; their data are kept.
+    pub jobs_kept: u64,
+    /// Jobs that are missing, or are asked for and were ended by a shorter `max_time`.
+    pub jobs_missing: u64,
+    /// Parts that are committed.
+    pub parts_done: u64,
+    /// Parts that are missing.
+    pub parts_missing: u64,
+    /// Cost of all jobs that are done or failed.
+    pub predicted_cost_done: f64,
+    /// Cost of the failed jobs.
+    pub predicted_cost_failed: f64,
+    /// Cost of the missing jobs.
+    pub predicted_cost_missing: f64,
+}
 
 /// The state of a results directory. Serialises to a stable form, whose version is `format`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -55,22 +79,76 @@ pub struct Failure {
     pub command: String,
 }
 
+impl Share<'_> {
+    /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
+    /// visits jobs that failed, each with its part, its position and the reason.
+    pub fn overview(&self, looks: bool, mut visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
+        let looks = looks || self.may_run_again();
+        let mut overview = Overview::default();
+        for part in self.parts {
+            if !self.done.has(part) {
+                let spilled = self.spilled(part)?;
+                let jobs = if spilled.is_empty() { Vec::new() } else { self.part(part).jobs };
+                let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
+                overview.parts_missing += 1;
+                overview.jobs_missing += (part.job_count - spilled.len()) as u64;
+                overview.predicted_cost_missing += part.cost - spilled_cost;
+                overview.jobs_done += spilled.len() as u64;
+                overview.predicted_cost_done += spilled_cost;
+                continue;
+            }
+            overview.parts_done += 1;
+            overview.jobs_done += part.job_count as u64;
+            overview.predicted_cost_done += part.cost;
+            let Some((part, unfinished)) = (if looks { self.unfinished(part)? } else { None }) else { continue };
+            for (position, why) in unfinished {
+                let cost = part.jobs[position].cost;
+                overview.jobs_done -= 1;
+                match why {
+                    Unfinished::Failed(reason) => {
+                        overview.jobs_failed += 1;
+                        overview.predicted_cost_failed += cost;
+                        visit(&part, position, &reason);
+                    }
+                    Unfinished::Cut => {
+                        overview.jobs_missing += 1;
+                        overview.predicted_cost_missing += cost;
+                        overview.predicted_cost_done -= cost;
+                    }
+                }
+            }
+        }
+        Ok(overview)
+    }
+}
+
+/// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
+fn jobs_kept(share: &Share<'_>) -> u64 {
+    let wants = |part: &Part, job: &Job| share.results.wants(part, job);
+    let kept = |part: Part| part.jobs.iter().filter(|job| !wants(&part, job)).count() as u64;
+    let last = share.results.extensions().len() - 1;
+    let earlier = share.parts.iter().filter(|part| part.extension < last && share.done.has(part));
+    earlier.map(|part| kept(share.part(part))).sum()
+}
+
 /// Looks through a directory.
 ///
 /// # Errors
 /// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
-    let overview =
-        Share::look_up(results, Shard::default(), false)?.overview_with_failures(|part, position, reason| {
-            if failures.len() < MAX_FAILURES {
-                failures.push(Failure {
-                    job_id: results.job_id(part, position),
-                    reason: reason.to_owned(),
-                    command: results.sweep().command(&part.jobs[position]),
-                });
-            }
-        })?;
+    let parts: Vec<Outline> = results.plan().outlines().collect();
+    let share = Share::look_up(results, &parts, false)?;
+    let mut overview = share.overview(true, |part, position, reason| {
+        if failures.len() < MAX_FAILURES {
+            failures.push(Failure {
+                job_id: results.job_id(part, position),
+                reason: reason.to_owned(),
+                command: results.sweep().command(&part.jobs[position]),
+            });
+        }
+    })?;
+    overview.jobs_kept = jobs_kept(&share);
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {

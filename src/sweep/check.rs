@@ -60,21 +60,30 @@ impl<'a> Places<'a> {
     }
 }
 
+/// Most points of a sweep. Each process that works on it walks through all of them, in some seconds at the least and a
+/// minute with conditions, and 4096 jobs a part make 25,000 files in a folder.
+pub const MAX_POINTS: u64 = 100_000_000;
+
 /// All checks of a sweep that is read.
 pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
     let place_of = |key: &str| file.entry(key).map_or(0, |entry| entry.at);
-    if sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len())).is_none() {
-        let problem = "[axes]: 2^64 points or more; take fewer, or a sample ([axes.sobol])";
+    let points = sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len()));
+    if points.is_none_or(|points| points > MAX_POINTS) {
+        let points = points.map_or_else(|| "2^64 points or more".to_owned(), |points| format!("{points} points"));
+        let problem = format!(
+            "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions: every worker walks through all of them. \
+             Take fewer, or a sample ([axes.sobol]), or several sweeps"
+        );
         return Err(file.source.refuse(place_of("axes"), problem));
     }
     period(sweep, places)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
         && let Some(((quantity, problem), point)) =
-            sweep.admitted().find_map(|(_, point)| Some((invalid(&point)?, point)))
+            sweep.admitted(sweep.points()).find_map(|(_, point)| Some((invalid(&point)?, point)))
     {
         return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
-    let Some((_, first)) = sweep.admitted().next() else {
+    let Some((_, first)) = sweep.admitted(sweep.points()).next() else {
         return Err(file.source.refuse(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
     if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {

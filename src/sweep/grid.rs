@@ -10,10 +10,12 @@ use super::cost::predicted_cost;
 use super::filter::Condition;
 use super::job::{Identity, Job, JobId, SetId, settings};
 use super::quantity::{Point, Quantity};
+use super::walked;
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
 use std::fmt;
+use std::ops::Range;
 
 /// A sweep file, parsed.
 #[derive(Clone, Debug)]
@@ -80,15 +82,25 @@ impl Sweep {
         })
     }
 
-    /// Number of points of the grid, before the conditions drop some. Fits, as the file was refused otherwise.
+    /// Number of points of the grid, before the conditions drop some: at most [`MAX_POINTS`](super::MAX_POINTS).
     #[must_use]
     pub fn point_count(&self) -> u64 {
         self.axes.iter().map(Axis::len).product()
     }
 
+    /// The numbers of all points.
+    pub(super) fn points(&self) -> Range<u64> {
+        0..self.point_count()
+    }
+
     /// The jobs in grid order.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
-        self.admitted().map(|(point, Point { parameters, .. })| {
+        self.jobs_at(self.points())
+    }
+
+    /// The jobs at these points, in grid order.
+    pub(super) fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
+        self.admitted(points).map(|(point, Point { parameters, .. })| {
             let cost = predicted_cost(&parameters, &self.recording, self.solver);
             Job { point, parameters, cost }
         })
@@ -154,23 +166,26 @@ impl Sweep {
             .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
     }
 
-    /// The points that are jobs, with their numbers, in canonical form.
-    pub(super) fn admitted(&self) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
-        self.walk(self.axes.iter().map(Axis::len).collect()).filter(|(_, point)| self.admits(point))
+    /// Those of these points that are jobs, with their numbers, in canonical form.
+    pub(super) fn admitted(&self, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+        self.walk(self.axes.iter().map(Axis::len).collect(), points).filter(|(_, point)| self.admits(point))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
     pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
         let is_seed = |axis: &Axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)];
-        let counts = self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() });
-        self.walk(counts.collect()).map(|(_, point)| point)
+        let counts: Vec<u64> = self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect();
+        let points = 0..counts.iter().product();
+        self.walk(counts, points).map(|(_, point)| point)
     }
 
-    /// Walks through this many rows of each axis, past points that repeat an earlier one. Yields canonical points, numbered
-    /// in this walk.
-    fn walk(&self, counts: Vec<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
+    /// Walks through these points of a grid with this many rows of each axis, past points that repeat an earlier one.
+    /// Yields canonical points with their numbers.
+    fn walk(&self, counts: Vec<u64>, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
-        (0..counts.iter().product()).filter_map(move |number: u64| {
+        let end = points.end;
+        points.filter_map(move |number| {
+            walked::note(number, end);
             let mut rest = number;
             for (row, count) in rows.iter_mut().zip(&counts).rev() {
                 *row = rest % count;

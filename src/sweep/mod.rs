@@ -24,10 +24,13 @@ mod samples;
 mod source;
 #[cfg(test)]
 mod tests;
+mod walked;
 
+pub use check::MAX_POINTS;
 pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
-pub use plan::{Extension, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub(crate) use source::nearest;
 pub use source::{Mistake, SweepError};
+pub use walked::walked;

@@ -4,11 +4,11 @@
 //! keep: what they had done by then. A *part* is a run of consecutive jobs of an extension, committed together. Parts are
 //! small, so that many workers can share them and little is lost with one, but not many: see [`Extension::new`].
 //! Contract: parts are a function of the texts of the sweeps, of what was done when each began, and of [`PLAN_VERSION`].
-//! Memory: one part.
+//! Memory: one part. The outlines of all parts, from which single parts are built again, take some 60 bytes each.
 
 use super::grid::Sweep;
 use super::job::Job;
-use std::ops::RangeInclusive;
+use std::ops::{Deref, Range, RangeInclusive};
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
 pub const PART_COST: f64 = 5.0;
@@ -41,17 +41,36 @@ pub struct Plan<'a> {
     extensions: &'a [Extension],
 }
 
-/// Consecutive jobs of an extension.
+/// A part without its jobs: where they lie, and what they add up to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct Outline {
     /// Number of the extension, from 0.
     pub extension: usize,
     /// Number of the part within its extension, from 0.
     pub index: u64,
-    /// Its jobs, in plan order. At least one.
-    pub jobs: Vec<Job>,
+    /// Points of the grid from its first job to its last.
+    pub points: RangeInclusive<u64>,
+    /// Number of its jobs. At least one.
+    pub job_count: usize,
     /// Sum of their predicted CPU times, in s.
     pub cost: f64,
+}
+
+/// Consecutive jobs of an extension.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// What is known of it without its jobs.
+    pub outline: Outline,
+    /// Its jobs, in plan order. At least one.
+    pub jobs: Vec<Job>,
+}
+
+impl Deref for Part {
+    type Target = Outline;
+
+    fn deref(&self) -> &Outline {
+        &self.outline
+    }
 }
 
 /// What a plan adds up to.
@@ -70,7 +89,7 @@ impl Extension {
     /// many, a 20,000th. A dear job is a part of its own.
     #[must_use]
     pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
-        let total: f64 = own_jobs(sweep, earlier).map(|job| job.cost).sum();
+        let total: f64 = own_jobs(sweep, earlier, sweep.points()).map(|job| job.cost).sum();
         let part_cost = PART_COST.max(total / MANY_PARTS).min(total / MIN_PARTS);
         Self { sweep: sweep.clone(), part_cost: part_cost * (1.0 + ROUNDING), kept: None }
     }
@@ -84,12 +103,16 @@ impl Extension {
     }
 }
 
-/// The jobs of a sweep that no earlier extension keeps, in grid order.
-fn own_jobs<'a>(sweep: &'a Sweep, earlier: &'a [Extension]) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
+/// The jobs at these points of a sweep that no earlier extension keeps, in grid order.
+fn own_jobs<'a>(
+    sweep: &'a Sweep,
+    earlier: &'a [Extension],
+    points: Range<u64>,
+) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
     let is_kept = |extension: &Extension, job: &Job| {
         extension.sweep.find(&job.parameters).is_some_and(|point| extension.keeps(point))
     };
-    sweep.jobs().filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
+    sweep.jobs_at(points).filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
 }
 
 impl<'a> Plan<'a> {
@@ -102,7 +125,7 @@ impl<'a> Plan<'a> {
     /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
-        let mut source = own_jobs(&own.sweep, &self.extensions[..extension]).peekable();
+        let mut source = own_jobs(&own.sweep, &self.extensions[..extension], own.sweep.points()).peekable();
         let parts = (0..).map_while(move |index| {
             let (mut jobs, mut cost) = (Vec::new(), 0.0);
             let fits = |jobs: &[Job], cost: f64| jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost);
@@ -110,9 +133,10 @@ impl<'a> Plan<'a> {
                 cost += job.cost;
                 jobs.push(job);
             }
-            (!jobs.is_empty()).then_some(Part { extension, index, jobs, cost })
+            let points = jobs.first()?.point..=jobs.last()?.point;
+            Some(Part { outline: Outline { extension, index, points, job_count: jobs.len(), cost }, jobs })
         });
-        parts.filter(|part| part.jobs.first().is_some_and(|job| own.keeps(job.point)))
+        parts.filter(|part| own.keeps(*part.points.start()))
     }
 
     /// The parts of all extensions, in order.
@@ -120,15 +144,27 @@ impl<'a> Plan<'a> {
         (0..self.extensions.len()).flat_map(move |extension| self.parts_of(extension))
     }
 
+    /// The outlines of all parts, in order. Each is to be kept: the next time takes as long.
+    pub fn outlines(self) -> impl Iterator<Item = Outline> + Send + use<'a> {
+        self.parts().map(|part| part.outline)
+    }
+
+    /// The part of an outline, whose points alone are walked through.
+    #[must_use]
+    pub fn part(self, outline: &Outline) -> Part {
+        let (own, earlier) = (&self.extensions[outline.extension].sweep, &self.extensions[..outline.extension]);
+        let points = *outline.points.start()..outline.points.end() + 1;
+        Part { outline: outline.clone(), jobs: own_jobs(own, earlier, points).collect() }
+    }
+
     /// Where in the grid those parts of an extension lie that are to be kept.
     pub fn ranges(self, extension: usize, is_kept: impl Fn(&Part) -> bool) -> Vec<RangeInclusive<u64>> {
         let mut ranges: Vec<RangeInclusive<u64>> = Vec::new();
         let mut next = None;
         for part in self.parts_of(extension).filter(is_kept) {
-            let last = part.jobs[part.jobs.len() - 1].point;
             match ranges.last_mut() {
-                Some(range) if next == Some(part.index) => *range = *range.start()..=last,
-                _ => ranges.push(part.jobs[0].point..=last),
+                Some(range) if next == Some(part.index) => *range = *range.start()..=*part.points.end(),
+                _ => ranges.push(part.points.clone()),
             }
             next = Some(part.index + 1);
         }
@@ -138,8 +174,8 @@ impl<'a> Plan<'a> {
     /// Walks through the plan and adds up.
     #[must_use]
     pub fn totals(self) -> Totals {
-        self.parts().fold(Totals::default(), |totals, part| Totals {
-            jobs: totals.jobs + part.jobs.len() as u64,
+        self.outlines().fold(Totals::default(), |totals, part| Totals {
+            jobs: totals.jobs + part.job_count as u64,
             parts: totals.parts + 1,
             cost: totals.cost + part.cost,
         })

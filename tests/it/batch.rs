@@ -3,6 +3,7 @@
 use crate::program::{Ended, FAILING, Folder, MANY, PROGRAM, wait};
 use std::fs;
 use std::process::{Child, Command};
+use std::thread::sleep;
 use std::time::Duration;
 
 /// Two jobs of a moment.
@@ -184,6 +185,38 @@ fn signals_stop_a_run_and_those_that_warn_a_worker_of_its_end_are_no_failure() {
     assert!(!ended.stderr.contains("28000 jobs"), "parts were kept: {}", ended.stderr);
 }
 
+/// The walk over these points alone takes seconds.
+const LONG_PLAN: &str = "\
+name = \"long\"
+[model]
+N = 1
+Ns = 1
+[axes]
+seed = { count = 100000000 }
+[record]
+slips = 1
+";
+
+#[test]
+fn a_signal_or_the_walltime_ends_planning_and_nothing_is_left_behind() {
+    let folder = Folder::new();
+    let dropped = LONG_PLAN.replace("[model]", "where = \"N > 1\"\n[model]");
+    for (text, command) in [(LONG_PLAN, "plan"), (LONG_PLAN, "run"), (&dropped, "plan"), (&dropped, "run")] {
+        folder.write("long.toml", text);
+        let child = folder.start(&format!("{command} long.toml"));
+        sleep(Duration::from_millis(500));
+        send(&child, &["TERM"]);
+        let (code, _, stderr) = wait(child);
+        assert_eq!(code, Some(3), "{stderr}");
+        assert!(stderr.contains("stopped while planning"), "{stderr}");
+    }
+    let ended = folder.ends(3, "run long.toml --walltime 0.4s");
+    assert!(ended.stderr.contains("give a longer --walltime"), "{}", ended.stderr);
+    assert_eq!(folder.contents("").len(), 1, "no directory was made");
+    folder.write("long.toml", &LONG_PLAN.replace("100000000", "2"));
+    folder.ends(0, "run long.toml --no-reduce");
+}
+
 #[test]
 fn a_worker_that_is_warned_before_it_has_finished_a_job_has_failed() {
     let folder = Folder::new();
@@ -191,7 +224,7 @@ fn a_worker_that_is_warned_before_it_has_finished_a_job_has_failed() {
     let mut child = folder.start("run long.toml --no-reduce --out r --worker");
     let has_begun = || folder.path("r/run/log").read_dir().is_ok_and(|mut logs| logs.next().is_some());
     while !has_begun() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
+        sleep(Duration::from_millis(1));
     }
     send(&child, &["USR1"]);
     let (code, _, stderr) = wait(child);

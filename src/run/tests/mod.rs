@@ -517,6 +517,21 @@ fn events_account_for_every_job() {
 }
 
 #[test]
+fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
+    let root = tempfile::tempdir().unwrap();
+    let (layout, stop) = (Layout::new(&Disk, root.path()), AtomicBool::new(false));
+    let results = Results::open(&layout, &sweep(SEEDS, "")).unwrap();
+    let parts: Vec<Outline> = results.plan().outlines().collect();
+    let share = Share::look_up(&results, &parts, false).unwrap();
+    assert_eq!(share.done_since().unwrap(), (0, 0.0));
+    let report =
+        run(&layout, &sweep(SEEDS, ""), options(&stop, 1), &|job, _| Ok(measure(&job.parameters)), &mut |_| ());
+    let (jobs, cost) = share.done_since().unwrap();
+    assert_eq!(jobs, 2 * SEEDS);
+    assert!((cost / report.unwrap().predicted_cost - 1.0).abs() < 1e-9);
+}
+
+#[test]
 fn a_job_that_takes_long_is_told_while_it_runs() {
     let root = tempfile::tempdir().unwrap();
     let text = "name = \"test\"\n[axes]\nseed = [7]\n[record]\nslips = 1\ndiscard = 0\n";

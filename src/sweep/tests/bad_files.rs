@@ -50,6 +50,7 @@ fn unknown_and_missing_keys_are_refused_with_the_nearest_known() {
         ("name = \"a\"\n[axes]\nV0 = { log = [1, 2], point = 3 }", 3, &["point = 3", "did you mean points?"]),
         ("name = \"a\"\n[axes]\nV0 = { log = [1, 2] }", 3, &["points is missing"]),
         ("name = \"a\"\n[record]\nslip = 3", 3, &["slip = 3", "did you mean slips?"]),
+        ("name = \"a\"\n[record]\nslips = 10000001", 3, &["slips = 10000001", "to 10000000", "memory"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed-step\"", 2, &["dt is missing", "dt = 1e-6"]),
         ("name = \"a\"\n[solver]\nmethod = \"fixed\"\ndt = 1", 3, &["\"fixed\"", "fixed-step"]),
         ("name = \"a\"\n[solver]\ndt = 1e-6", 3, &["dt = 1e-6", "allowed are method, tolerance"]),
@@ -148,6 +149,11 @@ fn contradictions_and_settings_without_effect_are_refused_with_the_other_place()
         ("name = \"a\"\n[axes]\nDelta = [1]\nV0 = [1e-200]\neta = [1]", 5, &["eta", "between 1e-100 and 1e100"]),
         ("name = \"a\"\nwhere = \"V0 > 1\"\n[axes]\nN = [1, 2]", 2, &["drops every point"]),
         ("name = \"a\"\n[axes]\nseed = { count = 9007199254740992 }\nN = { count = 10000, first = 1 }", 2, &["2^64"]),
+        (
+            "name = \"a\"\nwhere = \"V0 > 1\"\n[axes]\nseed = { count = 50000001 }\nN = [1, 2]",
+            3,
+            &["100000002 points", "at most 100000000", "[axes.sobol]"],
+        ),
     ]);
 }
 

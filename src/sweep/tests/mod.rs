@@ -179,7 +179,7 @@ fn what_an_earlier_sweep_did_is_kept_and_the_rest_belongs_to_the_new_one() {
     all.push(Extension::new(&narrow, &all));
     let jobs: Vec<(usize, u64, f64, u64)> = Plan::new(&all)
         .parts()
-        .flat_map(|part| part.jobs.into_iter().map(move |job| (part.extension, part.index, job)))
+        .flat_map(|Part { outline, jobs }| jobs.into_iter().map(move |job| (outline.extension, outline.index, job)))
         .map(|(extension, index, job)| (extension, index, job.parameters.drive_velocity, job.parameters.seed))
         .collect();
     assert_eq!(jobs, [(0, 1, 1e-4, 1), (0, 2, 1e-4, 2), (0, 5, 2e-4, 1), (1, 0, 1e-4, 0), (1, 1, 1e-4, 3)]);

@@ -136,7 +136,9 @@ proptest! {
             next[part.extension] += 1;
             prop_assert!(!part.jobs.is_empty() && part.jobs.len() <= PART_JOBS);
             prop_assert!(part.jobs.len() == 1 || part.cost <= extensions[part.extension].part_cost);
-            covered.extend(part.jobs.into_iter().map(|job| (part.extension, job)));
+            prop_assert_eq!(&plan.part(&part.outline), &part);
+            let super::Part { outline, jobs } = part;
+            covered.extend(jobs.into_iter().map(|job| (outline.extension, job)));
         }
         prop_assert_eq!(covered, expected);
     }
@@ -160,6 +162,8 @@ proptest! {
         }
         let parts: Vec<_> = Plan::new(&extensions).parts().collect();
         prop_assert_eq!(&parts[..done.len()], &done[..]);
+        let again: Vec<_> = Plan::new(&extensions).outlines().map(|outline| Plan::new(&extensions).part(&outline)).collect();
+        prop_assert_eq!(&again, &parts);
         let ids = |jobs: &mut dyn Iterator<Item = &Job>| jobs.map(|job| identity.job(&job.parameters)).collect::<Vec<_>>();
         let there = ids(&mut parts.iter().flat_map(|part| &part.jobs));
         let once: HashSet<_> = there.iter().copied().collect();
