@@ -99,7 +99,13 @@ pub fn join<T, E: From<ResultsError>>(
     let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
     let results = Results::open(layout, sweep)?;
     results.join(Task::Run, threads, |member| {
-        let ended = body(&Joined { results: &results, member, begin, threads, options })?;
+        layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
+        let ended = body(&Joined { results: &results, member, begin, threads, options });
+        if ended.is_err() {
+            // What is not found where it was says less than that it was moved.
+            results.check_place()?;
+        }
+        let ended = ended?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })

@@ -55,22 +55,27 @@ pub struct Failure {
     pub command: String,
 }
 
+fn overview_and_failures(results: &Results<'_>) -> Result<(Overview, Vec<Failure>), ResultsError> {
+    let mut failures = Vec::new();
+    let share = Share::look_up(results, Shard::default(), false)?;
+    let overview = share.overview_with_failures(|part, position, reason| {
+        if failures.len() < MAX_FAILURES {
+            failures.push(Failure {
+                job_id: results.job_id(part, position),
+                reason: reason.to_owned(),
+                command: results.sweep().command(&part.jobs[position]),
+            });
+        }
+    })?;
+    Ok((overview, failures))
+}
+
 /// Looks through a directory.
 ///
 /// # Errors
 /// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
-    let mut failures = Vec::new();
-    let overview =
-        Share::look_up(results, Shard::default(), false)?.overview_with_failures(|part, position, reason| {
-            if failures.len() < MAX_FAILURES {
-                failures.push(Failure {
-                    job_id: results.job_id(part, position),
-                    reason: reason.to_owned(),
-                    command: results.sweep().command(&part.jobs[position]),
-                });
-            }
-        })?;
+    let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results))??;
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {
