@@ -7,6 +7,7 @@ use super::{AccuracyError, Stability, cost, method_in_words};
 use crate::figure::{ErrorPanel, Growth, Line, MethodLine, Picture, WorkPrecision, scaling, work_precision};
 use crate::model::Symbol;
 use crate::results::commit::Commit;
+use crate::results::layout::Layout;
 use crate::table::arrow;
 use crate::table::columns::Table;
 use crate::table::file::{DatasetError, Footer, PROGRAM, TableWriter};
@@ -101,7 +102,7 @@ impl<'a> Report<'a> {
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
         Disk.ensure_folder(folder)?;
         let staging = folder.join("staging");
-        let mut commit = Commit::begin(&Disk, &staging)?;
+        let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
         let mut files = Vec::new();
         let footer = Footer::default().with("processor", &cost::processor());
         for (name, write) in &self.tables {

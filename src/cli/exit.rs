@@ -55,6 +55,7 @@ impl Exit {
                 ReduceError::Dataset(error) => Self::of_cause(error),
                 ReduceError::NoJobs { .. } => Some(Self::Usage),
                 ReduceError::Storage(_) => None,
+                ReduceError::Results(error) => Self::of_cause(error),
             };
         }
         match cause.downcast_ref::<DatasetError>() {

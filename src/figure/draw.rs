@@ -48,8 +48,8 @@ pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
 
 fn write(layout: &Layout<'_>, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
     let folder = layout.figures();
-    layout.storage.ensure_folder(&folder)?;
-    let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
+    layout.ensure_folder(&folder)?;
+    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut files = Vec::new();
     for picture in pictures {
         for (extension, bytes) in [("svg", picture.svg().into_bytes()), ("png", picture.png()?)] {

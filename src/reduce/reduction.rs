@@ -12,10 +12,10 @@ use super::set::{SetJobs, SetRow, SetSlips};
 use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
 use crate::observe::{Regime, Slip};
-use crate::results::Results;
 use crate::results::commit::{Commit, alone};
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
+use crate::results::{Results, ResultsError};
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Dataset, DatasetError, TableWriter};
 use crate::table::selected::Selected;
@@ -41,6 +41,9 @@ pub enum ReduceError {
     /// A folder or file cannot be prepared or put in its place.
     #[error(transparent)]
     Storage(#[from] StorageError),
+    /// The directory is not the one that was opened.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
     /// There is nothing to reduce.
     #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", .tables.display())]
     NoJobs {
@@ -82,6 +85,14 @@ pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary, ReduceError> {
 fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, ReduceError> {
     let layout = results.layout();
     let _alone = alone(layout, WRITER)?;
+    let (commit, summary) = layout.read_tables(|| stage(results, max_slips))??;
+    results.publish(commit)?;
+    Ok(summary)
+}
+
+/// Reads the tables, and stages what they are reduced to.
+fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary), ReduceError> {
+    let layout = results.layout();
     // Listed once: what other runs commit meanwhile is left out as a whole.
     let job_files = layout.dataset(JOBS)?;
     let slip_files = committed_files(layout, SLIPS, &job_files)?;
@@ -101,8 +112,8 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
         backbone: Vec::new(),
     };
 
-    layout.storage.ensure_folder(&layout.reduced())?;
-    let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
+    layout.ensure_folder(&layout.reduced())?;
+    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
     let footer = &results.footer(results.extensions().len() - 1);
     let mut set_writer = TableWriter::<SetRow>::new(stage(SetRow::NAME)?, footer)?;
@@ -146,8 +157,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
     startup_writer.finish()?;
     backbone_writer.finish()?;
     point_writer.finish()?;
-    commit.publish()?;
-    Ok(summary)
+    Ok((commit, summary))
 }
 
 columns! {

@@ -37,7 +37,7 @@ impl<'a> Claims<'a> {
     /// # Errors
     /// When they cannot be listed.
     pub fn list(results: &'a Results<'a>, member: &'a Member<'a>) -> Result<Self, StorageError> {
-        results.layout().storage.ensure_folder(&results.layout().claims())?;
+        results.layout().ensure_folder(&results.layout().claims())?;
         let mut claims = Self { results, member, generations: HashMap::new(), own: HashSet::new() };
         claims.refresh()?;
         Ok(claims)

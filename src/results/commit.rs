@@ -24,13 +24,14 @@ pub struct Commit<'a> {
 }
 
 impl<'a> Commit<'a> {
-    /// Begins in a staging folder.
+    /// Begins in a staging folder of a directory.
     ///
     /// # Errors
     /// When the folder cannot be made.
-    pub fn begin(storage: &'a dyn Storage, staging: &Path) -> Result<Self, StorageError> {
-        storage.ensure_folder(staging)?;
-        Ok(Self { storage, staging: staging.to_owned(), token: format!("{:016x}", own_number()), staged: Vec::new() })
+    pub fn begin(layout: &Layout<'a>, staging: &Path) -> Result<Self, StorageError> {
+        layout.ensure_folder(staging)?;
+        let token = format!("{:016x}", own_number());
+        Ok(Self { storage: layout.storage, staging: staging.to_owned(), token, staged: Vec::new() })
     }
 
     /// Creates the next file, which is to be written, and synced, before it goes to its target.
@@ -107,7 +108,7 @@ pub(super) fn own_number() -> u64 {
 /// # Errors
 /// When another does not end within minutes, or a file operation fails.
 pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
-    layout.storage.ensure_folder(&layout.locks())?;
+    layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);
     let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;
     if matches!(lock, Lock::Taken) {
@@ -147,7 +148,7 @@ pub(crate) mod tests {
         let root = tempfile::tempdir().unwrap();
         let (staging, target) = (root.path().join("run/staging/x"), root.path().join("target"));
         fs::write(&target, "old").unwrap();
-        let mut commit = Commit::begin(&Disk, &staging).unwrap();
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &staging).unwrap();
         commit.stage_bytes(&target, b"new").unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"old");
         commit.publish().unwrap();
@@ -159,7 +160,7 @@ pub(crate) mod tests {
     fn an_abandoned_commit_leaves_nothing() {
         let root = tempfile::tempdir().unwrap();
         let (staging, target) = (root.path().join("staging"), root.path().join("target"));
-        let mut commit = Commit::begin(&Disk, &staging).unwrap();
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &staging).unwrap();
         commit.stage_bytes(&target, b"new").unwrap();
         drop(commit);
         assert!(!target.exists());
@@ -170,7 +171,7 @@ pub(crate) mod tests {
     fn a_file_that_cannot_take_its_place_holds_back_those_after_it() {
         let root = tempfile::tempdir().unwrap();
         let (missing, last) = (root.path().join("no folder/first"), root.path().join("last"));
-        let mut commit = Commit::begin(&Disk, &root.path().join("staging")).unwrap();
+        let mut commit = Commit::begin(&Layout::new(&Disk, root.path()), &root.path().join("staging")).unwrap();
         commit.stage_bytes(&missing, b"1").unwrap();
         commit.stage_bytes(&last, b"2").unwrap();
         let error = commit.publish().unwrap_err();

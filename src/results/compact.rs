@@ -7,13 +7,14 @@
 //!
 //! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all
 //! tables at once: who lists a table sees all rows once, before and after. Names hold checksums, so a reader that has
-//! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. A kill at any step
-//! leaves the old tables or the new ones.
+//! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. The old folders stay as
+//! they are until the next compaction, or for [`GRACE`] at least: a reader may have one open, and would find it empty. A
+//! kill at any step leaves the old tables or the new ones.
 
 use crate::results::error::ResultsError;
 use crate::results::events::RunEvent;
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, TableFile};
+use crate::results::layout::{COMPACTION, Layout, REPLACED, TableFile};
 use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::results::verify::Remedy;
 use crate::sweep::Part;
@@ -25,11 +26,12 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::ops::RangeInclusive;
 use std::path::Path;
+use std::time::Duration;
 
 /// Parts of a compacted file at most: some 2 million rows of slips or jobs, 16 row groups.
 const PARTS_PER_FILE: u64 = 512;
-/// Name of the staging folder, which only one process uses at a time.
-const WRITER: &str = "compact";
+/// How long the tables that were replaced stay, unless the next compaction comes first.
+pub(super) const GRACE: Duration = Duration::from_mins(1);
 
 /// What a compaction made.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -94,19 +96,22 @@ impl Results<'_> {
         self.exclusively(|| {
             // It may have been extended before the lock was ours.
             let results = Self::read(self.layout())?;
+            results.refuse_links()?;
             let problems = Self::verify(self.layout())?.problems;
             if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
                 return Err(ResultsError::damaged(&problem.path, problem.problem));
             }
-            let staging = self.layout().staging(WRITER);
-            self.layout().storage.remove_folder(&staging)?;
             let plan = results.plan_compaction(parts_per_file)?;
             let mut there = results.files_by_part(tables::JOBS)?;
             there.retain(|_, file| file.is_compacted());
             let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
             let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
             if changed {
-                results.build(&plan, &staging)?;
+                let staging = self.layout().staging(COMPACTION);
+                results.replace_tables(&plan, &staging).inspect_err(|_| {
+                    // What stays is removed by the next who has the directory alone.
+                    let _ = self.layout().storage.remove_folder(&staging);
+                })?;
             }
             Ok(results.report_compaction(&plan, changed)?)
         })
@@ -135,11 +140,43 @@ impl Results<'_> {
         Ok(self.layout().table_files(table)?.map(|file| ((file.extension, file.first), file)).collect())
     }
 
-    /// Builds the new tables, and puts them in the place of the old ones, which then lie in the staging folder.
-    fn build(&self, plan: &CompactionPlan, staging: &Path) -> Result<(), ResultsError> {
-        let (old, storage) = (self.layout(), self.layout().storage);
-        storage.ensure_folder(staging)?;
+    /// Refuses folders that are elsewhere: the exchange would put one that is here in the place of the link.
+    fn refuse_links(&self) -> Result<(), ResultsError> {
+        let folders = self.tables().map(|table| self.layout().table(table));
+        for folder in std::iter::once(self.layout().tables()).chain(folders) {
+            if self.layout().storage.is_link(&folder)? {
+                let problem = "is a symbolic link, which a compaction would replace; put the folder itself here, or link \
+                               the whole results directory instead";
+                return Err(ResultsError::refused(&folder, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Builds the new tables, and puts them in the place of the old ones.
+    fn replace_tables(&self, plan: &CompactionPlan, staging: &Path) -> Result<(), ResultsError> {
+        let (layout, storage) = (self.layout(), self.layout().storage);
+        let replaced = layout.staging(REPLACED);
+        // The tables before the last ones: no more than one generation stays.
+        storage.remove_folder(&replaced)?;
+        layout.ensure_folder(staging)?;
         self.probe_exchange(staging)?;
+        let files = self.build(plan, staging)?;
+        self.check_place()?;
+        // Under this name already, so that a kill after the exchange leaves the old tables under it.
+        storage.rename(staging, &replaced)?;
+        self.exchange(&layout.tables(), &Layout::new(storage, &replaced).tables()).inspect_err(|_| {
+            let _ = storage.rename(&replaced, staging);
+        })?;
+        for folder in [layout.root(), &replaced, &layout.staging("")] {
+            storage.sync_folder(folder)?;
+        }
+        Ok(self.begin_log()?.write(&RunEvent::Compacted { files })?)
+    }
+
+    /// Builds the new tables in a staging folder; returns the names of the files of the jobs table that are compacted.
+    fn build(&self, plan: &CompactionPlan, staging: &Path) -> Result<Vec<String>, ResultsError> {
+        let storage = self.layout().storage;
         let new = Layout::new(storage, staging);
         self.concatenate::<SlipRow<'_>>(plan, &new)?;
         if self.sweep().recording().precursors {
@@ -149,28 +186,33 @@ impl Results<'_> {
         for folder in [&new.tables(), staging] {
             storage.sync_folder(folder)?;
         }
-        storage.exchange(&old.tables(), &new.tables())?;
-        for folder in [old.root(), staging] {
-            storage.sync_folder(folder)?;
-        }
-        self.begin_log()?.write(&RunEvent::Compacted { files })?;
-        Ok(storage.remove_folder(staging)?)
+        Ok(files)
     }
 
     /// Tries the exchange on two empty folders before anything is built.
     fn probe_exchange(&self, staging: &Path) -> Result<(), ResultsError> {
         let ([one, other], storage) = (["one", "other"].map(|name| staging.join(name)), self.layout().storage);
         for folder in [&one, &other] {
-            storage.ensure_folder(folder)?;
+            storage.create_folder(folder)?;
         }
-        match storage.exchange(&one, &other) {
-            Err(error) if error.kind() == ErrorKind::Unsupported => Err(ResultsError::refused(
-                staging,
-                "this file system cannot exchange two folders in one step, so readers would see an unfinished table; \
-                 nothing was changed. Copy the directory to a local disk and compact it there",
-            )),
-            exchanged => Ok(exchanged?),
-        }
+        self.exchange(&one, &other)
+    }
+
+    /// Exchanges two folders, or says what to do where that is impossible.
+    fn exchange(&self, one: &Path, other: &Path) -> Result<(), ResultsError> {
+        let why = match self.layout().storage.exchange(one, other) {
+            Err(error) if error.kind() == ErrorKind::Unsupported => "this file system cannot exchange two folders",
+            Err(error) if matches!(error.kind(), ErrorKind::CrossesDevices | ErrorKind::ResourceBusy) => {
+                "this folder cannot be exchanged with one in run/staging, as if it were a file system of its own, or in a \
+                 lower layer of an overlay,"
+            }
+            exchanged => return Ok(exchanged?),
+        };
+        let problem = format!(
+            "{why} in one step, so readers would see an unfinished table; nothing was changed. Copy the whole results \
+             directory, for instance to a local disk, and compact the copy"
+        );
+        Err(ResultsError::refused(one, problem))
     }
 
     /// Makes the files of one table; returns the names of those that are compacted.
@@ -178,7 +220,7 @@ impl Results<'_> {
         let (storage, name) = (self.layout().storage, R::NAME);
         let (old_folder, new_folder) = (self.layout().table(name), new.table(name));
         let old = self.files_by_part(name)?;
-        storage.ensure_folder(&new_folder)?;
+        storage.ensure_folder_below(new.root(), &new_folder)?;
         let keep = |file: &TableFile| {
             let file = file.to_string();
             storage.link(&old_folder.join(&file), &new_folder.join(&file)).map(|()| file)

@@ -4,6 +4,7 @@
 //! other's. Tables never depend on it.
 
 use crate::results::commit::own_number;
+use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::TableFile;
 use crate::table::file::PROGRAM;
@@ -227,10 +228,11 @@ impl Results<'_> {
     /// Begins a log.
     ///
     /// # Errors
-    /// When it cannot be created.
-    pub fn begin_log(&self) -> Result<Log, StorageError> {
+    /// When it cannot be created, or the directory is not the one that was opened.
+    pub fn begin_log(&self) -> Result<Log, ResultsError> {
+        self.check_place()?;
         let folder = self.layout().logs();
-        self.layout().storage.ensure_folder(&folder)?;
+        self.layout().ensure_folder(&folder)?;
         let plain: String =
             host().chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
         let (process, number) = (std::process::id(), own_number());

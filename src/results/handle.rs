@@ -1,9 +1,9 @@
 //! A results directory that fits this program: opened once, valid from then on.
 
-use crate::results::commit::alone;
+use crate::results::commit::{Commit, alone};
 use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
-use crate::results::manifest::{self, Manifest};
+use crate::results::manifest::{self, Manifest, Record};
 use crate::results::missing::no_results;
 use crate::results::parts::DoneParts;
 use crate::results::tables;
@@ -34,6 +34,7 @@ impl<'a> Results<'a> {
         if before.is_of(sweep) {
             return Ok(results);
         }
+        layout.storage.ensure_folder(layout.root())?;
         let _alone = alone(layout, manifest::WRITER)?;
         // Another run may have written the manifest before the lock was ours.
         let found = Found::look(layout, sweep)?;
@@ -74,6 +75,32 @@ impl<'a> Results<'a> {
 
     pub(super) fn new(layout: &Layout<'a>, extensions: Vec<Extension>) -> Self {
         Self { layout: layout.clone(), extensions }
+    }
+
+    /// Makes sure that the directory is still the one that was opened. Another that has taken its place belongs to other
+    /// sweeps, so rows of these must not get into it.
+    ///
+    /// # Errors
+    /// When it is not, or cannot be read.
+    pub fn check_place(&self) -> Result<(), ResultsError> {
+        let found = Manifest::read(&self.layout)?;
+        let is_ours = |manifest: Manifest| manifest.extensions.into_iter().eq(self.extensions.iter().map(Record::new));
+        if found.is_some_and(is_ours) {
+            return Ok(());
+        }
+        let problem = "the results directory was moved, removed or replaced since it was opened; \
+                       move it back or name its new place, and the same command resumes";
+        Err(ResultsError::refused(self.layout.root(), problem))
+    }
+
+    /// Moves staged files to their targets, if the directory is still in its place. Should it be moved after this check,
+    /// the staged files, which lie in it, are not found.
+    ///
+    /// # Errors
+    /// As [`Results::check_place`] and [`Commit::publish`].
+    pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
+        self.check_place()?;
+        Ok(commit.publish()?)
     }
 
     /// Where it and everything in it lie.

@@ -6,6 +6,7 @@
 //!                reduced/  figures/                                      made from the tables
 //!                run/manifest.json  sweep-EEE.toml                       what the tables belong to
 //!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
+//!                run/staging/replaced/tables/                            what the last compaction replaced, for a while
 //!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
 //!                run/quarantine/                                         damaged files that a repair took away
 //! ```
@@ -30,6 +31,12 @@ pub const RUN: &str = "run";
 const MANIFEST: &str = "manifest.json";
 /// Folder of the results directories that nobody placed elsewhere.
 pub(super) const RESULTS: &str = "results";
+/// Staging folder of a compaction, which only one process uses at a time.
+pub(super) const COMPACTION: &str = "compact";
+/// Staging folder of a merger, likewise.
+pub(super) const MERGER: &str = "merge";
+/// Folder beside them that holds the tables which the last compaction replaced.
+pub(super) const REPLACED: &str = "replaced";
 /// Names of its folders.
 pub const RUN_FOLDERS: [&str; 7] = ["staging", "lock", "log", "workers", "claims", "spill", "batch"];
 
@@ -93,6 +100,29 @@ impl<'a> Layout<'a> {
     /// As [`Dataset::of_folder`].
     pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, DatasetError> {
         Dataset::of_folder(self.storage, &self.table(name))
+    }
+
+    /// Reads the tables; again as often as a compaction has put others in their place meanwhile, since files that were
+    /// listed before may then not be found.
+    ///
+    /// # Errors
+    /// When the folder of the tables cannot be looked up.
+    pub fn read_tables<T>(&self, mut read: impl FnMut() -> T) -> Result<T, StorageError> {
+        loop {
+            let before = self.storage.hold(&self.tables())?;
+            let found = read();
+            if self.storage.hold(&self.tables())? == before {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
+    ///
+    /// # Errors
+    /// When the directory is gone, or the folder cannot be created.
+    pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
+        self.storage.ensure_folder_below(&self.root, folder)
     }
 
     /// Folder of reduced data.

@@ -125,7 +125,7 @@ impl Manifest {
 
     /// Writes the manifest, and copies of the sweep files beside it.
     pub(super) fn write(&self, layout: &Layout<'_>) -> Result<(), ResultsError> {
-        let mut commit = Commit::begin(layout.storage, &layout.staging(WRITER))?;
+        let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
         for (extension, record) in self.extensions.iter().enumerate() {
             commit.stage_bytes(&layout.sweep(extension), record.sweep.as_bytes())?;
         }
@@ -174,7 +174,7 @@ impl Manifest {
 }
 
 impl Record {
-    fn new(Extension { sweep, part_cost, kept }: &Extension) -> Self {
+    pub(super) fn new(Extension { sweep, part_cost, kept }: &Extension) -> Self {
         Self { sweep: sweep.text().to_owned(), part_cost: *part_cost, kept: kept.clone() }
     }
 }

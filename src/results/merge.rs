@@ -4,14 +4,11 @@ use crate::results::commit::{Commit, alone};
 use crate::results::error::ResultsError;
 use crate::results::events::RunEvent;
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, part_name};
+use crate::results::layout::{Layout, MERGER, part_name};
 use crate::results::manifest::{self, Manifest};
 use crate::sweep::Part;
 use crate::table::checksum;
 use serde::Serialize;
-
-/// Name of the staging folder, which only one process uses at a time.
-const WRITER: &str = "merge";
 
 /// What a merger made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -93,14 +90,14 @@ impl Results<'_> {
     /// Takes over the files of a part, as they are.
     fn take_part(&self, source: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
-        let mut commit = Commit::begin(storage, &self.layout().staging(WRITER))?;
+        let mut commit = Commit::begin(self.layout(), &self.layout().staging(MERGER))?;
         for table in self.tables() {
             let from = source.part_file(table, part);
             checksum::check(storage, &from)?;
-            storage.ensure_folder(&self.layout().table(table))?;
+            self.layout().ensure_folder(&self.layout().table(table))?;
             commit.stage_link(&from, &self.part_file(table, part))?;
         }
-        Ok(commit.publish()?)
+        self.publish(commit)
     }
 
     /// Begins a directory with the extensions of another.
@@ -108,6 +105,7 @@ impl Results<'_> {
         // Refuses what is not empty.
         let first = &of.extensions()[0].sweep;
         Results::preview(target, first)?;
+        target.storage.ensure_folder(target.root())?;
         let _alone = alone(target, manifest::WRITER)?;
         Manifest::new(of.extensions()).write(target)?;
         Results::read(target)

@@ -224,7 +224,7 @@ impl Results<'_> {
         let positions = (0..part.jobs.len()).filter(is_written);
         let jobs: Jobs<'_> = positions.map(|position| (label(position), outcomes.get(&position))).collect();
         let places = (from, to);
-        let mut commit = Commit::begin(self.layout().storage, staging)?;
+        let mut commit = Commit::begin(self.layout(), staging)?;
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
         })?;
@@ -237,7 +237,7 @@ impl Results<'_> {
         self.stage::<JobRow>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             writer.push(&(relabel(job), JobRecord::new(outcome.as_ref().map_err(String::as_str))))
         })?;
-        Ok(commit.publish()?)
+        self.publish(commit)
     }
 
     /// Writes a part's file of one table: new rows of jobs with an outcome, the old ones of the others.
@@ -255,8 +255,12 @@ impl Results<'_> {
             Place::Spill => self.spilled_file(R::NAME, part),
         };
         let target = place(to);
+        let above = match to {
+            Place::Tables => self.layout().tables(),
+            Place::Spill => self.layout().run(),
+        };
         if let Some(folder) = target.parent() {
-            storage.ensure_folder(folder)?;
+            storage.ensure_folder_below(&above, folder)?;
         }
         let kept = KeptRows::read(Dataset::new(storage, from.map(place).into_iter().collect()))?;
         let mut writer = TableWriter::new(commit.stage(&target)?, &self.footer(part.extension))?;

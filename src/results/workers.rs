@@ -11,10 +11,11 @@
 //! leaves.
 
 use crate::results::commit::own_number;
+use crate::results::compact::GRACE;
 use crate::results::error::ResultsError;
 use crate::results::events::host;
 use crate::results::handle::Results;
-use crate::results::layout::Layout;
+use crate::results::layout::{COMPACTION, Layout, MERGER, REPLACED};
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -179,7 +180,10 @@ impl<'a> Results<'a> {
     /// # Errors
     /// As [`Results::join`].
     pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
-        self.join(Task::Change, 1, |_| body())
+        self.join(Task::Change, 1, |member| {
+            member.tidy()?;
+            body()
+        })
     }
 }
 
@@ -218,10 +222,10 @@ impl<'a> Member<'a> {
         own().insert(name.clone());
         let member =
             Self { layout: layout.clone(), name, number, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
-        layout.storage.ensure_folder(&layout.workers())?;
+        layout.ensure_folder(&layout.workers())?;
         // First, so that nobody takes what follows for a dead one's.
         member.beat()?;
-        layout.storage.ensure_folder(&member.staging())?;
+        layout.ensure_folder(&member.staging())?;
         layout.storage.create(&member.claim())?.write(member.name.as_bytes())?;
         Ok(member)
     }
@@ -294,7 +298,7 @@ impl<'a> Member<'a> {
     }
 
     /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
-    /// looked up what is done before they ended.
+    /// looked up what is done before they ended; likewise what is left of compactions and mergers.
     ///
     /// # Errors
     /// When something cannot be listed or removed.
@@ -321,9 +325,24 @@ impl<'a> Member<'a> {
             }
         }
         if others.is_empty() {
+            for name in [COMPACTION, MERGER, REPLACED].into_iter().filter(|name| left.iter().any(|there| there == name))
+            {
+                if name != REPLACED || self.is_grace_over()? {
+                    storage.remove_folder(&layout.staging(name))?;
+                }
+            }
             claims.iter().try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
         }
         Ok(())
+    }
+}
+
+impl Member<'_> {
+    /// Whether the tables that a compaction replaced need not stay any longer, by the clock of the file system.
+    fn is_grace_over(&self) -> Result<bool, StorageError> {
+        let modified = |path: PathBuf| self.layout.storage.modified(&path);
+        let age = modified(self.file())?.duration_since(modified(self.layout.staging(REPLACED))?);
+        Ok(age.is_ok_and(|age| age > GRACE))
     }
 }
 

@@ -100,7 +100,13 @@ pub fn join<T, E: From<ResultsError>>(
     let results = Results::open(layout, sweep)?;
     let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
     results.join(Task::Run, threads, |member| {
-        let ended = body(&Joined { results: &results, parts: &parts, member, begin, threads, options })?;
+        layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
+        let ended = body(&Joined { results: &results, parts: &parts, member, begin, threads, options });
+        if ended.is_err() {
+            // What is not found where it was says less than that it was moved.
+            results.check_place()?;
+        }
+        let ended = ended?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })

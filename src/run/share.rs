@@ -7,6 +7,7 @@
 use crate::results::claims::{Claims, Standing};
 use crate::results::layout::part_name;
 use crate::results::parts::{DoneParts, Unfinished};
+use crate::results::tables;
 use crate::results::workers::{Living, Member};
 use crate::results::{Results, ResultsError};
 use crate::run::walltime::Walltime;
@@ -129,7 +130,10 @@ impl<'a> Share<'a> {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
                 Standing::Free(_) => left.has_abandoned = true,
-                Standing::Own => (),
+                Standing::Own => {
+                    let path = self.results.part_file(tables::JOBS, &part);
+                    return Err(ResultsError::damaged(&path, "it was committed and is gone"));
+                }
             }
         }
         Ok(left)

@@ -131,11 +131,7 @@ fn jobs_kept(share: &Share<'_>) -> u64 {
     earlier.map(|part| kept(share.part(part))).sum()
 }
 
-/// Looks through a directory.
-///
-/// # Errors
-/// When a log or a part cannot be read.
-pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
+fn overview_and_failures(results: &Results<'_>) -> Result<(Overview, Vec<Failure>), ResultsError> {
     let mut failures = Vec::new();
     let parts: Vec<Outline> = results.plan().outlines().collect();
     let share = Share::look_up(results, &parts, false)?;
@@ -149,6 +145,15 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
         }
     })?;
     overview.jobs_kept = jobs_kept(&share);
+    Ok((overview, failures))
+}
+
+/// Looks through a directory.
+///
+/// # Errors
+/// When a log or a part cannot be read.
+pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
+    let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results))??;
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {

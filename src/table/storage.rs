@@ -60,11 +60,11 @@ impl StoredFile {
 /// The file operations. Every error names the operation, the path and the operating system's reason.
 #[allow(clippy::missing_errors_doc, reason = "said once for all")]
 pub trait Storage: Sync {
-    /// Creates a folder and its parents; nothing happens if it is there.
+    /// Creates a folder within one that is there; nothing happens if it is there itself.
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Creates a file, or empties it.
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError>;
-    /// Renames a file within the file system, over another if there is one.
+    /// Renames a file within the file system, over another if there is one; or a folder.
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
     /// Gives a file a second name within the file system; copies it where files have one name only.
     fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
@@ -83,7 +83,12 @@ pub trait Storage: Sync {
     /// Removes a folder with all that is in it; nothing happens if there is none.
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
+    /// [`io::ErrorKind::CrossesDevices`]: it cannot move one of these two.
     fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError>;
+    /// The folder that has a path now; `None` if there is none.
+    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError>;
+    /// Whether a path is that of a symbolic link.
+    fn is_link(&self, path: &Path) -> Result<bool, StorageError>;
     /// Tries to lock a file, created if needed.
     fn lock(&self, file: &Path) -> Result<Lock, StorageError>;
 
@@ -118,6 +123,20 @@ pub trait Storage: Sync {
         self.sync_folder(parent.unwrap_or(Path::new(".")))
     }
 
+    /// Creates a folder below another, which must be there, and those in between; brings the new names to the disk.
+    fn ensure_folder_below(&self, top: &Path, folder: &Path) -> Result<(), StorageError> {
+        if self.exists(folder)? {
+            return Ok(());
+        }
+        let Some(parent) = folder.parent().filter(|_| folder != top) else {
+            let gone = io::Error::new(io::ErrorKind::NotFound, "it is not there any more");
+            return Err(StorageError::at("write into", folder)(gone));
+        };
+        self.ensure_folder_below(top, parent)?;
+        self.create_folder(folder)?;
+        self.sync_folder(parent)
+    }
+
     /// Removes the files in a folder.
     fn clear_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.list(folder)?.into_iter().try_for_each(|name| self.remove(&folder.join(name)))
@@ -150,6 +169,19 @@ pub trait Storage: Sync {
             }
             std::thread::sleep(LOCK_POLL);
         }
+    }
+}
+
+/// A folder, by its number in the file system. It stays open, so that no other folder gets the number.
+#[derive(Debug)]
+pub struct HeldFolder {
+    _open: File,
+    number: (u64, u64),
+}
+
+impl PartialEq for HeldFolder {
+    fn eq(&self, other: &Self) -> bool {
+        self.number == other.number
     }
 }
 
@@ -200,7 +232,10 @@ impl Sink for File {
 
 impl Storage for Disk {
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        fs::create_dir_all(folder).map_err(StorageError::at("create", folder))
+        match fs::create_dir(folder) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
+            created => created.map_err(StorageError::at("create", folder)),
+        }
     }
 
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError> {
@@ -273,6 +308,20 @@ impl Storage for Disk {
         exchange(one, other).map_err(StorageError::at("exchange folders with", one))
     }
 
+    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
+        match held(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            held => held.map_err(StorageError::at("look up", folder)),
+        }
+    }
+
+    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
+        match fs::symlink_metadata(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            found => Ok(found.map_err(StorageError::at("look up", path))?.is_symlink()),
+        }
+    }
+
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
         let handle = File::options().create(true).truncate(false).write(true).open(file);
         let handle = handle.map_err(StorageError::at("lock", file))?;
@@ -288,6 +337,20 @@ impl Storage for Disk {
             Err(TryLockError::Error(error)) => Err(StorageError::at("lock", file)(error)),
         }
     }
+}
+
+#[cfg(unix)]
+fn held(folder: &Path) -> io::Result<Option<HeldFolder>> {
+    use std::os::unix::fs::MetadataExt;
+    let open = File::open(folder)?;
+    let metadata = open.metadata()?;
+    Ok(Some(HeldFolder { number: (metadata.dev(), metadata.ino()), _open: open }))
+}
+
+/// Elsewhere no folder takes the place of another, as none can be exchanged.
+#[cfg(not(unix))]
+fn held(_: &Path) -> io::Result<Option<HeldFolder>> {
+    Ok(None)
 }
 
 #[cfg(any(target_os = "linux", target_os = "macos"))]

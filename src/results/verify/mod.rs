@@ -128,7 +128,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
     pub fn verify(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
-        Ok(Self::examine(layout)?.1)
+        Ok(layout.read_tables(|| Self::examine(layout))??.1)
     }
 
     /// Takes away what is damaged, so that the next run makes it again; returns what was found.

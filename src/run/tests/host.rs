@@ -8,7 +8,7 @@
 
 use super::schedule::Schedule;
 use crate::results::workers::BEAT_THREAD;
-use crate::table::storage::{Disk, Lock, Storage, StorageError, StoredFile};
+use crate::table::storage::{Disk, HeldFolder, Lock, Storage, StorageError, StoredFile};
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fs::File;
@@ -159,6 +159,16 @@ impl Storage for Host<'_> {
 
     fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
         self.change("exchange", [one, other], || Disk.exchange(one, other))
+    }
+
+    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
+        self.turn("look up", folder)?;
+        Disk.hold(folder)
+    }
+
+    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
+        self.turn("look up", path)?;
+        Disk.is_link(path)
     }
 
     /// Network file systems are often mounted without locks.

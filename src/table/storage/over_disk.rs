@@ -1,6 +1,6 @@
 //! Disks of tests: that of the operating system, but for what a test says otherwise.
 
-use super::{Disk, Lock, Sink, Storage, StorageError, StoredFile};
+use super::{Disk, HeldFolder, Lock, Sink, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
@@ -83,6 +83,14 @@ impl<T: OverDisk> Storage for T {
     fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
         self.before(Access::Change).map_err(StorageError::at("exchange folders with", one))?;
         self.exchange_folders(one, other)
+    }
+    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("look up", folder))?;
+        Disk.hold(folder)
+    }
+    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
+        self.before(Access::Look).map_err(StorageError::at("look up", path))?;
+        Disk.is_link(path)
     }
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
         self.before(Access::Look).map_err(StorageError::at("lock", file))?;
