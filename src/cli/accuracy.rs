@@ -9,6 +9,7 @@ use stickslip::accuracy::{
     self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
     hard_cases, scaling_report, solver_in_words, stability_report, study_report,
 };
+use stickslip::table::shown::shown;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -94,7 +95,7 @@ fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Re
         return output::json(report.json());
     }
     output::print(text)?;
-    files.iter().try_for_each(|file| output::print(&format!("{}\n", file.display())))
+    files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))
 }
 
 fn or_dash(value: Option<f64>) -> String {

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf, absolute};
 use std::time::Duration;
 use stickslip::results::layout::Layout;
 use stickslip::sweep::Sweep;
+use stickslip::table::shown::shown;
 
 /// Print a script that submits a sweep to a batch system
 #[derive(Debug, Args)]
@@ -132,10 +133,10 @@ fn margin(time: Duration) -> Duration {
 
 /// An absolute path; symbolic links stay, since a common disk may be mounted elsewhere on other nodes.
 fn whole_path(path: &Path) -> Result<String> {
-    let path = absolute(path).with_context(|| format!("{}: cannot be made absolute", path.display()))?;
+    let path = absolute(path).with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
     let text = path.to_str().filter(|text| !text.contains(char::is_control));
     Ok(text.map(ToOwned::to_owned).ok_or_else(|| {
-        let path = path.display();
+        let path = shown(&path);
         UsageError(format!("{path}: must be UTF-8 without control characters; choose another path"))
     })?)
 }

@@ -3,6 +3,8 @@
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
+use stickslip::table::shown::is_plain;
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
 pub fn print(text: &str) -> Result<()> {
@@ -60,4 +62,19 @@ pub fn quoted(text: &str) -> String {
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
     }
+}
+
+/// A path as a shell reads it; as bash, ksh and zsh do, if a byte of it has to be escaped.
+pub fn quoted_path(path: &Path) -> String {
+    if let Some(text) = path.to_str().filter(|text| text.chars().all(is_plain)) {
+        return quoted(text);
+    }
+    let bytes = path.as_os_str().as_encoded_bytes().iter();
+    let escaped: String = bytes
+        .map(|&byte| match byte {
+            b' '..=b'~' if !b"'\\".contains(&byte) => char::from(byte).to_string(),
+            _ => format!("\\x{byte:02x}"),
+        })
+        .collect();
+    format!("$'{escaped}'")
 }

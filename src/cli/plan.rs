@@ -11,7 +11,8 @@ use stickslip::results::layout::Layout;
 use stickslip::results::{ErrorKind, Results};
 use stickslip::run::{Overview, status};
 use stickslip::sweep::{Extension, Plan, Sweep};
-use stickslip::table::storage::Disk;
+use stickslip::table::shown::{serialize_path, shown};
+use stickslip::table::storage::{Disk, Storage};
 
 /// Show what a sweep would run, and what of it is done: jobs, parts, predicted cost. Nothing is written
 #[derive(Debug, Args)]
@@ -52,6 +53,7 @@ struct Report {
 /// What of the sweep is in its results directory, or why it cannot be run there.
 #[derive(Serialize)]
 struct Directory {
+    #[serde(serialize_with = "serialize_path")]
     path: PathBuf,
     refused: Option<String>,
     #[serde(flatten)]
@@ -61,7 +63,7 @@ struct Directory {
 impl Directory {
     /// `None` if there is none yet.
     fn of(sweep: &Sweep, root: PathBuf) -> Result<Option<Self>> {
-        if !root.exists() {
+        if !Disk.exists(&root)? {
             return Ok(None);
         }
         let layout = Layout::new(&Disk, &root);
@@ -75,7 +77,7 @@ impl Directory {
     }
 
     fn in_words(&self) -> String {
-        let path = self.path.display();
+        let path = shown(&self.path);
         match (&self.overview, &self.refused) {
             (Some(overview), _) => format!(
                 "{path}: {} done, {} failed, {} to run; {} kept that the sweep no longer has",

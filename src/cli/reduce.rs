@@ -9,6 +9,7 @@ use stickslip::figure::draw_all;
 use stickslip::reduce::ReductionSummary;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
+use stickslip::table::shown::shown;
 use stickslip::table::storage::Disk;
 
 /// Reduce the tables of a results directory to Fig. 3-style data
@@ -47,7 +48,7 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
 pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     for path in draw_all(results.layout())? {
-        output::print(&format!("{}\n", path.display()))?;
+        output::print(&format!("{}\n", shown(&path)))?;
     }
     Ok(Exit::Done)
 }
@@ -67,11 +68,11 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
 
 /// A reduction in brief.
 pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'static str, String)> {
-    let shown = |path: &Path| path.display().to_string();
+    let text = |path: &Path| shown(path).to_string();
     vec![
         ("jobs", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
         ("parameter sets", format!("{}, {} locked", summary.sets, summary.locked_sets)),
         ("slips", summary.slips.to_string()),
-        ("reduced data", shown(&layout.reduced())),
+        ("reduced data", text(&layout.reduced())),
     ]
 }

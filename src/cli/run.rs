@@ -18,6 +18,7 @@ use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
+use stickslip::table::shown::shown;
 use stickslip::table::storage::Disk;
 
 /// Run or resume a sweep; then reduce and plot
@@ -133,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     }
     if report.jobs_left > 0 {
         let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));
-        let out = root.display();
+        let out = output::quoted_path(&root);
         output::report(&format!(
             "nothing is left to take: others run the last {left} ({hosts}); see stickslip status {out}"
         ));
@@ -160,7 +161,7 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
     if !arguments.json {
         output::pairs(&reduce::summary_lines(&summary, layout))?;
         for path in figures {
-            output::print(&format!("figure  {}\n", path.display()))?;
+            output::print(&format!("figure  {}\n", shown(&path)))?;
         }
     }
     if arguments.shard.is_some() { reduce::report_missing(&results) } else { Ok(()) }

@@ -10,6 +10,7 @@ use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::workers::Worker;
 use stickslip::run::{Failure, Overview, Present};
+use stickslip::table::shown::shown_text;
 use stickslip::table::storage::Disk;
 
 /// Show what of a results directory is done, failed and missing, who is at work, and the predicted time left
@@ -58,12 +59,13 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         for Present { worker, last_beat } in &status.workers {
             let Worker { host, process, threads, jobs_per_second, .. } = worker;
             output::print(&format!(
-                "worker  process {process} on {host}: {}, {jobs_per_second:.2} jobs/s, last beat {last_beat:.0} s ago\n",
+                "worker  process {process} on {}: {}, {jobs_per_second:.2} jobs/s, last beat {last_beat:.0} s ago\n",
+                shown_text(host),
                 output::count(*threads as u64, "thread")
             ))?;
         }
         for Failure { job_id, reason, command } in &status.failures {
-            output::print(&format!("failed  {job_id}: {reason}\n  alone: {command}\n"))?;
+            output::print(&format!("failed  {job_id}: {}\n  alone: {command}\n", shown_text(reason)))?;
         }
         if overview.jobs_failed > status.failures.len() as u64 {
             output::print("failed  and more: see outcome and reason in tables/jobs\n")?;

@@ -3,6 +3,7 @@
 use super::exit::UsageError;
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
+use stickslip::table::shown::shown;
 
 /// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
 /// `HQ_CPUS` is not among them: it lists the cores by their ids.
@@ -30,7 +31,7 @@ impl Threads {
         // OpenMP's may be a list, of one number for each level of nesting.
         let count = value.to_str().and_then(|value| value.split(',').next()?.trim().parse().ok());
         let count = count.ok_or_else(|| {
-            let value = value.display();
+            let value = shown(value.as_ref());
             UsageError(format!("{variable}={value}: must be a whole number >= 1; unset it, or give --threads"))
         })?;
         Ok(Self { count: Some(count), variable: Some(variable) })

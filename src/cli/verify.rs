@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::verify::{Problem, Verification};
+use stickslip::table::shown::{shown, shown_text};
 use stickslip::table::storage::Disk;
 
 /// Check that every file of a results directory is whole and every job is there once, and say what to do if not
@@ -59,7 +60,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
 
 /// What repairs a directory.
 fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
-    let (root, mut commands) = (output::quoted(&layout.root().display().to_string()), Vec::new());
+    let (root, mut commands) = (output::quoted_path(layout.root()), Vec::new());
     if with_repair && verification.wants_repair() {
         commands.push(format!("stickslip verify {root} --repair"));
     }
@@ -77,7 +78,7 @@ fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool)
 
 fn print_summary(verification: &Verification, commands: &[String], repaired: bool) -> Result<()> {
     for problem in &verification.problems {
-        output::print(&format!("{}: {}{}\n", problem.path.display(), problem.problem, jobs_of(problem)))?;
+        output::print(&format!("{}: {}{}\n", shown(&problem.path), shown_text(&problem.problem), jobs_of(problem)))?;
     }
     let megabytes = verification.bytes as f64 / 1e6;
     let missing = match (verification.parts_missing, verification.jobs_missing) {

@@ -35,6 +35,7 @@ pub use simulation::{AttachedMap, simulation};
 pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 
 use crate::table::file::DatasetError;
+use crate::table::shown::shown;
 use crate::table::storage::StorageError;
 use std::path::PathBuf;
 
@@ -58,7 +59,7 @@ pub enum FigureError {
         reason: String,
     },
     /// There are no reduced data.
-    #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", .directory.display())]
+    #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", shown(directory))]
     NotReduced {
         /// The results directory.
         directory: PathBuf,

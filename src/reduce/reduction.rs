@@ -19,6 +19,7 @@ use crate::results::{Results, ResultsError};
 use crate::table::columns::{Table, columns};
 use crate::table::file::{Dataset, DatasetError, TableWriter};
 use crate::table::selected::Selected;
+use crate::table::shown::shown;
 use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::cmp::Ordering;
@@ -45,7 +46,7 @@ pub enum ReduceError {
     #[error(transparent)]
     Results(#[from] ResultsError),
     /// There is nothing to reduce.
-    #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", .tables.display())]
+    #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", shown(tables))]
     NoJobs {
         /// Folder of the jobs table.
         tables: PathBuf,
@@ -100,7 +101,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     if all_jobs.is_empty() {
         return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
     }
-    let total: u64 = all_jobs.iter().map(|set| set.slips).sum();
+    let total = all_jobs.iter().map(|set| set.slips).fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
         format: SUMMARY_FORMAT,
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
@@ -191,7 +192,7 @@ fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
                 set.failed += 1;
             } else {
                 set.finished += 1;
-                set.slips += job.slips.unwrap_or(0);
+                set.slips = set.slips.saturating_add(job.slips.unwrap_or(0));
                 set.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
                 set.friction.extend(job.mean_friction);
                 set.attached_fraction.extend(job.attached_fraction);
@@ -225,7 +226,7 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
     let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
     let mut slips = 0;
     for set in sets {
-        slips += set.slips;
+        slips = set.slips.saturating_add(slips);
         match chunks.last_mut() {
             Some(chunk) if slips <= max_slips => chunk.push(set),
             _ => {

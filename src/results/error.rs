@@ -1,6 +1,7 @@
 //! Why a results directory cannot be used or changed: where, what, and the way out.
 
 use crate::table::file::DatasetError;
+use crate::table::shown::{shown, shown_text};
 use crate::table::storage::StorageError;
 use std::error::Error;
 use std::fmt;
@@ -54,12 +55,13 @@ impl ResultsError {
 impl fmt::Display for ResultsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { kind, path, problem } = self;
-        let path = path.display();
+        let path = shown(path);
         match kind {
             ErrorKind::Refused | ErrorKind::Busy => write!(f, "{path}: {problem}"),
             ErrorKind::Damaged => write!(
                 f,
-                "{path}: damaged: {problem}; `stickslip verify` on the results directory reports how to repair it"
+                "{path}: damaged: {}; `stickslip verify` on the results directory reports how to repair it",
+                shown_text(problem)
             ),
             ErrorKind::Disk => write!(f, "{path}: {problem}; all that was committed before is kept"),
         }

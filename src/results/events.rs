@@ -7,11 +7,12 @@ use crate::results::commit::own_number;
 use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::TableFile;
-use crate::table::file::PROGRAM;
+use crate::sweep::Outline;
+use crate::table::file::{FILE_EXTENSION, PROGRAM};
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Something that happened. Costs are CPU times, and all times are in s.
@@ -166,6 +167,9 @@ impl RunEvent {
     }
 }
 
+/// Most bytes of a line: far more than the names of all compacted files.
+const MAX_LINE: u64 = 1 << 24;
+
 /// A line of a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Line {
@@ -241,7 +245,7 @@ impl Results<'_> {
     }
 
     /// Goes through all events that are logged, in order of the beginnings of their runs. What a killed run left
-    /// half-written is passed over.
+    /// half-written is passed over, and so is what is no file.
     ///
     /// # Errors
     /// When a log cannot be read.
@@ -249,11 +253,17 @@ impl Results<'_> {
         let (folder, storage) = (self.layout().logs(), self.layout().storage);
         for name in storage.list(&folder)? {
             let path = folder.join(name);
-            for line in BufReader::new(storage.open(&path)?).split(b'\n') {
-                let line = line.map_err(StorageError::at("read", &path))?;
+            let mut log = match storage.open(&path) {
+                Err(error) if error.is_no_file() => continue,
+                log => BufReader::new(log?),
+            };
+            let mut line = Vec::new();
+            while log.by_ref().take(MAX_LINE).read_until(b'\n', &mut line).map_err(StorageError::at("read", &path))? > 0
+            {
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
                 }
+                line.clear();
             }
         }
         Ok(())
@@ -274,23 +284,54 @@ impl Results<'_> {
         Ok((predicted > 0.0).then(|| measured / predicted))
     }
 
-    /// The parts that were committed and not taken away since, by their names, as the logs say.
-    pub(super) fn committed_parts(&self) -> Result<BTreeMap<String, Kept>, StorageError> {
-        let mut parts = BTreeMap::new();
+    /// The parts that were committed and not taken away since, as the logs say.
+    pub(super) fn committed_parts(&self) -> Result<CommittedParts, StorageError> {
+        let mut parts = CommittedParts::default();
+        let file_of = |part: &str| TableFile::parse(&format!("{part}.{FILE_EXTENSION}"));
         self.events(|event| match event {
             RunEvent::PartCommitted { part, .. } | RunEvent::PartMerged { part } => {
-                parts.insert(part, Kept::Alone);
+                parts.set(file_of(&part), Some(Kept::Alone));
             }
-            RunEvent::PartQuarantined { part } => {
-                parts.remove(&part);
-            }
+            RunEvent::PartQuarantined { part } => parts.set(file_of(&part), None),
             RunEvent::Compacted { files } => {
-                let files = files.iter().filter_map(|name| TableFile::parse(name));
-                parts.extend(files.flat_map(|file| file.part_names()).map(|part| (part, Kept::Compacted)));
+                files.iter().for_each(|name| parts.set(TableFile::parse(name), Some(Kept::Compacted)));
             }
             _ => (),
         })?;
         Ok(parts)
+    }
+}
+
+/// How the rows of parts were kept last: ranges without overlap, as a log may name more parts than there can be.
+#[derive(Debug, Default)]
+pub(super) struct CommittedParts(BTreeMap<(usize, u64), (u64, Kept)>);
+
+impl CommittedParts {
+    /// How the rows of a part were kept; `None` if it was never committed, or taken away.
+    pub fn get(&self, part: &Outline) -> Option<Kept> {
+        let before = self.0.range((part.extension, 0)..=(part.extension, part.index)).next_back();
+        before.filter(|(_, (last, _))| part.index <= *last).map(|(_, (_, kept))| *kept)
+    }
+
+    /// Says how the parts of a file are kept from now on.
+    fn set(&mut self, file: Option<TableFile>, kept: Option<Kept>) {
+        let Some(TableFile { extension, first, last, .. }) = file else { return };
+        let overlaps = |(begin, (end, _)): &(&(usize, u64), &(u64, Kept))| begin.0 == extension && *end >= first;
+        while let Some((&(_, begin), &(end, before))) =
+            self.0.range((extension, 0)..=(extension, last)).next_back().filter(overlaps)
+        {
+            self.0.remove(&(extension, begin));
+            // What sticks out on either side stays.
+            if end > last {
+                self.0.insert((extension, last + 1), (end, before));
+            }
+            if begin < first {
+                self.0.insert((extension, begin), (first - 1, before));
+            }
+        }
+        if let Some(kept) = kept {
+            self.0.insert((extension, first), (last, kept));
+        }
     }
 }
 
@@ -322,5 +363,35 @@ mod tests {
         let mut read_back = Vec::new();
         results.events(|event| read_back.push(event)).unwrap();
         assert_eq!(read_back, events);
+    }
+
+    #[test]
+    fn the_last_event_says_how_a_part_is_kept() {
+        let part = |index| Outline { extension: 0, index, points: 0..=0, job_count: 1, cost: 0.0 };
+        let file = |first, last| Some(TableFile::compacted(0, &(first..=last), "0"));
+        let mut parts = CommittedParts::default();
+        parts.set(file(2, 2), Some(Kept::Alone));
+        parts.set(file(0, u64::MAX), Some(Kept::Compacted));
+        parts.set(file(3, 4), None);
+        parts.set(file(6, 6), Some(Kept::Alone));
+        parts.set(file(u64::MAX, u64::MAX), None);
+        let kept: Vec<_> = (0..8).chain([u64::MAX - 1, u64::MAX]).map(|index| parts.get(&part(index))).collect();
+        let [all, alone] = [Some(Kept::Compacted), Some(Kept::Alone)];
+        assert_eq!(kept, [all, all, all, None, None, all, alone, all, all, None]);
+        assert_eq!(parts.get(&Outline { extension: 1, ..part(0) }), None);
+    }
+
+    #[test]
+    fn a_log_without_ends_of_lines_is_read_in_pieces_and_what_is_no_file_passed_over() {
+        let root = tempfile::tempdir().unwrap();
+        let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
+        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
+        results.begin_log().unwrap().write(&RunEvent::Stopping).unwrap();
+        let logs = results.layout().logs();
+        std::fs::create_dir(logs.join("0")).unwrap();
+        std::fs::File::create(logs.join("1")).unwrap().set_len(3 * MAX_LINE).unwrap();
+        let mut events = 0;
+        results.events(|_| events += 1).unwrap();
+        assert_eq!(events, 1);
     }
 }

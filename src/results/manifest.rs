@@ -17,9 +17,9 @@ use crate::sweep::{Extension, PLAN_VERSION, Sweep};
 use crate::table::checksum;
 use crate::table::columns::Table;
 use crate::table::file::PROGRAM;
+use crate::table::shown::shown_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -101,13 +101,13 @@ impl Manifest {
             .into_iter()
             .zip(versions(ours))
             .filter(|(before, after)| before != after)
-            .map(|((key, before), (_, after))| format!("{key}: {before} -> {after}"))
+            .map(|((key, before), (_, after))| format!("{key}: {} -> {after}", shown_text(&before)))
             .collect();
         // Versions enter it.
         if differences.is_empty() && self.identity != ours.identity {
             differences.push(format!(
                 "defaults: those of {} -> others of this program; what its sweep file leaves out would mean something else",
-                self.program
+                shown_text(&self.program)
             ));
         }
         for (name, after) in &ours.tables {
@@ -149,6 +149,23 @@ impl Manifest {
         self.extensions.iter().enumerate().map(extension).collect()
     }
 
+    /// Looks whether a program can have written this.
+    fn check(&self) -> Result<(), &'static str> {
+        let Some((last, earlier)) = self.extensions.split_last() else { return Err("there is no sweep") };
+        if last.kept.is_some() || earlier.iter().any(|record| record.kept.is_none()) {
+            return Err("it keeps points of other sweeps than the earlier ones");
+        }
+        if !self.extensions.iter().all(|record| record.part_cost.is_finite() && record.part_cost >= 0.0) {
+            return Err("the cost of a part is none");
+        }
+        let is_ordered = |kept: &Vec<RangeInclusive<u64>>| {
+            kept.iter().all(|range| range.start() <= range.end())
+                && kept.windows(2).all(|pair| pair[0].end() < pair[1].start())
+        };
+        let mut kept = earlier.iter().filter_map(|record| record.kept.as_ref());
+        if kept.all(is_ordered) { Ok(()) } else { Err("the points that it keeps are not in order") }
+    }
+
     /// Reads the manifest alone; `None` if there is none.
     pub(super) fn read(layout: &Layout<'_>) -> Result<Option<Self>, ResultsError> {
         let path = layout.manifest();
@@ -166,9 +183,7 @@ impl Manifest {
             return Err(ResultsError::refused(&path, problem));
         }
         let manifest: Self = checksum::from_json(&text).map_err(damaged)?;
-        if manifest.extensions.is_empty() {
-            return Err(damaged("there is no sweep".to_owned()));
-        }
+        manifest.check().map_err(|problem| damaged(problem.to_owned()))?;
         Ok(Some(manifest))
     }
 }
@@ -211,7 +226,8 @@ pub(super) fn refuse(layout: &Layout<'_>, differences: &[String], way_out: &str)
 /// The text of a file that must be there.
 pub(super) fn read_text(layout: &Layout<'_>, path: &Path) -> Result<String, ResultsError> {
     match layout.storage.read(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Err(ResultsError::damaged(path, "it is missing")),
+        Err(error) if error.is_missing() => Err(ResultsError::damaged(path, "it is missing")),
+        Err(error) if error.is_no_file() => Err(ResultsError::damaged(path, error.source.to_string())),
         bytes => String::from_utf8(bytes?).map_err(|error| ResultsError::damaged(path, error.to_string())),
     }
 }

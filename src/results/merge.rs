@@ -8,6 +8,7 @@ use crate::results::layout::{Layout, MERGER, part_name};
 use crate::results::manifest::{self, Manifest};
 use crate::sweep::Part;
 use crate::table::checksum;
+use crate::table::shown::shown;
 use serde::Serialize;
 
 /// What a merger made.
@@ -39,7 +40,7 @@ pub fn merge(sources: &[Layout<'_>], target: &Layout<'_>) -> Result<Merged, Resu
         if !Manifest::new(source.extensions()).is_of_same_plan(&expected) {
             let problem = format!(
                 "was run with other sweep files than {}, or had other parts done when they changed; merge shards of one sweep",
-                first.layout().root().display()
+                shown(first.layout().root())
             );
             return Err(ResultsError::refused(source.layout().root(), problem));
         }

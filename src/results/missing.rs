@@ -3,6 +3,7 @@
 use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RESULTS};
 use crate::sweep::{Sweep, nearest};
+use crate::table::shown::shown;
 use crate::table::storage::Storage;
 use std::path::{Path, PathBuf};
 
@@ -15,15 +16,15 @@ pub(super) fn no_results(layout: &Layout<'_>) -> ResultsError {
     let way_out = "name one that a run made, such as results/fig3";
     let problem = if !storage.exists(root).unwrap_or(true) {
         match meant(storage, root) {
-            Some(path) => format!("there is no such directory; did you mean {}?", path.display()),
+            Some(path) => format!("there is no such directory; did you mean {}?", shown(&path)),
             None => format!("there is no such directory; {way_out}"),
         }
     } else if let Some(sweep) = sweep_file(storage, root) {
         let directory = Layout::default_root(&sweep);
-        format!("is a sweep file; name its results directory, by default {}", directory.display())
+        format!("is a sweep file; name its results directory, by default {}", shown(&directory))
     } else {
         let inside = results_in(storage, root);
-        let named: Vec<_> = inside.iter().take(MAX_NAMED).map(|name| root.join(name).display().to_string()).collect();
+        let named: Vec<_> = inside.iter().take(MAX_NAMED).map(|name| shown(&root.join(name)).to_string()).collect();
         let named = named.join(", ");
         match inside.len() {
             0 => format!("is no results directory (there is no run/manifest.json); {way_out}"),

@@ -16,6 +16,7 @@ use crate::results::error::ResultsError;
 use crate::results::events::host;
 use crate::results::handle::Results;
 use crate::results::layout::{COMPACTION, Layout, MERGER, REPLACED};
+use crate::table::shown::shown_text;
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -76,7 +77,7 @@ impl Living {
             Task::Run => "run",
             Task::Change => "repaired, compacted or merged",
         };
-        format!("is being {what} by process {process} on {host}")
+        format!("is being {what} by process {process} on {}", shown_text(host))
     }
 }
 
@@ -191,7 +192,7 @@ impl Layout<'_> {
     /// The workers that live, by their names. Compares beats with `now`, by the clock of the file system.
     ///
     /// # Errors
-    /// When the workers cannot be listed.
+    /// When the workers cannot be listed or read.
     pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
         let mut living = BTreeMap::new();
         for name in self.storage.list(&self.workers())? {
@@ -199,9 +200,16 @@ impl Layout<'_> {
             if name.ends_with(NEW) {
                 continue;
             }
-            let read = || Some((self.storage.read(&path).ok()?, self.storage.modified(&path).ok()?));
-            // One that ends at this moment, or what a power cut left.
-            let Some((text, beat)) = read() else { continue };
+            let read = || Ok::<_, StorageError>((self.storage.read(&path)?, self.storage.modified(&path)?));
+            // A beat may have replaced it while it was read.
+            let is_stale = |error: &StorageError| error.kind() == ErrorKind::StaleNetworkFileHandle;
+            let (text, beat) = match read().or_else(|error| if is_stale(&error) { read() } else { Err(error) }) {
+                // One that ends at this moment.
+                Err(error) if error.is_missing() || error.is_no_file() => continue,
+                // Who cannot be read may well be at work.
+                found => found?,
+            };
+            // What a power cut left has no sense.
             let Ok(worker) = serde_json::from_slice::<Worker>(&text) else { continue };
             let lives_here = worker.lives_here(&name);
             let is_recent = || now.duration_since(beat).is_ok_and(|age| age < SILENCE) || beat > now;

@@ -169,7 +169,7 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     let threads = if workers.is_empty() {
         last_threads
     } else {
-        Some(workers.iter().map(|present| present.worker.threads).sum())
+        Some(workers.iter().map(|present| present.worker.threads).fold(0, usize::saturating_add))
     };
     let pace = results.pace()?;
     Ok(Status {

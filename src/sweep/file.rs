@@ -15,6 +15,8 @@ use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
+use crate::table::storage::{Disk, Storage};
+use std::io;
 use std::path::Path;
 
 /// Longest name of a sweep, in characters: it becomes a folder.
@@ -26,9 +28,10 @@ impl Sweep {
     /// # Errors
     /// When the file cannot be read, or as [`Sweep::parse`].
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })?;
-        Self::parse(&text, path)
+        let text = Disk.read(path).map_err(|error| error.source).and_then(|bytes| {
+            String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+        });
+        Self::parse(&text.map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })?, path)
     }
 
     /// Reads the text of a sweep file; the path is for messages only.

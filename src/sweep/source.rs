@@ -9,6 +9,7 @@
 
 use crate::model::Value;
 use crate::model::value::FieldType;
+use crate::table::shown::{shown, shown_text};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ use toml::de::{DeTable, DeValue};
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// The file cannot be read.
-    #[error("{}: cannot be read: {source}; check the path and its permissions", .path.display())]
+    #[error("{}: cannot be read: {source}; check the path and its permissions", shown(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -52,8 +53,8 @@ const MAX_SHOWN: usize = 10;
 
 /// One mistake on its line, several below each other.
 fn listed(path: &Path, mistakes: &[Mistake]) -> String {
-    let path = path.display();
-    let shown = |Mistake { line, problem }: &Mistake| format!("{path}:{line}: {problem}");
+    let path = shown(path);
+    let shown = |Mistake { line, problem }: &Mistake| format!("{path}:{line}: {}", shown_text(problem));
     if let [mistake] = mistakes {
         return shown(mistake);
     }

@@ -5,13 +5,15 @@
 //! its pages.
 
 use crate::table::error::DatasetError;
-use crate::table::storage::{Storage, StorageError};
+use crate::table::read_file::ReadFile;
+use crate::table::storage::{MAX_WHOLE, Storage, StorageError};
+use parquet::file::reader::Length;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 use std::path::Path;
 
 /// The footer's key of the checksum.
@@ -58,44 +60,51 @@ pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
 /// # Errors
 /// When the file cannot be read, is no table file with a checksum, or is not as it was written.
 pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError> {
-    let file = storage.open(path)?;
-    let compared = compare(file).map_err(StorageError::at("read", path))?;
+    check_file(&ReadFile::open(storage, path)?, path)
+}
+
+/// The same of a file that is open.
+pub(super) fn check_file(file: &ReadFile, path: &Path) -> Result<String, DatasetError> {
+    let compared = compare(file).map_err(|error| {
+        // The error that the file remembers says more.
+        StorageError::at("read", path)(file.take_refused().unwrap_or(error))
+    })?;
     compared.map_err(|problem| DatasetError::damaged(path)(problem))
 }
 
-fn compare(mut file: impl Read + Seek) -> io::Result<Result<String, &'static str>> {
+fn compare(file: &ReadFile) -> io::Result<Result<String, &'static str>> {
     const CUT: &str = "it is cut off, or no Parquet file";
-    let length = file.seek(SeekFrom::End(0))?;
+    let length = file.len();
     if length < (MAGIC.len() + END) as u64 {
         return Ok(Err(CUT));
     }
     let footer_end = length - END as u64;
-    file.seek(SeekFrom::Start(footer_end))?;
     let mut end = [0; END];
-    file.read_exact(&mut end)?;
+    file.from(footer_end).read_exact(&mut end)?;
     let [a, b, c, d, magic @ ..] = end;
-    let footer = u64::from(u32::from_le_bytes([a, b, c, d]));
-    if magic != MAGIC || footer > footer_end {
+    let footer = u32::from_le_bytes([a, b, c, d]);
+    if magic != MAGIC || u64::from(footer) > footer_end {
         return Ok(Err(CUT));
     }
-    let begin = footer_end - footer;
-    file.seek(SeekFrom::Start(begin))?;
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
+    if u64::from(footer) > MAX_WHOLE {
+        return Ok(Err("its footer is longer than any"));
+    }
+    let begin = footer_end - u64::from(footer);
+    let mut bytes = file.bytes(begin, footer as usize + END)?;
     let Some(place) = place(&bytes) else { return Ok(Err("it has no checksum")) };
     let written = bytes[place..place + PLACEHOLDER.len()].to_owned();
     bytes[place..place + PLACEHOLDER.len()].copy_from_slice(PLACEHOLDER.as_bytes());
 
     let mut hasher = Sha256::new();
-    file.seek(SeekFrom::Start(0))?;
-    let mut data = file.take(begin);
+    let mut data = file.from(0).take(begin);
     let mut chunk = vec![0; CHUNK];
     loop {
-        let read = data.read(&mut chunk)?;
-        if read == 0 {
-            break;
+        match data.read(&mut chunk) {
+            Ok(0) => break,
+            Ok(read) => hasher.update(&chunk[..read]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => (),
+            Err(error) => return Err(error),
         }
-        hasher.update(&chunk[..read]);
     }
     hasher.update(&bytes);
     let expected = hexadecimal(&hasher.finalize());
@@ -151,13 +160,17 @@ mod tests {
         let checksum = writer.finish().unwrap();
         assert_eq!(check(&Disk, &path).unwrap(), checksum);
         let bytes = fs::read(&path).unwrap();
+        let is_found = |changed: &[u8]| {
+            fs::write(&path, changed).unwrap();
+            matches!(check(&Disk, &path), Err(DatasetError::Damaged { .. }))
+        };
         for bit in 0..8 * bytes.len() {
             let mut changed = bytes.clone();
             changed[bit / 8] ^= 1 << (bit % 8);
-            assert!(compare(io::Cursor::new(&changed)).unwrap().is_err(), "bit {bit}");
+            assert!(is_found(&changed), "bit {bit}");
         }
         for length in 0..bytes.len() {
-            assert!(compare(io::Cursor::new(&bytes[..length])).unwrap().is_err(), "cut at {length}");
+            assert!(is_found(&bytes[..length]), "cut at {length}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! Why a table file cannot be written or read.
 
+use crate::table::shown::{shown, shown_text};
 use crate::table::storage::StorageError;
 use parquet::errors::ParquetError;
 use std::path::{Path, PathBuf};
@@ -7,11 +8,11 @@ use std::path::{Path, PathBuf};
 /// A table file that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// A file operation failed.
+    /// A file operation failed, which says nothing about what the file holds.
     #[error(transparent)]
-    Storage(#[from] StorageError),
+    Storage(StorageError),
     /// Writing failed.
-    #[error("{}: cannot be written: {source}; all that was committed before is kept", .path.display())]
+    #[error("{}: cannot be written: {source}; all that was committed before is kept", shown(path))]
     Write {
         /// The file.
         path: PathBuf,
@@ -20,8 +21,9 @@ pub enum DatasetError {
     },
     /// A file is cut off, changed or no table.
     #[error(
-        "{}: damaged: {problem}; `stickslip verify` on its results directory reports how to repair it",
-        .path.display()
+        "{}: damaged: {}; `stickslip verify` on its results directory reports how to repair it",
+        shown(path),
+        shown_text(problem)
     )]
     Damaged {
         /// The file.
@@ -30,14 +32,36 @@ pub enum DatasetError {
         problem: String,
     },
     /// Something else lies among the files of a table.
-    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", .path.display())]
+    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", shown(path))]
     Stray {
         /// The file.
         path: PathBuf,
     },
 }
 
+impl From<StorageError> for DatasetError {
+    fn from(error: StorageError) -> Self {
+        if error.is_no_file() {
+            Self::Damaged { path: error.path, problem: error.source.to_string() }
+        } else {
+            Self::Storage(error)
+        }
+    }
+}
+
 impl DatasetError {
+    /// Of a file that must be there: what is wrong with it, as far as that is known.
+    ///
+    /// # Errors
+    /// When the disk fails: what cannot be read is not damaged.
+    pub fn damage(self) -> Result<(PathBuf, String), Self> {
+        match self {
+            Self::Damaged { path, problem } => Ok((path, problem)),
+            Self::Storage(error) if error.is_missing() => Ok((error.path, "it is missing".to_owned())),
+            error => Err(error),
+        }
+    }
+
     /// The file.
     #[must_use]
     pub fn path(&self) -> &Path {

@@ -9,6 +9,7 @@ use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
 pub use crate::table::error::DatasetError;
+use crate::table::read_file::ReadFile;
 use crate::table::storage::{Storage, StorageError, StoredFile};
 use arrow_array::RecordBatch;
 use arrow_schema::{DataType, Field, Schema};
@@ -17,13 +18,12 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -41,8 +41,6 @@ const GROUP_ROWS: usize = 1 << 17;
 const BATCH_ROWS: usize = 1 << 14;
 /// zstd's level: higher ones gain little on random doubles.
 const ZSTD_LEVEL: i32 = 3;
-/// What the text of an error of the operating system holds.
-const OS_ERROR: &str = "(os error ";
 
 /// What the footer of a file holds beside the columns: sorted texts under keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -205,30 +203,43 @@ impl Batch {
     }
 }
 
-/// The texts under keys in the footer of a file.
+/// The checksum of a file, and the texts under keys in its footer.
 ///
 /// # Errors
 /// When the file cannot be read or is damaged.
-pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
-    let file = storage.open(path)?;
-    let metadata = decode(path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
+pub fn footer(storage: &dyn Storage, path: &Path) -> Result<(String, BTreeMap<String, String>), DatasetError> {
+    let file = ReadFile::open(storage, path)?;
+    let checksum = checksum::check_file(&file, path)?;
+    let metadata = decode(&file, path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
+    let texts = entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default()));
+    Ok((checksum, texts.collect()))
 }
 
 /// Decodes bytes of a file. A disk that does not read says nothing about the file, so its errors are no damage; what panics
 /// the decoder, as some damaged files do, is.
-fn decode<T, E: std::fmt::Display>(path: &Path, decoder: impl FnOnce() -> Result<T, E>) -> Result<T, DatasetError> {
-    let problem = match catch_unwind(AssertUnwindSafe(decoder)) {
-        Ok(Ok(decoded)) => return Ok(decoded),
-        Ok(Err(error)) => error.to_string(),
-        Err(_) => "its content makes no sense".to_owned(),
-    };
-    // Of the operating system's errors the decoder keeps the text alone.
-    if problem.contains(OS_ERROR) {
-        return Err(StorageError::at("read", path)(io::Error::other(problem)).into());
+fn decode<T, E: std::fmt::Display>(
+    file: &ReadFile,
+    path: &Path,
+    decoder: impl FnOnce() -> Result<T, E>,
+) -> Result<T, DatasetError> {
+    let decoded = catch_unwind(AssertUnwindSafe(decoder));
+    if let Some(refused) = file.take_refused() {
+        return Err(StorageError::at("read", path)(refused).into());
     }
-    Err(DatasetError::damaged(path)(problem))
+    match decoded {
+        Ok(decoded) => decoded.map_err(DatasetError::damaged(path)),
+        Err(_) => Err(DatasetError::damaged(path)("its content makes no sense")),
+    }
+}
+
+/// Whether the counts of a footer are those of a file that [`TableWriter`] can have written; of others the decoder may ask
+/// for any amount of memory and time.
+fn has_counts(metadata: &ParquetMetaData) -> bool {
+    let groups = metadata.row_groups();
+    let is_counted = |group: &RowGroupMetaData| (0..=GROUP_ROWS as i64).contains(&group.num_rows());
+    let rows = groups.iter().fold(0_i64, |rows, group| rows.saturating_add(group.num_rows()));
+    groups.iter().all(is_counted) && rows == metadata.file_metadata().num_rows()
 }
 
 /// Files of a table, in this order.
@@ -296,28 +307,39 @@ struct Reader<'a> {
     files: std::vec::IntoIter<PathBuf>,
     /// Names of the columns to read; all if there are none.
     columns: Vec<Cow<'static, str>>,
-    current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
+    current: Option<Current>,
+}
+
+/// The file that is being read.
+struct Current {
+    path: Arc<Path>,
+    file: ReadFile,
+    rows: ParquetRecordBatchReader,
 }
 
 impl Reader<'_> {
     /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
-    fn open(&self, path: &Path) -> Result<ParquetRecordBatchReader, DatasetError> {
-        checksum::check(self.storage, path)?;
-        let file = self.storage.open(path)?;
-        decode(path, || {
-            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH_ROWS);
+    fn open(&self, path: &Path) -> Result<Current, DatasetError> {
+        let file = ReadFile::open(self.storage, path)?;
+        checksum::check_file(&file, path)?;
+        let rows = decode(&file, path, || {
+            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file.clone())?.with_batch_size(BATCH_ROWS);
+            if !has_counts(builder.metadata()) {
+                return Err(ParquetError::General("its counts of rows make no sense".to_owned()));
+            }
             if !self.columns.is_empty() {
                 let mask = ProjectionMask::columns(builder.parquet_schema(), self.columns.iter().map(AsRef::as_ref));
                 builder = builder.with_projection(mask);
             }
             builder.build()
-        })
+        })?;
+        Ok(Current { path: path.into(), file, rows })
     }
 
     fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
         loop {
-            if let Some((path, reader)) = &mut self.current {
-                match decode(path, || reader.next().transpose())? {
+            if let Some(Current { path, file, rows }) = &mut self.current {
+                match decode(file, path, || rows.next().transpose())? {
                     Some(rows) => {
                         return Ok(Some(Batch { path: Arc::clone(path), rows }));
                     }
@@ -325,8 +347,7 @@ impl Reader<'_> {
                 }
             }
             let Some(path) = self.files.next() else { return Ok(None) };
-            let reader = self.open(&path)?;
-            self.current = Some((path.into(), reader));
+            self.current = Some(self.open(&path)?);
         }
     }
 }

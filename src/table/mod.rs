@@ -5,8 +5,10 @@
 //! selected.rs    parameters as columns
 //! arrow.rs       rows as record batches and as JSON
 //! file.rs        one table as a file: the same rows, the same bytes
+//! read_file.rs   a file that is read from any place
 //! error.rs       why a file cannot be written or read
 //! checksum.rs    files that hold their own SHA-256
+//! shown.rs       paths and texts in messages
 //! storage.rs     the few file operations, so that a faulty disk can be put underneath
 //! ```
 
@@ -19,6 +21,10 @@ pub mod columns;
 pub mod error;
 #[cfg(feature = "sweeps")]
 pub mod file;
+#[cfg(feature = "sweeps")]
+mod read_file;
 pub mod selected;
+#[cfg(feature = "sweeps")]
+pub mod shown;
 #[cfg(feature = "sweeps")]
 pub mod storage;

@@ -3,14 +3,19 @@
 #[cfg(test)]
 pub(crate) mod over_disk;
 
+use crate::table::shown::shown;
 use std::ffi::OsString;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, FileType, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
+#[cfg(unix)]
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How often to look whether a lock is free.
 const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 });
+/// Most bytes that are held in memory as a whole: far more than any manifest, sweep file or footer has.
+pub const MAX_WHOLE: u64 = 1 << 28;
 
 /// Where the bytes of a file go.
 pub trait Sink: Write + Send {
@@ -74,7 +79,7 @@ pub trait Storage: Sync {
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError>;
     /// Names in a folder, sorted; none if there is no such folder.
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError>;
-    /// Opens a file for reading.
+    /// Opens a regular file for reading. Of anything else that has its name, the error [is no file](StorageError::is_no_file).
     fn open(&self, file: &Path) -> Result<File, StorageError>;
     /// Whether a file is there.
     fn exists(&self, file: &Path) -> Result<bool, StorageError>;
@@ -92,10 +97,12 @@ pub trait Storage: Sync {
     /// Tries to lock a file, created if needed.
     fn lock(&self, file: &Path) -> Result<Lock, StorageError>;
 
-    /// All bytes of a file.
+    /// All bytes of a file, up to [`MAX_WHOLE`].
     fn read(&self, file: &Path) -> Result<Vec<u8>, StorageError> {
         let mut bytes = Vec::new();
-        self.open(file)?.read_to_end(&mut bytes).map_err(StorageError::at("read", file))?;
+        let read = self.open(file)?.take(MAX_WHOLE + 1).read_to_end(&mut bytes);
+        let read = read.and_then(|length| if length as u64 > MAX_WHOLE { Err(NoFile::TooLong.into()) } else { Ok(()) });
+        read.map_err(StorageError::at("read", file))?;
         Ok(bytes)
     }
 
@@ -197,7 +204,7 @@ pub enum Lock {
 
 /// A file operation that failed.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot {action}: {source}; all that was committed before is kept", .path.display())]
+#[error("{}: cannot {action}: {source}; all that was committed before is kept", shown(path))]
 pub struct StorageError {
     /// What was tried.
     pub action: &'static str,
@@ -218,6 +225,76 @@ impl StorageError {
     pub fn kind(&self) -> io::ErrorKind {
         self.source.kind()
     }
+
+    /// Whether there is no file of this name.
+    #[must_use]
+    pub fn is_missing(&self) -> bool {
+        matches!(self.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+    }
+
+    /// Whether something has this name that the program cannot have written: it is not that the disk fails.
+    #[must_use]
+    pub fn is_no_file(&self) -> bool {
+        self.source.get_ref().is_some_and(|reason| reason.is::<NoFile>())
+    }
+}
+
+/// What has the name of a file and is none.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+enum NoFile {
+    #[error("it is a folder, not a file")]
+    Folder,
+    #[error("it is a FIFO, not a regular file")]
+    Fifo,
+    #[error("it is a socket, not a regular file")]
+    Socket,
+    #[error("it is a device, not a regular file")]
+    Device,
+    #[error("it has more than {} MiB", MAX_WHOLE >> 20)]
+    TooLong,
+}
+
+impl NoFile {
+    /// `None` for a regular file.
+    fn of(kind: FileType) -> Option<Self> {
+        #[cfg(unix)]
+        if kind.is_fifo() {
+            return Some(Self::Fifo);
+        } else if kind.is_socket() {
+            return Some(Self::Socket);
+        }
+        if kind.is_file() { None } else { Some(if kind.is_dir() { Self::Folder } else { Self::Device }) }
+    }
+}
+
+impl From<NoFile> for io::Error {
+    fn from(what: NoFile) -> Self {
+        Self::new(io::ErrorKind::InvalidInput, what)
+    }
+}
+
+/// Opens a regular file. A FIFO would make the program wait, and opening a device may have effects.
+fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+    let is_regular = |kind: FileType| NoFile::of(kind).map_or(Ok(()), |what| Err(io::Error::from(what)));
+    match fs::metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => (),
+        metadata => is_regular(metadata?.file_type())?,
+    }
+    // Something else may have taken its place.
+    #[cfg(unix)]
+    options.custom_flags(libc::O_NONBLOCK);
+    let file = options.open(path)?;
+    is_regular(file.metadata()?.file_type())?;
+    Ok(file)
+}
+
+/// Opens a folder.
+fn open_folder(path: &Path) -> io::Result<File> {
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    options.custom_flags(libc::O_DIRECTORY);
+    options.open(path)
 }
 
 /// The file system of the operating system.
@@ -267,7 +344,7 @@ impl Storage for Disk {
     }
 
     fn sync_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        File::open(folder).and_then(|folder| folder.sync_all()).map_err(StorageError::at("sync", folder))
+        open_folder(folder).and_then(|folder| folder.sync_all()).map_err(StorageError::at("sync", folder))
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
@@ -282,7 +359,7 @@ impl Storage for Disk {
     }
 
     fn open(&self, file: &Path) -> Result<File, StorageError> {
-        File::open(file).map_err(StorageError::at("read", file))
+        open_regular(File::options().read(true), file).map_err(StorageError::at("read", file))
     }
 
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {
@@ -323,7 +400,7 @@ impl Storage for Disk {
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
-        let handle = File::options().create(true).truncate(false).write(true).open(file);
+        let handle = open_regular(File::options().create(true).truncate(false).write(true), file);
         let handle = handle.map_err(StorageError::at("lock", file))?;
         match handle.try_lock() {
             Ok(()) => Ok(Lock::Ours(Box::new(handle))),
@@ -384,6 +461,32 @@ mod tests {
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Taken));
         drop(held);
         assert!(matches!(Disk.lock(&file).unwrap(), Lock::Ours(_)));
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_is_no_regular_file_is_named_and_never_waited_for() {
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        mknodat(CWD, path("fifo"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(path("socket")).unwrap();
+        fs::create_dir(path("folder")).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", path("device")).unwrap();
+        for name in ["fifo", "socket", "folder", "device"] {
+            let looked_at = [
+                Disk.read(&path(name)).map(drop),
+                Disk.length(&path(name)).map(drop),
+                Disk.lock(&path(name)).map(drop),
+            ];
+            for error in looked_at.map(Result::unwrap_err) {
+                assert!(error.is_no_file() && error.to_string().to_lowercase().contains(name), "{error}");
+            }
+        }
+        assert!(Disk.sync_folder(&path("fifo")).unwrap_err().is_missing());
+        File::create(path("long")).unwrap().set_len(1 << 40).unwrap();
+        assert!(Disk.read(&path("long")).unwrap_err().is_no_file());
+        assert!(Disk.read(&path("missing")).unwrap_err().is_missing());
     }
 
     #[test]

@@ -3,20 +3,31 @@
 //!
 //! `PROPTEST_CASES` sets the number of cases of each test.
 
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, Int64Type};
+use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::DataType;
 use proptest::prelude::*;
 use proptest::sample::Index;
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
+use stickslip::figure::draw_all;
 use stickslip::observe::measure;
+use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, StartupRow, reduce};
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
-use stickslip::run::{Options, Shard, run};
+use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
+use stickslip::run::{Options, Shard, run, status};
 use stickslip::sweep::Sweep;
-use stickslip::table::file::Dataset;
-use stickslip::table::storage::Disk;
+use stickslip::table::checksum::{PLACEHOLDER, hexadecimal};
+use stickslip::table::columns::Row;
+use stickslip::table::file::{Batch, Dataset, Footer, TableWriter};
+use stickslip::table::storage::{Disk, Storage};
 
 /// No case takes longer; it takes milliseconds.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -162,6 +173,9 @@ static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
         run(&Layout::new(&Disk, &folder.path().join(name)), &sweep, options, &kernel, &mut |_| ()).unwrap();
     }
     Results::read(&Layout::new(&Disk, &folder.path().join("compacted"))).unwrap().compact().unwrap();
+    for name in ["parts", "compacted"] {
+        reduce(&Results::read(&Layout::new(&Disk, &folder.path().join(name))).unwrap()).unwrap();
+    }
     Examples { folder }
 });
 
@@ -182,7 +196,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// Copies a directory, with a file changed, to a place of its own.
 fn copy(from: &Path, file: &Path, changes: &[Change]) -> (tempfile::TempDir, bool) {
-    let to = tempfile::tempdir().unwrap();
+    // Where syncs cost nothing, if there is such a place.
+    let to = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();
     let mut is_changed = false;
     for path in files(from) {
         let target = to.path().join(path.strip_prefix(from).unwrap());
@@ -195,8 +210,134 @@ fn copy(from: &Path, file: &Path, changes: &[Change]) -> (tempfile::TempDir, boo
     (to, is_changed)
 }
 
+/// A table file with changes in its data or in its footer, and the checksum of what came of them.
+fn resealed(bytes: &[u8], in_footer: bool, changes: &[Change]) -> Vec<u8> {
+    const END: usize = 8;
+    let end = bytes.len() - END;
+    let footer = u32::from_le_bytes(bytes[end..end + 4].try_into().unwrap()) as usize;
+    let (data, footer) = bytes[..end].split_at(end - footer);
+    let [mut data, mut footer] = [data, footer].map(<[u8]>::to_vec);
+    for change in changes {
+        apply(if in_footer { &mut footer } else { &mut data }, change);
+    }
+    let key = b"\x18\x04seal\x18\x40";
+    let place = footer.windows(key.len()).position(|bytes| bytes == key).map(|mark| mark + key.len());
+    let place = place.map(|place| place..place + PLACEHOLDER.len()).filter(|place| place.end <= footer.len());
+    if let Some(place) = place.clone() {
+        footer[place].copy_from_slice(PLACEHOLDER.as_bytes());
+    }
+    let length = u32::try_from(footer.len()).unwrap().to_le_bytes();
+    let hash = Sha256::new().chain_update(&data).chain_update(&footer).chain_update(length).chain_update("PAR1");
+    if let Some(place) = place {
+        footer[place].copy_from_slice(hexadecimal(&hash.finalize()).as_bytes());
+    }
+    [&data[..], &footer, &length, b"PAR1"].concat()
+}
+
+/// Numbers that make no sense almost anywhere.
+const NUMBERS: [&str; 10] =
+    ["-1", "0", "1", "2", "1e308", "-1e-320", "4294967296", "9223372036854775807", "18446744073709551615", "null"];
+
+/// A manifest with one of its numbers replaced, and the checksum of that.
+fn resealed_json(text: &str, which: Index, number: &str) -> String {
+    let (body, _) = text.rsplit_once(",\n  \"sha256\"").unwrap();
+    let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+    let starts: Vec<usize> = body
+        .char_indices()
+        .filter(|&(at, c)| (is_of_number(c) && !body[..at].ends_with(is_of_number)) || body[at..].starts_with("null"))
+        .map(|(at, _)| at)
+        .collect();
+    let at = starts[which.index(starts.len())];
+    let rest = &body[at..];
+    let end = if rest.starts_with("null") { 4 } else { rest.find(|c| !is_of_number(c)).unwrap_or(rest.len()) };
+    let body = format!("{}{number}{}", &body[..at], &rest[end..]);
+    let sha256 = hexadecimal(&Sha256::digest(format!("{body}\n}}")));
+    format!("{body},\n  \"sha256\": \"{sha256}\"\n}}\n")
+}
+
+/// Writes a file of a table again, with a value that makes no sense in a column.
+fn write_nonsense<R: Row>(path: &Path, column: Index, row: Index, value: Index) {
+    let (_, footer) = stickslip::table::file::footer(&Disk, path).unwrap();
+    let kept = |key: &&str| !["seal", "units", "meaning", "ARROW:schema"].contains(key);
+    let keys: Vec<&str> = footer.keys().map(String::as_str).filter(kept).collect();
+    let footer = keys.into_iter().fold(Footer::default(), |new, key| new.with(key, &footer[key]));
+    let batches: Vec<Batch> = Dataset::new(&Disk, vec![path.to_owned()]).batches().collect::<Result<_, _>>().unwrap();
+    let mut writer = TableWriter::<R>::new(Disk.create(path).unwrap(), &footer).unwrap();
+    for Batch { path, rows } in batches.into_iter().filter(|batch| batch.rows.num_rows() > 0) {
+        let (column, row) = (column.index(rows.num_columns()), row.index(rows.num_rows()));
+        let mut columns = rows.columns().to_vec();
+        columns[column] = nonsense(&columns[column], row, value);
+        let rows = RecordBatch::try_new(rows.schema(), columns).unwrap();
+        writer.copy(&Batch { path, rows: rows.clone() }, 0..rows.num_rows()).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn nonsense(column: &ArrayRef, row: usize, value: Index) -> ArrayRef {
+    const REALS: [f64; 8] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -1.0, 0.0, 1e-320, 1e300];
+    const COUNTS: [i64; 7] = [-1, 0, 1, i64::MAX, i64::MIN, 1 << 40, i64::MAX - 1];
+    const TEXTS: [&str; 5] = ["", "done", "failed", "\u{1b}[31m", "ffffffffffffffffffffffffffffffff"];
+    match column.data_type() {
+        DataType::Float64 => {
+            let mut cells: Vec<Option<f64>> = column.as_primitive::<Float64Type>().iter().collect();
+            cells[row] = Some(REALS[value.index(REALS.len())]);
+            Arc::new(Float64Array::from(cells))
+        }
+        DataType::Int64 => {
+            let mut cells: Vec<Option<i64>> = column.as_primitive::<Int64Type>().iter().collect();
+            cells[row] = Some(COUNTS[value.index(COUNTS.len())]);
+            Arc::new(Int64Array::from(cells))
+        }
+        DataType::Utf8 => {
+            let mut cells: Vec<Option<&str>> = column.as_string::<i32>().iter().collect();
+            cells[row] = Some(TEXTS[value.index(TEXTS.len())]);
+            Arc::new(StringArray::from(cells))
+        }
+        _ => Arc::clone(column),
+    }
+}
+
+/// Reads all that there is to read of a directory. Errors are fine.
+fn read_all(root: &Path) {
+    let begin = Instant::now();
+    let layout = Layout::new(&Disk, root);
+    let _ = Results::verify(&layout);
+    if let Ok(results) = Results::read(&layout) {
+        let _ = status(&results);
+        let _ = draw_all(&layout);
+        let _ = reduce(&results);
+        let _ = Results::repair(&layout);
+    }
+    assert!(begin.elapsed() < LONGEST, "{:?}", begin.elapsed());
+    assert!(peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY), "{:?}", peak_memory());
+}
+
+/// All tests of this process take less.
+const MAX_MEMORY: u64 = 3 << 30;
+
+/// The most memory that this process ever had, in bytes, where the kernel says.
+fn peak_memory() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? << 10)
+}
+
+/// A table file of a copy of one of the directories.
+fn table_file(compacted: bool, which: Index) -> (tempfile::TempDir, PathBuf) {
+    let root = RESULTS.folder.path().join(if compacted { "compacted" } else { "parts" });
+    let tables: Vec<PathBuf> = ["tables", "reduced"].iter().flat_map(|folder| files(&root.join(folder))).collect();
+    let file = &tables[which.index(tables.len())];
+    let (copy, _) = copy(&root, Path::new(""), &[]);
+    let file = copy.path().join(file.strip_prefix(&root).unwrap());
+    (copy, file)
+}
+
 fn config() -> ProptestConfig {
-    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(400);
+    config_with(400)
+}
+
+fn config_with(cases: u32) -> ProptestConfig {
+    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(cases);
     ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
 }
 
@@ -267,5 +408,66 @@ proptest! {
         // What is read of the footer alone, before any checksum is looked at, may be refused but must not break.
         let _ = stickslip::table::file::footer(&Disk, &file);
         prop_assert!(begin.elapsed() < LONGEST);
+    }
+}
+
+proptest! {
+    #![proptest_config(config_with(150))]
+
+    #[test]
+    fn bytes_that_make_no_sense_under_a_right_checksum_are_refused(
+        compacted in any::<bool>(),
+        which in any::<Index>(),
+        in_footer in any::<bool>(),
+        changes in prop::collection::vec(change(), 1..4),
+    ) {
+        let (copy, file) = table_file(compacted, which);
+        fs::write(&file, resealed(&fs::read(&file).unwrap(), in_footer, &changes)).unwrap();
+        read_all(copy.path());
+    }
+
+    #[test]
+    fn values_that_make_no_sense_under_a_right_checksum_are_refused_or_reduced(
+        compacted in any::<bool>(),
+        which in any::<Index>(),
+        column in any::<Index>(),
+        row in any::<Index>(),
+        value in any::<Index>(),
+    ) {
+        let (copy, file) = table_file(compacted, which);
+        let name = if file.starts_with(copy.path().join("reduced")) { file.file_stem() } else { file.parent().unwrap().file_name() };
+        let write = match name.unwrap().to_str().unwrap() {
+            "slips" => write_nonsense::<SlipRow<'_>>,
+            "precursors" => write_nonsense::<PrecursorRow<'_>>,
+            "jobs" => write_nonsense::<JobRow>,
+            "sets" => write_nonsense::<SetRow>,
+            "histograms" => write_nonsense::<HistogramBin>,
+            "startup" => write_nonsense::<StartupRow>,
+            "backbone" => write_nonsense::<BackboneBin>,
+            "points" => write_nonsense::<Point>,
+            other => panic!("a table {other}"),
+        };
+        write(&file, column, row, value);
+        read_all(copy.path());
+    }
+
+    #[test]
+    fn a_manifest_that_makes_no_sense_under_a_right_checksum_is_refused(
+        compacted in any::<bool>(),
+        which in any::<Index>(),
+        number in prop::sample::select(NUMBERS.to_vec()),
+    ) {
+        let (copy, _) = table_file(compacted, which);
+        let path = copy.path().join("run/manifest.json");
+        fs::write(&path, resealed_json(&fs::read_to_string(&path).unwrap(), which, number)).unwrap();
+        read_all(copy.path());
+    }
+}
+
+#[test]
+fn a_seal_that_is_made_again_is_that_of_the_program() {
+    for file in files(&RESULTS.folder.path().join("parts/tables")) {
+        let bytes = fs::read(file).unwrap();
+        assert!(resealed(&bytes, true, &[]) == bytes);
     }
 }

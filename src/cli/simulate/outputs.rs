@@ -11,6 +11,7 @@ use stickslip::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
 use stickslip::sweep::Sweep;
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
+use stickslip::table::shown::shown;
 use stickslip::table::storage::{Disk, Storage};
 
 /// More samples than this, of 24 bytes each, are a mistake.
@@ -47,7 +48,7 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     }
     let is_picture = |path: &&PathBuf| matches!(extension(path), Some("svg" | "png"));
     if let Some(path) = arguments.plot.iter().find(|path| !is_picture(path)) {
-        return Err(UsageError(format!("--plot {}: must end in .svg or .png", path.display())).into());
+        return Err(UsageError(format!("--plot {}: must end in .svg or .png", shown(path))).into());
     }
     let tables = [
         ("--trace", &arguments.trace),
@@ -62,12 +63,12 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // A device is not to be replaced by a file.
         if !folder.is_dir() || (path.exists() && !path.is_file()) {
-            let path = path.display();
+            let path = shown(path);
             let problem = format!("{flag} {path}: cannot be written; its folder must exist, and it must be a file");
             return Err(UsageError(problem).into());
         }
         if paths.contains(&path) {
-            let problem = format!("{flag} {}: another flag writes this file, too; give each its own", path.display());
+            let problem = format!("{flag} {}: another flag writes this file, too; give each its own", shown(path));
             return Err(UsageError(problem).into());
         }
         paths.push(path);
@@ -151,7 +152,7 @@ fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
             // What remains of a draft is of no use; the first error is the one to report.
             let _ = std::fs::remove_file(&draft);
         })
-        .with_context(|| format!("cannot write {}", path.display()))
+        .with_context(|| format!("cannot write {}", shown(path)))
 }
 
 fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map: &[MapRow]) -> Result<Picture> {

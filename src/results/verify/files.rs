@@ -2,15 +2,14 @@
 //! the rows of its jobs. And what else lies among them.
 
 use super::rows::{Files, check_rows};
-use super::{Problem, Remedy, Verification, problem_of};
+use super::{Problem, Remedy, Verification, damage_in};
 use crate::results::error::ResultsError;
-use crate::results::events::Kept;
+use crate::results::events::{CommittedParts, Kept};
 use crate::results::handle::Results;
 use crate::results::layout::{TableFile, part_name};
 use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::Part;
 use crate::table::arrow::schema;
-use crate::table::checksum;
 use crate::table::file::{DatasetError, FILE_EXTENSION, footer, has_columns};
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -24,9 +23,11 @@ enum State {
     Whole,
     /// Not committed, with files of which readers need know nothing.
     Missing,
-    /// One error for each file that is not right.
-    Damaged(Vec<DatasetError>),
+    Damaged(Damage),
 }
+
+/// Files that are not right, with what is wrong.
+type Damage = Vec<(PathBuf, String)>;
 
 /// Compacted files, by extension and first part: the last part, and the file of each table.
 type Compacted = BTreeMap<(usize, u64), (u64, BTreeMap<&'static str, PathBuf>)>;
@@ -34,7 +35,7 @@ type Compacted = BTreeMap<(usize, u64), (u64, BTreeMap<&'static str, PathBuf>)>;
 /// Verifies all files of the tables. `committed` has the parts that were committed, as far as that is known.
 pub(super) fn verify(
     results: &Results<'_>,
-    committed: &BTreeMap<String, Kept>,
+    committed: &CommittedParts,
     verification: &mut Verification,
 ) -> Result<(), ResultsError> {
     let (mut compacted, mut unexpected) = compacted_files(results)?;
@@ -51,7 +52,7 @@ pub(super) fn verify(
                 check.part(&part)?;
                 continue;
             };
-            let members = usize::try_from(last - part.index + 1).unwrap_or(usize::MAX);
+            let members = usize::try_from(last - part.index).map_or(usize::MAX, |others| others.saturating_add(1));
             planned.extend(parts.by_ref().take(members - 1).map(|part| (extension, part.index)));
             check.compacted(&TableFile::compacted(extension, &(part.index..=last), "*"), &files, || {
                 here.clone().take(members)
@@ -73,7 +74,7 @@ pub(super) fn verify(
 /// A verification of the files of the tables.
 struct FilesCheck<'a> {
     results: &'a Results<'a>,
-    committed: &'a BTreeMap<String, Kept>,
+    committed: &'a CommittedParts,
     verification: &'a mut Verification,
 }
 
@@ -83,7 +84,7 @@ impl FilesCheck<'_> {
         let results = self.results;
         let files: Files = results.tables().map(|table| (table, results.part_file(table, part))).collect();
         let jobs_file = results.part_file(tables::JOBS, part);
-        let state = || -> Result<State, StorageError> {
+        let state = || -> Result<State, DatasetError> {
             let is_done = results.layout().storage.exists(&jobs_file)?;
             state(results, part.extension, &files, is_done, ids(results, part))
         };
@@ -95,9 +96,9 @@ impl FilesCheck<'_> {
         let name = part_name(part);
         match found {
             State::Whole => self.whole(&files, [part.jobs.len()].into_iter())?,
-            State::Damaged(errors) => self.damaged(&errors, &files, &[name], ids(results, part).collect()),
-            State::Missing if let Some(kept) = self.committed.get(&name) => {
-                self.verification.lost_compacted |= *kept == Kept::Compacted;
+            State::Damaged(damage) => self.damaged(damage, &files, &[name], ids(results, part).collect()),
+            State::Missing if let Some(kept) = self.committed.get(part) => {
+                self.verification.lost_compacted |= kept == Kept::Compacted;
                 let problem = Problem::of_file(jobs_file, "it is missing, though it was committed", Remedy::Run);
                 let jobs = ids(results, part).collect();
                 self.verification.problems.push(Problem { parts: vec![name], jobs, ..problem });
@@ -122,8 +123,8 @@ impl FilesCheck<'_> {
         let path = |table| found.get(table).cloned().unwrap_or_else(|| missing(table));
         let files: Files = results.tables().map(|table| (table, path(table))).collect();
         let planned = parts().flat_map(|part| ids(results, &part).collect::<Vec<_>>());
-        let errors = match state(results, pattern.extension, &files, true, planned)? {
-            State::Damaged(errors) => errors,
+        let damage = match state(results, pattern.extension, &files, true, planned)? {
+            State::Damaged(damage) => damage,
             State::Whole | State::Missing => {
                 self.whole(&files, parts().map(|part| part.jobs.len()))?;
                 for part in parts() {
@@ -147,7 +148,7 @@ impl FilesCheck<'_> {
             }
         }
         self.verification.lost_compacted |= !lost.is_empty();
-        self.damaged(&errors, &files, &lost, jobs);
+        self.damaged(damage, &files, &lost, jobs);
         Ok(())
     }
 
@@ -165,11 +166,11 @@ impl FilesCheck<'_> {
     }
 
     /// Reports damaged files of parts that are to be run again. The first problem has their jobs and all their files.
-    fn damaged(&mut self, errors: &[DatasetError], files: &Files, parts: &[String], mut jobs: Vec<String>) {
+    fn damaged(&mut self, damage: Damage, files: &Files, parts: &[String], mut jobs: Vec<String>) {
         // Jobs first: a part without them is not done.
         let mut moved: Vec<PathBuf> = files.iter().rev().map(|(_, path)| path.clone()).collect();
-        for error in errors {
-            let problem = Problem::of_file(error.path().to_owned(), problem_of(error), Remedy::Part);
+        for (path, problem) in damage {
+            let problem = Problem::of_file(path, problem, Remedy::Part);
             let (jobs, moved) = (std::mem::take(&mut jobs), std::mem::take(&mut moved));
             self.verification.problems.push(Problem { parts: parts.to_vec(), jobs, moved, ..problem });
         }
@@ -188,32 +189,31 @@ fn state(
     files: &Files,
     is_done: bool,
     planned: impl Iterator<Item = String>,
-) -> Result<State, StorageError> {
-    let mut errors = Vec::new();
+) -> Result<State, DatasetError> {
+    let mut damage = Damage::new();
     for (table, path) in files {
         // What a killed run left is whole, too, and is read by those who read the folder.
         if is_done || results.layout().storage.exists(path)? {
-            errors.extend(check_file(results, extension, table, path).err());
+            damage.extend(damage_in(check_file(results, extension, table, path))?);
         }
     }
-    if errors.is_empty() && !is_done {
+    if damage.is_empty() && !is_done {
         return Ok(State::Missing);
     }
-    if errors.is_empty() {
-        errors.extend(check_rows(results, files, planned).err());
+    if damage.is_empty() {
+        damage.extend(damage_in(check_rows(results, files, planned))?);
     }
-    Ok(if errors.is_empty() { State::Whole } else { State::Damaged(errors) })
+    Ok(if damage.is_empty() { State::Whole } else { State::Damaged(damage) })
 }
 
 /// Whether a file is as it was written, and has the checksum, the sweep and the columns of its place.
 fn check_file(results: &Results<'_>, extension: usize, table: &str, path: &Path) -> Result<(), DatasetError> {
     let damaged = |problem| Err(DatasetError::damaged(path)(problem));
-    let checksum = checksum::check(results.layout().storage, path)?;
+    let (checksum, footer) = footer(results.layout().storage, path)?;
     let named = TableFile::of_path(path).and_then(|file| file.checksum);
     if named.is_some_and(|named| !checksum.starts_with(&named)) {
         return damaged("it is another file than its name says");
     }
-    let footer = footer(results.layout().storage, path)?;
     let sweep = results.extensions().get(extension).map(|extension| extension.sweep.text());
     if sweep.is_none() || footer.get("sweep").map(String::as_str) != sweep {
         return damaged("it is of another sweep");
@@ -248,7 +248,13 @@ fn compacted_files(results: &Results<'_>) -> Result<(Compacted, Unexpected), Res
     });
     if overlaps {
         // Those that are right come first, so that others are the unexpected ones.
-        all.sort_by_cached_key(|(file, table, path)| check_file(results, file.extension, table, path).is_err());
+        let mut judged = Vec::new();
+        for (file, table, path) in all {
+            let is_damaged = damage_in(check_file(results, file.extension, table, &path))?.is_some();
+            judged.push((is_damaged, file, table, path));
+        }
+        judged.sort_by_key(|(is_damaged, ..)| *is_damaged);
+        all = judged.into_iter().map(|(_, file, table, path)| (file, table, path)).collect();
     }
     let (mut compacted, mut unexpected) = (Compacted::new(), Unexpected::new());
     for (file, table, path) in all {

@@ -4,14 +4,14 @@ use super::{Problem, Remedy};
 use crate::results::commit::alone;
 use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::handle::Results;
-use crate::results::layout::{Layout, TableFile, part_name};
+use crate::results::layout::Layout;
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
 use crate::results::missing::no_results;
 use crate::results::tables;
 use crate::sweep::{Extension, Part};
-use crate::table::checksum;
-use crate::table::file::footer;
-use std::path::Path;
+use crate::table::file::{DatasetError, footer};
+use crate::table::storage::StorageError;
+use std::path::PathBuf;
 
 /// Opens a directory whose manifest or sweep files may be damaged, from what is whole; what is not is a problem.
 ///
@@ -38,7 +38,7 @@ fn begin_again(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Extension>, 
         if number + 1 < texts.len() {
             let results = Results::new(layout, extensions.clone());
             let (done, committed) = (results.done_parts()?, results.committed_parts()?);
-            let is_kept = |part: &Part| done.has(part) || committed.contains_key(&part_name(part));
+            let is_kept = |part: &Part| done.has(part) || committed.get(part).is_some();
             extensions[number].kept = Some(results.plan().ranges(number, is_kept));
         }
     }
@@ -65,7 +65,7 @@ enum Texts {
 fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<Texts, ResultsError> {
     let copies = copies(layout)?;
     let damaged = match Manifest::read(layout) {
-        Ok(Some(manifest)) => match foreign(layout, &manifest, &copies) {
+        Ok(Some(manifest)) => match foreign(layout, &manifest, &copies)? {
             None => {
                 for (extension, record) in manifest.extensions.iter().enumerate() {
                     if copies.get(extension) != Some(&record.sweep) {
@@ -73,7 +73,7 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
                         let is_there = layout.storage.exists(&path)?;
                         let problem =
                             if is_there { "it is not the text that the manifest has" } else { "it is missing" };
-                        problems.push(Problem::of_file(path, problem, Remedy::Manifest));
+                        problems.push(problem_with(layout, path, problem)?);
                     }
                 }
                 return Ok(Texts::Manifest(manifest));
@@ -87,7 +87,7 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
     };
     // Nothing else says what a damaged copy was, and nothing may be guessed.
     for (extension, text) in copies.iter().enumerate() {
-        if text_in_tables(layout, extension).is_some_and(|found| found != *text) {
+        if text_in_tables(layout, extension)?.is_some_and(|found| found != *text) {
             let problem = "it and the manifest are both damaged; restore one of them from a backup";
             return Err(ResultsError::damaged(&layout.sweep(extension), problem));
         }
@@ -96,8 +96,18 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
         let problem = format!("{damaged}, and so are the copies of the sweep files; restore one of them from a backup");
         return Err(ResultsError::damaged(&layout.manifest(), problem));
     }
-    problems.push(Problem::of_file(layout.manifest(), damaged, Remedy::Manifest));
+    problems.push(problem_with(layout, layout.manifest(), damaged)?);
     Ok(Texts::Copies(copies))
+}
+
+/// A manifest or a copy of a sweep file that is to be written again. What is no file, such as a folder, has to give way.
+fn problem_with(layout: &Layout<'_>, path: PathBuf, problem: impl Into<String>) -> Result<Problem, StorageError> {
+    let moved = match layout.storage.length(&path) {
+        Err(error) if error.is_no_file() => vec![path.clone()],
+        Err(error) if error.is_missing() => Vec::new(),
+        length => length.map(|_| Vec::new())?,
+    };
+    Ok(Problem { moved, ..Problem::of_file(path, problem, Remedy::Manifest) })
 }
 
 /// The copies of sweep files, as far as they can be read.
@@ -116,20 +126,27 @@ fn copies(layout: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
 }
 
 /// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.
-fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Option<String> {
-    let is_in_tables = |extension: usize, text: &String| {
+fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Result<Option<String>, DatasetError> {
+    for (extension, text) in copies.iter().enumerate() {
         let in_manifest = manifest.extensions.get(extension).map(|record| &record.sweep);
-        in_manifest != Some(text) && text_in_tables(layout, extension).as_ref() == Some(text)
-    };
-    let extension = copies.iter().enumerate().position(|(extension, text)| is_in_tables(extension, text))?;
-    Some(format!("it does not belong to these tables: their sweep {extension} is another"))
+        if in_manifest != Some(text) && text_in_tables(layout, extension)?.as_ref() == Some(text) {
+            return Ok(Some(format!("it does not belong to these tables: their sweep {extension} is another")));
+        }
+    }
+    Ok(None)
 }
 
 /// The sweep in the first whole file with parts of an extension.
-fn text_in_tables(layout: &Layout<'_>, extension: usize) -> Option<String> {
-    let is_of_extension = |path: &Path| TableFile::of_path(path).is_some_and(|file| file.extension == extension);
-    let jobs = layout.dataset(tables::JOBS).ok()?;
-    let is_whole = |path: &Path| checksum::check(layout.storage, path).is_ok();
-    let whole = jobs.files().iter().find(|path| is_of_extension(path) && is_whole(path))?;
-    footer(layout.storage, whole).ok()?.remove("sweep")
+///
+/// # Errors
+/// When the disk fails.
+fn text_in_tables(layout: &Layout<'_>, extension: usize) -> Result<Option<String>, DatasetError> {
+    let folder = layout.table(tables::JOBS);
+    for file in layout.table_files(tables::JOBS)?.filter(|file| file.extension == extension) {
+        match footer(layout.storage, &folder.join(file.to_string())) {
+            Ok((_, mut texts)) => return Ok(texts.remove("sweep")),
+            Err(error) => error.damage().map(drop)?,
+        }
+    }
+    Ok(None)
 }

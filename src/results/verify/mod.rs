@@ -20,7 +20,7 @@ use crate::results::handle::Results;
 use crate::results::layout::Layout;
 use crate::table::checksum;
 use crate::table::file::DatasetError;
-use crate::table::storage::StorageError;
+use crate::table::shown::serialize_path;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -60,6 +60,7 @@ pub struct Verification {
 #[derive(Clone, Debug, Serialize)]
 pub struct Problem {
     /// The file.
+    #[serde(serialize_with = "serialize_path")]
     pub path: PathBuf,
     /// What is wrong with it.
     pub problem: String,
@@ -141,12 +142,13 @@ impl<'a> Results<'a> {
         let (results, _) = Self::examine(layout)?;
         results.exclusively(|| {
             let (results, verification) = Self::examine(layout)?;
+            let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
+            for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
+                let name = path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path);
+                layout.storage.move_away(path, &quarantine.join(name))?;
+            }
             if verification.problems.iter().any(|problem| problem.remedy == Remedy::Manifest) {
                 manifest::restore_manifest(&results)?;
-            }
-            let (tables, quarantine) = (layout.tables(), layout.quarantine());
-            for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
-                layout.storage.move_away(path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
             }
             let lost = verification.lost_parts();
             if !lost.is_empty() {
@@ -168,9 +170,8 @@ impl<'a> Results<'a> {
         let reduced = layout.reduced();
         for name in layout.storage.list(&reduced)? {
             let path = reduced.join(name);
-            if let Err(error) = checksum::check(layout.storage, &path) {
-                verification.problems.push(Problem::of_file(path, problem_of(&error), Remedy::Reduce));
-            }
+            let damage = damage_in(checksum::check(layout.storage, &path))?;
+            verification.problems.extend(damage.map(|(path, problem)| Problem::of_file(path, problem, Remedy::Reduce)));
         }
         verification.whole = verification.problems.is_empty();
         verification.wants_run = !verification.lost_parts().is_empty();
@@ -178,12 +179,10 @@ impl<'a> Results<'a> {
     }
 }
 
-/// What an error says is wrong with a file.
-fn problem_of(error: &DatasetError) -> String {
-    match error {
-        DatasetError::Damaged { problem, .. } => problem.clone(),
-        DatasetError::Storage(error) if error.kind() == std::io::ErrorKind::NotFound => "it is missing".to_owned(),
-        DatasetError::Storage(StorageError { source, .. }) => format!("it cannot be read: {source}"),
-        error => error.to_string(),
-    }
+/// What a check found of a file that must be there: its path and what is wrong.
+///
+/// # Errors
+/// When the disk fails: what cannot be read is not damaged.
+fn damage_in<T>(checked: Result<T, DatasetError>) -> Result<Option<(PathBuf, String)>, DatasetError> {
+    checked.map_or_else(|error| error.damage().map(Some), |_| Ok(None))
 }
