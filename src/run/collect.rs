@@ -14,7 +14,6 @@ use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::any::Any;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -33,16 +32,8 @@ const LONG_BY_PREDICTION: f64 = 20.0;
 /// Outcomes that may wait for the collector, for each thread.
 const WAITING_PER_THREAD: usize = 4;
 
-/// What the workers send.
-enum Message {
-    Ended {
-        job: PartJob,
-        outcome: Outcome,
-        time: JobTime,
-    },
-    /// The plan could not be continued, since a part could not be looked up.
-    Broken(ResultsError),
-}
+/// What the workers send: a job that has ended; or that a part could not be looked up, so the plan cannot be continued.
+type Message = Result<(PartJob, Outcome, JobTime), ResultsError>;
 
 /// What a job took, in s.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,7 +65,6 @@ struct OpenPart {
 pub(super) struct Collector<'a, 'e> {
     share: &'a Share<'a>,
     member: &'a Member<'a>,
-    staging: PathBuf,
     walltime: &'a Walltime,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
@@ -89,7 +79,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { share, member, staging: member.staging(), walltime, events, report, open: HashMap::new() }
+        Self { share, member, walltime, events, report, open: HashMap::new() }
     }
 
     /// Runs jobs of the share until none is left for this worker, the flag turns true, the
@@ -126,7 +116,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             if *again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(&self.staging, part, &open.outcomes, spilled)?;
+                self.share.results.spill(&self.member.staging(), part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -166,8 +156,10 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.events.send(&RunEvent::OutOfTime)?;
             }
             match receiver.recv_timeout(STOP_POLL) {
-                Ok(Message::Ended { job, outcome, time }) => self.take(&job, outcome, time)?,
-                Ok(Message::Broken(error)) => return Err(error),
+                Ok(message) => {
+                    let (job, outcome, time) = message?;
+                    self.take(&job, outcome, time)?;
+                }
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Ok(!interrupt.load(Ordering::Relaxed) && self.walltime.refused().is_none());
@@ -233,7 +225,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.share.results.commit(&self.staging, part, &whole.outcomes, spilled)?;
+        self.share.results.commit(&self.member.staging(), part, &whole.outcomes, spilled)?;
         self.walltime.committed(begin.elapsed().as_secs_f64());
         let (part, jobs) = (part_name(part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
@@ -262,22 +254,19 @@ fn work(
     under_way: &AllUnderWay,
     sender: &SyncSender<Message>,
 ) {
-    let message = match job {
-        Err(error) => Message::Broken(error),
-        Ok(job) => {
-            let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
-            let long_after =
-                Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
-            let key = (job.of.part.extension, job.of.part.index, job.position);
-            locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
-            let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
-            locked(under_way).remove(&key);
-            let Some(outcome) = outcome else { return };
-            let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
-            Message::Ended { job, outcome, time }
-        }
-    };
-    let _ = sender.send(message);
+    let message = job.map(|job| {
+        let (begin, task) = (Instant::now(), &job.of.part.jobs[job.position]);
+        let long_after = Duration::try_from_secs_f64(LONG_BY_PREDICTION * task.cost).unwrap_or(Duration::MAX).max(LONG);
+        let key = (job.of.part.extension, job.of.part.index, job.position);
+        locked(under_way).insert(key, UnderWay { job: job.clone(), begin, long_after });
+        let (cpu, outcome) = cpu::timed(|| outcome(task, kernel, interrupt));
+        locked(under_way).remove(&key);
+        let time = JobTime { cpu, wall: begin.elapsed().as_secs_f64() };
+        outcome.map(|outcome| (job, outcome, time))
+    });
+    if let Some(message) = message.transpose() {
+        let _ = sender.send(message);
+    }
 }
 
 /// `None` for a job that was interrupted.
