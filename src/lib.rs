@@ -25,6 +25,7 @@
 //! | set | all jobs that differ in the seed alone |
 //! | extension | a sweep in a results directory; it owns its jobs but for those that earlier ones have done |
 //! | part | consecutive jobs of an extension, committed together |
+//! | outline | a part without its jobs: where they lie, and what they add up to |
 //! | worker | a process at work on a results directory, beside others |
 //! | claim | which worker runs a part |
 //! | shard | a share of the parts, run into a directory of its own |

@@ -14,7 +14,6 @@ use crate::sweep::Job;
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -73,7 +72,6 @@ struct OpenPart {
 pub(super) struct Collector<'a, 'e> {
     share: &'a Share<'a>,
     member: &'a Member<'a>,
-    staging: PathBuf,
     walltime: &'a Walltime,
     threads: usize,
     /// Set from outside when the run is to stop.
@@ -93,17 +91,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self {
-            share,
-            member,
-            staging: member.staging(),
-            walltime,
-            threads,
-            stop,
-            events,
-            report,
-            open: BTreeMap::new(),
-        }
+        Self { share, member, walltime, threads, stop, events, report, open: BTreeMap::new() }
     }
 
     /// Runs jobs of the share until none is left for this worker, the flag turns true, the
@@ -144,7 +132,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             if *again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(&self.staging, part, &open.outcomes, spilled)?;
+                self.share.results.spill(&self.member.staging(), part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -268,7 +256,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.share.results.commit(&self.staging, part, &whole.outcomes, spilled)?;
+        self.share.results.commit(&self.member.staging(), part, &whole.outcomes, spilled)?;
         self.walltime.committed(begin.elapsed().as_secs_f64());
         let (part, jobs) = (part_name(part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();

@@ -5,7 +5,7 @@ use crate::results::parts::Unfinished;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::share::Share;
-use crate::sweep::{Job, Outline, Part};
+use crate::sweep::{Outline, Part};
 use serde::Serialize;
 use std::time::SystemTime;
 
@@ -124,11 +124,10 @@ impl Share<'_> {
 
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
 fn jobs_kept(share: &Share<'_>) -> u64 {
-    let wants = |part: &Part, job: &Job| share.results.wants(part, job);
-    let kept = |part: Part| part.jobs.iter().filter(|job| !wants(&part, job)).count() as u64;
     let last = share.results.extensions().len() - 1;
     let earlier = share.parts.iter().filter(|part| part.extension < last && share.done.has(part));
-    earlier.map(|part| kept(share.part(part))).sum()
+    let jobs = earlier.flat_map(|part| share.part(part).jobs);
+    jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
 }
 
 fn overview_and_failures(results: &Results<'_>) -> Result<(Overview, Vec<Failure>), ResultsError> {

@@ -60,8 +60,8 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Most points of a sweep. Each process that works on it walks through all of them, in some seconds at the least and a
-/// minute with conditions, and 4096 jobs a part make 25,000 files in a folder.
+/// Most points of a sweep. Each process that works on it walks through all of them, at 0.14 to 0.2 µs each, and longer
+/// where earlier sweeps of the directory are asked for them; and 4096 jobs a part make 25,000 files in a folder.
 pub const MAX_POINTS: u64 = 100_000_000;
 
 /// All checks of a sweep that is read.
