@@ -315,7 +315,8 @@ impl<'a> Member<'a> {
             }
         }
         if others.is_empty() {
-            for name in [COMPACTION, MERGER, REPLACED].into_iter().filter(|name| left.iter().any(|there| there == name)) {
+            for name in [COMPACTION, MERGER, REPLACED].into_iter().filter(|name| left.iter().any(|there| there == name))
+            {
                 if name != REPLACED || self.is_grace_over()? {
                     storage.remove_folder(&layout.staging(name))?;
                 }

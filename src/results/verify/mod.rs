@@ -23,7 +23,7 @@ use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of [`Verification`] as JSON.
 const FORMAT: u32 = 3;
@@ -145,8 +145,16 @@ impl<'a> Results<'a> {
                 manifest::restore_manifest(&results)?;
             }
             let (tables, quarantine) = (layout.tables(), layout.quarantine());
-            for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
-                layout.storage.move_away(path, &quarantine.join(path.strip_prefix(&tables).unwrap_or(path)))?;
+            for Problem { moved, .. } in &verification.problems {
+                let place = |path: &Path| quarantine.join(path.strip_prefix(&tables).unwrap_or(path));
+                match &moved[..] {
+                    // It may be a folder.
+                    [path] => layout.storage.move_away(path, &place(path))?,
+                    files => {
+                        let moves: Vec<_> = files.iter().map(|path| (path.as_path(), place(path))).collect();
+                        layout.storage.move_away_together(&moves)?;
+                    }
+                }
             }
             let lost = verification.lost_parts();
             if !lost.is_empty() {
