@@ -31,7 +31,7 @@ use std::time::Duration;
 /// Parts of a compacted file at most: some 2 million rows of slips or jobs, 16 row groups.
 const PARTS_PER_FILE: u64 = 512;
 /// How long the tables that were replaced stay, unless the next compaction comes first.
-pub(super) const GRACE: Duration = Duration::from_mins(1);
+pub(crate) const GRACE: Duration = Duration::from_mins(1);
 
 /// What a compaction made.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -93,28 +93,30 @@ impl Results<'_> {
     }
 
     pub(crate) fn compact_by(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
-        self.exclusively(|| {
-            // It may have been extended before the lock was ours.
-            let results = Self::read(self.layout())?;
-            results.refuse_links()?;
-            let problems = Self::verify(self.layout())?.problems;
-            if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
-                return Err(ResultsError::damaged(&problem.path, problem.problem));
-            }
-            let plan = results.plan_compaction(parts_per_file)?;
-            let mut there = results.files_by_part(tables::JOBS)?;
-            there.retain(|_, file| file.is_compacted());
-            let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
-            let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
-            if changed {
-                let staging = self.layout().staging(COMPACTION);
-                results.replace_tables(&plan, &staging).inspect_err(|_| {
-                    // What stays is removed by the next who has the directory alone.
-                    let _ = self.layout().storage.remove_folder(&staging);
-                })?;
-            }
-            Ok(results.report_compaction(&plan, changed)?)
-        })
+        // It may have been extended before the directory was ours alone.
+        self.exclusively(|| Self::read(self.layout())?.compact_alone(parts_per_file))
+    }
+
+    /// Compacts a directory that nobody else changes.
+    pub(crate) fn compact_alone(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
+        self.refuse_links()?;
+        let problems = Self::verify(self.layout())?.problems;
+        if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
+            return Err(ResultsError::damaged(&problem.path, problem.problem));
+        }
+        let plan = self.plan_compaction(parts_per_file)?;
+        let mut there = self.files_by_part(tables::JOBS)?;
+        there.retain(|_, file| file.is_compacted());
+        let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
+        let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
+        if changed {
+            let staging = self.layout().staging(COMPACTION);
+            self.replace_tables(&plan, &staging).inspect_err(|_| {
+                // What stays is removed by the next who has the directory alone.
+                let _ = self.layout().storage.remove_folder(&staging);
+            })?;
+        }
+        Ok(self.report_compaction(&plan, changed)?)
     }
 
     /// Goes through the plan for runs of parts that can be compacted.
@@ -201,16 +203,18 @@ impl Results<'_> {
     /// Exchanges two folders, or says what to do where that is impossible.
     fn exchange(&self, one: &Path, other: &Path) -> Result<(), ResultsError> {
         let why = match self.layout().storage.exchange(one, other) {
-            Err(error) if error.kind() == ErrorKind::Unsupported => "this file system cannot exchange two folders",
+            Err(error) if error.kind() == ErrorKind::Unsupported => {
+                "this file system cannot exchange two folders in one step"
+            }
             Err(error) if matches!(error.kind(), ErrorKind::CrossesDevices | ErrorKind::ResourceBusy) => {
-                "this folder cannot be exchanged with one in run/staging, as if it were a file system of its own, or in a \
-                 lower layer of an overlay,"
+                "it cannot be exchanged with a folder in run/staging in one step: it is a mount point, or in a lower \
+                 layer of an overlay"
             }
             exchanged => return Ok(exchanged?),
         };
         let problem = format!(
-            "{why} in one step, so readers would see an unfinished table; nothing was changed. Copy the whole results \
-             directory, for instance to a local disk, and compact the copy"
+            "{why}. Readers would see unfinished tables, so nothing was changed. Copy the whole results directory, for \
+             instance to a local disk, and compact the copy"
         );
         Err(ResultsError::refused(one, problem))
     }

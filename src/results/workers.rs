@@ -348,9 +348,10 @@ impl<'a> Member<'a> {
 impl Member<'_> {
     /// Whether the tables that a compaction replaced need not stay any longer, by the clock of the file system.
     fn is_grace_over(&self) -> Result<bool, StorageError> {
-        let modified = |path: PathBuf| self.layout.storage.modified(&path);
-        let age = modified(self.file())?.duration_since(modified(self.layout.staging(REPLACED))?);
-        Ok(age.is_ok_and(|age| age > GRACE))
+        let (storage, replaced) = (self.layout.storage, self.layout.staging(REPLACED));
+        let Some(folder) = storage.hold(&replaced)? else { return Ok(true) };
+        let since = folder.modified().map_err(StorageError::at("look up", &replaced))?;
+        Ok(storage.modified(&self.file())?.duration_since(since).is_ok_and(|age| age > GRACE))
     }
 }
 

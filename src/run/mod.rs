@@ -29,7 +29,7 @@ use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
 use crate::results::workers::{Member, Task};
-use crate::results::{Results, ResultsError};
+use crate::results::{ErrorKind, Results, ResultsError};
 use crate::run::collect::Collector;
 use crate::run::share::{Left, Share};
 use crate::run::walltime::Walltime;
@@ -102,9 +102,12 @@ pub fn join<T, E: From<ResultsError>>(
     results.join(Task::Run, threads, |member| {
         layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
         let ended = body(&Joined { results: &results, parts: &parts, member, begin, threads, options });
-        if ended.is_err() {
-            // What is not found where it was says less than that it was moved.
-            results.check_place()?;
+        // That the directory was moved says more than what was not found in it.
+        if ended.is_err()
+            && let Err(moved) = results.check_place()
+            && moved.kind == ErrorKind::Refused
+        {
+            return Err(moved.into());
         }
         let ended = ended?;
         member.tidy().map_err(ResultsError::from)?;

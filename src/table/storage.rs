@@ -136,8 +136,8 @@ pub trait Storage: Sync {
             return Ok(());
         }
         let Some(parent) = folder.parent().filter(|_| folder != top) else {
-            let gone = io::Error::new(io::ErrorKind::NotFound, "it is not there any more");
-            return Err(StorageError::at("write into", folder)(gone));
+            let gone = io::Error::new(io::ErrorKind::NotFound, "it was moved or removed");
+            return Err(StorageError::at("create anything in it", folder)(gone));
         };
         self.ensure_folder_below(top, parent)?;
         self.create_folder(folder)?;
@@ -154,16 +154,37 @@ pub trait Storage: Sync {
         if !self.exists(from)? {
             return Ok(());
         }
-        let mut free = to.to_owned();
+        let free = self.free_name(to)?;
+        self.rename(from, &free)?;
+        [free.parent(), from.parent()].into_iter().flatten().try_for_each(|folder| self.sync_folder(folder))
+    }
+
+    /// Moves files that belong together, those that are there, under names that are free, in this order. All have their
+    /// new names before the first loses its old one, so that a kill leaves none alone in a place where it may be replaced.
+    fn move_away_together(&self, moves: &[(&Path, PathBuf)]) -> Result<(), StorageError> {
+        let mut moved = Vec::new();
+        for (from, to) in moves {
+            if self.exists(from)? {
+                let free = self.free_name(to)?;
+                self.link(from, &free)?;
+                moved.push((*from, free));
+            }
+        }
+        let sync = |file: &Path| file.parent().map_or(Ok(()), |folder| self.sync_folder(folder));
+        moved.iter().try_for_each(|(_, free)| sync(free))?;
+        moved.iter().try_for_each(|(from, _)| self.remove(from).and_then(|()| sync(from)))
+    }
+
+    /// A name like this one that is free, in a folder that is there.
+    fn free_name(&self, file: &Path) -> Result<PathBuf, StorageError> {
+        file.parent().map_or(Ok(()), |folder| self.ensure_folder(folder))?;
+        let mut free = file.to_owned();
         let mut number = 0;
         while self.exists(&free)? {
             number += 1;
-            free = to.with_added_extension(number.to_string());
+            free = file.with_added_extension(number.to_string());
         }
-        let folders = || [free.parent(), from.parent()].into_iter().flatten();
-        folders().try_for_each(|folder| self.ensure_folder(folder))?;
-        self.rename(from, &free)?;
-        folders().try_for_each(|folder| self.sync_folder(folder))
+        Ok(free)
     }
 
     /// Tries for a lock until it is free or the time is over.
@@ -182,8 +203,18 @@ pub trait Storage: Sync {
 /// A folder, by its number in the file system. It stays open, so that no other folder gets the number.
 #[derive(Debug)]
 pub struct HeldFolder {
-    _open: File,
+    open: File,
     number: (u64, u64),
+}
+
+impl HeldFolder {
+    /// When a name in it was changed last, by the clock of its file system.
+    ///
+    /// # Errors
+    /// When that cannot be read.
+    pub fn modified(&self) -> io::Result<SystemTime> {
+        self.open.metadata()?.modified()
+    }
 }
 
 impl PartialEq for HeldFolder {
@@ -421,7 +452,7 @@ fn held(folder: &Path) -> io::Result<Option<HeldFolder>> {
     use std::os::unix::fs::MetadataExt;
     let open = File::open(folder)?;
     let metadata = open.metadata()?;
-    Ok(Some(HeldFolder { number: (metadata.dev(), metadata.ino()), _open: open }))
+    Ok(Some(HeldFolder { number: (metadata.dev(), metadata.ino()), open }))
 }
 
 /// Elsewhere no folder takes the place of another, as none can be exchanged.

@@ -19,6 +19,7 @@ mod grid;
 mod grid_hard_cases;
 mod hard_cases;
 mod kills;
+mod moved;
 mod program;
 mod ramp;
 mod regimes;

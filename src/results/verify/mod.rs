@@ -23,7 +23,7 @@ use crate::table::file::DatasetError;
 use crate::table::shown::serialize_path;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of [`Verification`] as JSON.
 const FORMAT: u32 = 3;
@@ -139,13 +139,22 @@ impl<'a> Results<'a> {
     /// same can be tried again.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
-        let (results, _) = Self::examine(layout)?;
+        let (results, _) = layout.read_tables(|| Self::examine(layout))??;
         results.exclusively(|| {
             let (results, verification) = Self::examine(layout)?;
             let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
-            for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
-                let name = path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path);
-                layout.storage.move_away(path, &quarantine.join(name))?;
+            for Problem { moved, .. } in &verification.problems {
+                let place = |path: &Path| {
+                    quarantine.join(path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path))
+                };
+                match &moved[..] {
+                    // It may be a folder.
+                    [path] => layout.storage.move_away(path, &place(path))?,
+                    files => {
+                        let moves: Vec<_> = files.iter().map(|path| (path.as_path(), place(path))).collect();
+                        layout.storage.move_away_together(&moves)?;
+                    }
+                }
             }
             if verification.problems.iter().any(|problem| problem.remedy == Remedy::Manifest) {
                 manifest::restore_manifest(&results)?;
