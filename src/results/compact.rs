@@ -93,30 +93,30 @@ impl Results<'_> {
     }
 
     pub(crate) fn compact_by(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
-        // It may have been extended before the directory was ours alone.
-        self.exclusively(|| Self::read(self.layout())?.compact_alone(parts_per_file))
+        self.exclusively(|| self.compact_alone(parts_per_file))
     }
 
     /// Compacts a directory that nobody else changes.
     pub(crate) fn compact_alone(&self, parts_per_file: u64) -> Result<Compacted, ResultsError> {
-        self.refuse_links()?;
-        let problems = Self::verify(self.layout())?.problems;
-        if let Some(problem) = problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
+        // It may have been extended before it was ours alone.
+        let (results, verification) = Self::examined(self.layout())?;
+        results.refuse_links()?;
+        if let Some(problem) = verification.problems.into_iter().find(|problem| problem.remedy != Remedy::Reduce) {
             return Err(ResultsError::damaged(&problem.path, problem.problem));
         }
-        let plan = self.plan_compaction(parts_per_file)?;
-        let mut there = self.files_by_part(tables::JOBS)?;
+        let plan = results.plan_compaction(parts_per_file)?;
+        let mut there = results.files_by_part(tables::JOBS)?;
         there.retain(|_, file| file.is_compacted());
         let is_there = |chunk: &Chunk| there.get(&chunk.begin()).is_some_and(|file| chunk.is(file));
         let changed = there.len() != plan.chunks.len() || !plan.chunks.iter().all(is_there);
         if changed {
             let staging = self.layout().staging(COMPACTION);
-            self.replace_tables(&plan, &staging).inspect_err(|_| {
+            results.replace_tables(&plan, &staging).inspect_err(|_| {
                 // What stays is removed by the next who has the directory alone.
                 let _ = self.layout().storage.remove_folder(&staging);
             })?;
         }
-        Ok(self.report_compaction(&plan, changed)?)
+        Ok(results.report_compaction(&plan, changed)?)
     }
 
     /// Goes through the plan for runs of parts that can be compacted.

@@ -3,7 +3,7 @@
 use crate::results::commit::{Commit, alone};
 use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
-use crate::results::manifest::{self, Manifest, Record};
+use crate::results::manifest::{self, Manifest};
 use crate::results::missing::no_results;
 use crate::results::parts::DoneParts;
 use crate::results::tables;
@@ -84,8 +84,12 @@ impl<'a> Results<'a> {
     /// When it is not, or cannot be read.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let found = Manifest::read(&self.layout)?;
-        let is_ours = |manifest: Manifest| manifest.extensions.into_iter().eq(self.extensions.iter().map(Record::new));
-        if found.is_some_and(is_ours) {
+        // A run may have added a sweep since.
+        let is_ours = |manifest: &Manifest| {
+            manifest.extensions.len() >= self.extensions.len()
+                && manifest.extensions.iter().zip(&self.extensions).all(|(found, ours)| found.is_of(ours))
+        };
+        if found.as_ref().is_some_and(is_ours) {
             return Ok(());
         }
         let problem = "the results directory was moved, removed or replaced since it was opened; \

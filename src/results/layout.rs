@@ -18,7 +18,9 @@
 use crate::results::tables;
 use crate::sweep::{Outline, Sweep};
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
-use crate::table::storage::{Storage, StorageError};
+use crate::table::storage::{HeldFolder, Storage, StorageError};
+use std::collections::HashSet;
+use std::ffi::OsString;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -102,19 +104,35 @@ impl<'a> Layout<'a> {
         Dataset::of_folder(self.storage, &self.table(name))
     }
 
-    /// Reads the tables; again as often as a compaction has put others in their place meanwhile, since files that were
-    /// listed before may then not be found.
+    /// Reads the directory; again as often as a compaction has put others in the place of the tables meanwhile, since files
+    /// that were listed before may then not be found, or as a run has added a sweep.
     ///
     /// # Errors
-    /// When the folder of the tables cannot be looked up.
+    /// When the directory cannot be looked up.
     pub fn read_tables<T>(&self, mut read: impl FnMut() -> T) -> Result<T, StorageError> {
         loop {
-            let before = self.storage.hold(&self.tables())?;
+            let before = self.generation()?;
             let found = read();
-            if self.storage.hold(&self.tables())? == before {
+            if self.generation()? == before {
                 return Ok(found);
             }
         }
+    }
+
+    /// The folder of the tables, and the copies of sweep files.
+    fn generation(&self) -> Result<(Option<HeldFolder>, Vec<PathBuf>), StorageError> {
+        Ok((self.storage.hold(&self.tables())?, self.sweeps()?))
+    }
+
+    /// The copies of the sweep files, in order, as the folder lists them: a network file system may not yet find them by
+    /// their names.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn sweeps(&self) -> Result<Vec<PathBuf>, StorageError> {
+        let names: HashSet<OsString> = self.storage.list(&self.run())?.into_iter().collect();
+        let is_there = |path: &PathBuf| path.file_name().is_some_and(|name| names.contains(name));
+        Ok((0..).map(|extension| self.sweep(extension)).take_while(is_there).collect())
     }
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.

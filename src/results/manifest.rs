@@ -189,6 +189,11 @@ impl Manifest {
 }
 
 impl Record {
+    /// Whether it is that of an extension, whatever of it is kept since.
+    pub(super) fn is_of(&self, extension: &Extension) -> bool {
+        (self.sweep.as_str(), self.part_cost) == (extension.sweep.text(), extension.part_cost)
+    }
+
     pub(super) fn new(Extension { sweep, part_cost, kept }: &Extension) -> Self {
         Self { sweep: sweep.text().to_owned(), part_cost: *part_cost, kept: kept.clone() }
     }

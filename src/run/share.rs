@@ -12,6 +12,7 @@ use crate::results::workers::{Living, Member};
 use crate::results::{Results, ResultsError};
 use crate::run::walltime::Walltime;
 use crate::sweep::{Extension, Outline, Part};
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -31,7 +32,8 @@ pub(super) struct Share<'a> {
     /// Whether failed jobs are to be run again.
     retry_failed: bool,
     pub done: DoneParts,
-    spilled: HashSet<(usize, u64)>,
+    /// The parts of which jobs are spilled.
+    spilled: RefCell<HashSet<(usize, u64)>>,
 }
 
 /// Positions of the jobs of a part that may run again.
@@ -79,7 +81,7 @@ pub(super) struct Left {
 impl<'a> Share<'a> {
     /// Looks up which of these parts are done.
     pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
-        let (done, spilled) = (results.done_parts()?, results.spilled_parts()?);
+        let (done, spilled) = (results.done_parts()?, RefCell::new(results.spilled_parts()?));
         Ok(Self { results, parts, retry_failed, done, spilled })
     }
 
@@ -104,9 +106,9 @@ impl<'a> Share<'a> {
         }))
     }
 
-    /// Positions of the jobs of a part that an earlier run has spilled.
+    /// Positions of the jobs of a part that are spilled, if it is one of which some are.
     pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        let is_spilled = self.spilled.contains(&(part.extension, part.index));
+        let is_spilled = self.spilled.borrow().contains(&(part.extension, part.index));
         if is_spilled { self.results.spilled(&self.part(part)) } else { Ok(BTreeSet::new()) }
     }
 
@@ -230,9 +232,10 @@ impl<'a> Work<'a> {
     /// Takes a part that is not done and whose claim is a dead worker's. Returns whether there is none, and it is certain
     /// that the owners of all others live.
     fn take_abandoned(&mut self) -> Result<bool, ResultsError> {
-        // In this order: who has ended has committed before.
+        // In this order: who has ended has committed or spilled before.
         let others = self.member.others()?;
         self.claims.refresh()?;
+        *self.share.spilled.borrow_mut() = self.share.results.spilled_parts()?;
         let done = self.share.results.done_parts()?;
         let mut is_certain = true;
         for part in self.share.parts.iter().filter(|part| !done.has(part)) {

@@ -112,17 +112,11 @@ fn problem_with(layout: &Layout<'_>, path: PathBuf, problem: impl Into<String>) 
 
 /// The copies of sweep files, as far as they can be read.
 fn copies(layout: &Layout<'_>) -> Result<Vec<String>, ResultsError> {
-    let mut copies = Vec::new();
-    loop {
-        let path = layout.sweep(copies.len());
-        if !layout.storage.exists(&path)? {
-            return Ok(copies);
-        }
-        match read_text(layout, &path) {
-            Err(error) if error.kind == ErrorKind::Damaged => copies.push(String::new()),
-            text => copies.push(text?),
-        }
-    }
+    let read = |path: PathBuf| match read_text(layout, &path) {
+        Err(error) if error.kind == ErrorKind::Damaged => Ok(String::new()),
+        text => text,
+    };
+    layout.sweeps()?.into_iter().map(read).collect()
 }
 
 /// In what a whole manifest belongs to other tables: their files have another sweep, that of the copy.

@@ -24,7 +24,12 @@ use crate::table::shown::serialize_path;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+/// How often to look at a directory whose manifest and sweep files do not fit, and the time in between: together longer
+/// than a network file system shows an old file.
+const LOOKS: u32 = 8;
+const LOOK: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 1000 });
 /// Version of [`Verification`] as JSON.
 const FORMAT: u32 = 3;
 
@@ -129,7 +134,25 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
     pub fn verify(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
-        Ok(layout.read_tables(|| Self::examine(layout))??.1)
+        Ok(Self::examined(layout)?.1)
+    }
+
+    /// A directory as it is restored, and what is wrong with it.
+    ///
+    /// # Errors
+    /// As [`Results::verify`].
+    pub(super) fn examined(layout: &Layout<'a>) -> Result<(Self, Verification), ResultsError> {
+        let mut looks = 0;
+        loop {
+            let (results, verification) = layout.read_tables(|| Self::examine(layout))??;
+            looks += 1;
+            // A run is about to add a sweep, or was killed there; or this host does not see the new manifest yet.
+            let is_unsettled = layout.sweeps()?.len() > results.extensions().len();
+            if verification.whole || !is_unsettled || looks == LOOKS {
+                return Ok((results, verification));
+            }
+            std::thread::sleep(LOOK);
+        }
     }
 
     /// Takes away what is damaged, so that the next run makes it again; returns what was found.
@@ -139,9 +162,9 @@ impl<'a> Results<'a> {
     /// same can be tried again.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
-        let (results, _) = layout.read_tables(|| Self::examine(layout))??;
+        let (results, _) = Self::examined(layout)?;
         results.exclusively(|| {
-            let (results, verification) = Self::examine(layout)?;
+            let (results, verification) = Self::examined(layout)?;
             let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
             for Problem { moved, .. } in &verification.problems {
                 let place = |path: &Path| {
