@@ -252,6 +252,10 @@ impl Results<'_> {
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
                 }
+                // The rest of it is no log.
+                if line.len() as u64 == MAX_LINE {
+                    break;
+                }
                 line.clear();
             }
         }
@@ -371,14 +375,14 @@ mod tests {
     }
 
     #[test]
-    fn a_log_without_ends_of_lines_is_read_in_pieces_and_what_is_no_file_passed_over() {
+    fn a_log_without_ends_of_lines_and_what_is_no_file_are_passed_over() {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
         let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         results.begin_log().unwrap().write(&RunEvent::Stopping).unwrap();
         let logs = results.layout().logs();
         std::fs::create_dir(logs.join("0")).unwrap();
-        std::fs::File::create(logs.join("1")).unwrap().set_len(3 * MAX_LINE).unwrap();
+        std::fs::File::create(logs.join("1")).unwrap().set_len(1 << 42).unwrap();
         let mut events = 0;
         results.events(|_| events += 1).unwrap();
         assert_eq!(events, 1);

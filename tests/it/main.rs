@@ -26,3 +26,4 @@ mod runs;
 mod sharing;
 mod simulate;
 mod statistics;
+mod unreadable;
