@@ -287,7 +287,9 @@ impl Results<'_> {
             }
             RunEvent::PartQuarantined { part } => parts.set(file_of(&part), None),
             RunEvent::Compacted { files } => {
-                files.iter().for_each(|name| parts.set(TableFile::parse(name), Some(Kept::Compacted)));
+                for name in &files {
+                    parts.set(TableFile::parse(name), Some(Kept::Compacted));
+                }
             }
             _ => (),
         })?;
@@ -308,7 +310,7 @@ impl CommittedParts {
 
     /// Says how the parts of a file are kept from now on.
     fn set(&mut self, file: Option<TableFile>, kept: Option<Kept>) {
-        let Some(TableFile { extension, first, last, .. }) = file else { return };
+        let Some((extension, first, last)) = file.map(|file| (file.extension, file.first, file.last)) else { return };
         let overlaps = |(begin, (end, _)): &(&(usize, u64), &(u64, Kept))| begin.0 == extension && *end >= first;
         while let Some((&(_, begin), &(end, before))) =
             self.0.range((extension, 0)..=(extension, last)).next_back().filter(overlaps)

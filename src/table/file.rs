@@ -237,7 +237,8 @@ fn decode<T, E: std::fmt::Display>(
 /// for any amount of memory and time.
 fn has_counts(metadata: &ParquetMetaData) -> bool {
     let groups = metadata.row_groups();
-    let is_counted = |group: &RowGroupMetaData| (0..=GROUP_ROWS as i64).contains(&group.num_rows());
+    let rows_of = |group: &RowGroupMetaData| usize::try_from(group.num_rows()).ok();
+    let is_counted = |group: &RowGroupMetaData| rows_of(group).is_some_and(|rows| rows <= GROUP_ROWS);
     let rows = groups.iter().fold(0_i64, |rows, group| rows.saturating_add(group.num_rows()));
     groups.iter().all(is_counted) && rows == metadata.file_metadata().num_rows()
 }

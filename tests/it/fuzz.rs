@@ -414,7 +414,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config_with(150))]
+    #![proptest_config(config_with(100))]
 
     #[test]
     fn bytes_that_make_no_sense_under_a_right_checksum_are_refused(
