@@ -25,6 +25,10 @@ pub(super) struct Axis {
 
 /// Ticks with a number on an axis.
 const MAX_TICKS: f64 = 6.0;
+/// Most ticks of any kind: values of which nothing can come have no end of them.
+const MAX_MULTIPLES: usize = 1000;
+/// No quantity is larger than this, nor smaller than its inverse.
+const LARGEST: f64 = 1e100;
 
 impl Axis {
     /// Linear from `low` to `high`.
@@ -124,7 +128,7 @@ impl Axis {
 /// Bounds of a logarithmic axis for data: a little wider than the data; `None` without any value > 0.
 pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     const MARGIN: f64 = 0.08;
-    let (low, high) = bounds(values.filter(|&value| value > 0.0))?;
+    let (low, high) = bounds(values.filter(|&value| value > 1.0 / LARGEST))?;
     // At least half a decade, or there would be no tick.
     let margin = (MARGIN * libm::log(high / low)).max(0.5 * (0.5 * LN_10 - libm::log(high / low)));
     Some((low * libm::exp(-margin), high * libm::exp(margin)))
@@ -136,9 +140,9 @@ pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
     ((low.min(-PI) / FRAC_PI_2).floor() * FRAC_PI_2, (high.max(PI) / FRAC_PI_2).ceil() * FRAC_PI_2)
 }
 
-/// Least and largest of the finite values.
+/// Least and largest of the values that can be.
 pub(super) fn bounds(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values.filter(|value| value.is_finite()).fold(None, |bounds, value| {
+    values.filter(|value| value.abs() < LARGEST).fold(None, |bounds, value| {
         let (low, high) = bounds.unwrap_or((value, value));
         Some((value.min(low), value.max(high)))
     })
@@ -166,7 +170,7 @@ fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-6;
     #[expect(clippy::cast_possible_truncation, reason = "a few dozen multiples")]
     let (first, last) = ((low / step - slack).ceil() as i64, (high / step + slack).floor() as i64);
-    (first..=last).map(move |multiple| multiple as f64 * step)
+    (first..=last).take(MAX_MULTIPLES).map(move |multiple| multiple as f64 * step)
 }
 
 /// With a true minus sign, and none before zero.
@@ -205,6 +209,20 @@ mod tests {
 
     fn labels(axis: &Axis) -> Vec<&str> {
         axis.ticks.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn values_that_make_no_sense_have_few_ticks() {
+        let huge = [1.0, f64::MAX, f64::INFINITY, f64::NAN, 1e-320];
+        assert!(logarithmic_bounds(huge.into_iter()).unwrap().1 < 10.0);
+        assert_eq!(bounds(huge.into_iter()), Some((1e-320, 1.0)));
+        for axis in [
+            Axis::angle("", 0.0, 1e300),
+            Axis::linear("", 1e300, 1e300_f64.next_up()),
+            Axis::linear("", 0.0, f64::INFINITY),
+        ] {
+            assert!(axis.ticks.len() + axis.minor.len() <= 2 * MAX_MULTIPLES);
+        }
     }
 
     #[test]

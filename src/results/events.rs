@@ -263,6 +263,10 @@ impl Results<'_> {
                 if let Ok(Line { event, .. }) = serde_json::from_slice(&line) {
                     visit(event);
                 }
+                // The rest of it is no log.
+                if line.len() as u64 == MAX_LINE {
+                    break;
+                }
                 line.clear();
             }
         }
@@ -294,7 +298,9 @@ impl Results<'_> {
             }
             RunEvent::PartQuarantined { part } => parts.set(file_of(&part), None),
             RunEvent::Compacted { files } => {
-                files.iter().for_each(|name| parts.set(TableFile::parse(name), Some(Kept::Compacted)));
+                for name in &files {
+                    parts.set(TableFile::parse(name), Some(Kept::Compacted));
+                }
             }
             _ => (),
         })?;
@@ -315,7 +321,7 @@ impl CommittedParts {
 
     /// Says how the parts of a file are kept from now on.
     fn set(&mut self, file: Option<TableFile>, kept: Option<Kept>) {
-        let Some(TableFile { extension, first, last, .. }) = file else { return };
+        let Some((extension, first, last)) = file.map(|file| (file.extension, file.first, file.last)) else { return };
         let overlaps = |(begin, (end, _)): &(&(usize, u64), &(u64, Kept))| begin.0 == extension && *end >= first;
         while let Some((&(_, begin), &(end, before))) =
             self.0.range((extension, 0)..=(extension, last)).next_back().filter(overlaps)
@@ -382,14 +388,14 @@ mod tests {
     }
 
     #[test]
-    fn a_log_without_ends_of_lines_is_read_in_pieces_and_what_is_no_file_passed_over() {
+    fn a_log_without_ends_of_lines_and_what_is_no_file_are_passed_over() {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
         let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         results.begin_log().unwrap().write(&RunEvent::Stopping).unwrap();
         let logs = results.layout().logs();
         std::fs::create_dir(logs.join("0")).unwrap();
-        std::fs::File::create(logs.join("1")).unwrap().set_len(3 * MAX_LINE).unwrap();
+        std::fs::File::create(logs.join("1")).unwrap().set_len(1 << 42).unwrap();
         let mut events = 0;
         results.events(|_| events += 1).unwrap();
         assert_eq!(events, 1);

@@ -296,12 +296,6 @@ impl TableFile {
         self.checksum.is_some()
     }
 
-    /// Names of its parts.
-    pub fn part_names(&self) -> impl Iterator<Item = String> + use<> {
-        let extension = self.extension;
-        self.parts().map(move |index| part_name_of(extension, index))
-    }
-
     /// Numbers of its parts.
     #[must_use]
     pub const fn parts(&self) -> RangeInclusive<u64> {

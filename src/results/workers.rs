@@ -435,6 +435,23 @@ pub(crate) mod tests {
     }
 
     #[test]
+    #[cfg(unix)]
+    fn a_worker_that_cannot_be_read_may_live_and_what_is_no_file_is_none() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        join(&results, |member| {
+            fs::create_dir(results.layout().workers().join("worker-folder")).unwrap();
+            assert!(member.others().unwrap().is_empty());
+            // It leads to itself.
+            let path = results.layout().workers().join("worker-loop");
+            std::os::unix::fs::symlink(&path, &path).unwrap();
+            assert!(member.others().unwrap_err().path == path);
+            assert!(member.tidy().is_err() && path.is_symlink());
+            fs::remove_file(path).unwrap();
+        });
+    }
+
+    #[test]
     fn a_member_beats_as_long_as_it_is_one() {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());

@@ -237,7 +237,8 @@ fn decode<T, E: std::fmt::Display>(
 /// for any amount of memory and time.
 fn has_counts(metadata: &ParquetMetaData) -> bool {
     let groups = metadata.row_groups();
-    let is_counted = |group: &RowGroupMetaData| (0..=GROUP_ROWS as i64).contains(&group.num_rows());
+    let rows_of = |group: &RowGroupMetaData| usize::try_from(group.num_rows()).ok();
+    let is_counted = |group: &RowGroupMetaData| rows_of(group).is_some_and(|rows| rows <= GROUP_ROWS);
     let rows = groups.iter().fold(0_i64, |rows, group| rows.saturating_add(group.num_rows()));
     groups.iter().all(is_counted) && rows == metadata.file_metadata().num_rows()
 }
@@ -370,6 +371,7 @@ mod tests {
     use super::*;
     use crate::table::columns::columns;
     use crate::table::storage::Disk;
+    use crate::table::storage::over_disk::OverDisk;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use std::fs::{self, File};
 
@@ -475,6 +477,29 @@ mod tests {
             let error = numbers(folder.path()).unwrap_err();
             assert!(error.to_string().contains("a.parquet"), "changed at {changed}: {error}");
         }
+    }
+
+    /// A disk on which a folder has the name of every file: it opens, and no byte of it can be read.
+    struct Unreadable;
+
+    impl OverDisk for Unreadable {
+        fn open_file(&self, _: &Path) -> Result<File, StorageError> {
+            Ok(File::open(std::env::temp_dir()).unwrap())
+        }
+    }
+
+    #[test]
+    fn an_error_of_the_disk_is_no_damage_whatever_the_decoder_makes_of_it() {
+        let path = Path::new("a.parquet");
+        let is_of_disk = |error: DatasetError| matches!(error, DatasetError::Storage(error) if error.path == path);
+        assert!(is_of_disk(footer(&Unreadable, path).unwrap_err()));
+        assert!(is_of_disk(Dataset::new(&Unreadable, vec![path.to_owned()]).batches().next().unwrap().unwrap_err()));
+        let file = ReadFile::open(&Unreadable, path).unwrap();
+        assert!(is_of_disk(decode(&file, path, || ParquetMetaDataReader::new().parse_and_finish(&file)).unwrap_err()));
+        let read = || file.bytes(0, 1).map(drop);
+        assert!(is_of_disk(decode(&file, path, || read().or(Ok::<_, String>(()))).unwrap_err()), "taken for an end");
+        assert!(is_of_disk(decode(&file, path, || read().map_err(|_| "too small")).unwrap_err()), "another text");
+        assert!(decode(&file, path, || Ok::<_, String>(())).is_ok(), "each error is reported once");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 pub(crate) mod over_disk;
 
 use crate::table::shown::shown;
+use std::error::Error;
 use std::ffi::OsString;
 use std::fs::{self, File, FileType, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
@@ -266,7 +267,7 @@ impl StorageError {
     /// Whether something has this name that the program cannot have written: it is not that the disk fails.
     #[must_use]
     pub fn is_no_file(&self) -> bool {
-        self.source.get_ref().is_some_and(|reason| reason.is::<NoFile>())
+        self.source.get_ref().is_some_and(<dyn Error + Send + Sync>::is::<NoFile>)
     }
 }
 

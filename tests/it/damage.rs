@@ -55,6 +55,14 @@ fn flip(path: &Path, at: impl FnOnce(usize) -> usize) {
     });
 }
 
+/// Puts a FIFO into the place of a file.
+#[cfg(unix)]
+fn fifo(path: &Path) {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    fs::remove_file(path).unwrap();
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+}
+
 fn swap(one: &Path, other: &Path) {
     let aside = one.with_extension("aside");
     fs::rename(one, &aside).unwrap();
@@ -194,6 +202,22 @@ const PARTS: &[Damage] = &[
     damage("a missing sweep file", "run/sweep-000.toml", 0, |root| {
         fs::remove_file(root.join("run/sweep-000.toml")).unwrap();
     }),
+    #[cfg(unix)]
+    damage("a FIFO in a file's place", "tables/slips/part-000-000001.parquet", 1, |root| {
+        fifo(&path(root, "slips", SECOND));
+    }),
+    #[cfg(unix)]
+    damage("a FIFO in the manifest's place", "run/manifest.json", 0, |root| fifo(&root.join("run/manifest.json"))),
+    damage("a folder in the manifest's place", "run/manifest.json", 0, |root| {
+        fs::remove_file(root.join("run/manifest.json")).unwrap();
+        fs::create_dir_all(root.join("run/manifest.json/full")).unwrap();
+    }),
+    damage("a folder in a sweep file's place", "run/sweep-001.toml", 0, |root| {
+        fs::remove_file(root.join("run/sweep-001.toml")).unwrap();
+        fs::create_dir(root.join("run/sweep-001.toml")).unwrap();
+    }),
+    #[cfg(unix)]
+    damage("a FIFO among reduced data", "reduced/sets.parquet", 0, |root| fifo(&root.join("reduced/sets.parquet"))),
     damage("a bit of reduced data", "reduced/sets.parquet", 0, |root| {
         flip(&root.join("reduced/sets.parquet"), |length| length / 2);
     }),

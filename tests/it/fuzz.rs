@@ -297,16 +297,18 @@ fn nonsense(column: &ArrayRef, row: usize, value: Index) -> ArrayRef {
     }
 }
 
-/// Reads all that there is to read of a directory. Errors are fine.
-fn read_all(root: &Path) {
+/// Reads all that depends on a file of a directory. Errors are fine.
+fn read_all(root: &Path, file: &Path) {
     let begin = Instant::now();
     let layout = Layout::new(&Disk, root);
     let _ = Results::verify(&layout);
     if let Ok(results) = Results::read(&layout) {
-        let _ = status(&results);
-        let _ = draw_all(&layout);
-        let _ = reduce(&results);
-        let _ = Results::repair(&layout);
+        if file.starts_with(layout.reduced()) {
+            let _ = draw_all(&layout);
+        } else {
+            let _ = status(&results);
+            let _ = reduce(&results);
+        }
     }
     assert!(begin.elapsed() < LONGEST, "{:?}", begin.elapsed());
     assert!(peak_memory().is_none_or(|bytes| bytes < MAX_MEMORY), "{:?}", peak_memory());
@@ -412,7 +414,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(config_with(150))]
+    #![proptest_config(config_with(100))]
 
     #[test]
     fn bytes_that_make_no_sense_under_a_right_checksum_are_refused(
@@ -423,7 +425,7 @@ proptest! {
     ) {
         let (copy, file) = table_file(compacted, which);
         fs::write(&file, resealed(&fs::read(&file).unwrap(), in_footer, &changes)).unwrap();
-        read_all(copy.path());
+        read_all(copy.path(), &file);
     }
 
     #[test]
@@ -448,7 +450,7 @@ proptest! {
             other => panic!("a table {other}"),
         };
         write(&file, column, row, value);
-        read_all(copy.path());
+        read_all(copy.path(), &file);
     }
 
     #[test]
@@ -458,9 +460,9 @@ proptest! {
         number in prop::sample::select(NUMBERS.to_vec()),
     ) {
         let (copy, _) = table_file(compacted, which);
-        let path = copy.path().join("run/manifest.json");
-        fs::write(&path, resealed_json(&fs::read_to_string(&path).unwrap(), which, number)).unwrap();
-        read_all(copy.path());
+        let file = copy.path().join("run/manifest.json");
+        fs::write(&file, resealed_json(&fs::read_to_string(&file).unwrap(), which, number)).unwrap();
+        read_all(copy.path(), &file);
     }
 }
 

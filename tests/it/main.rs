@@ -27,3 +27,4 @@ mod runs;
 mod sharing;
 mod simulate;
 mod statistics;
+mod unreadable;

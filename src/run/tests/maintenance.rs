@@ -20,7 +20,7 @@ use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::time::SystemTime;
 
 /// A disk on which nothing can be changed any more after some changes, as if the process had been killed.
@@ -73,6 +73,48 @@ impl OverDisk for Dying {
             Some(io::ErrorKind::CrossesDevices) if !one.ends_with("tables") => Disk.exchange(one, other),
             Some(refusal) => Err(StorageError::at("exchange folders with", one)(refusal.into())),
             None => Disk.exchange(one, other),
+        }
+    }
+}
+
+/// A disk that fails at one look, or from then on.
+struct Blind {
+    looks_left: AtomicI64,
+    stays: bool,
+    error: i32,
+}
+
+impl OverDisk for Blind {
+    fn before(&self, access: Access) -> io::Result<()> {
+        if access == Access::Change {
+            return Ok(());
+        }
+        let left = self.looks_left.fetch_sub(1, Ordering::Relaxed);
+        let fails = left == 0 || (self.stays && left < 0);
+        if fails { Err(io::Error::from_raw_os_error(self.error)) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn a_disk_that_cannot_be_read_is_not_damaged_and_its_repair_moves_nothing() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), SEEDS);
+    let before = tables_of(root.path());
+    for (stays, error) in [(false, libc::EIO), (true, libc::EMFILE), (true, libc::EACCES)] {
+        for looks in 0.. {
+            let disk = Blind { looks_left: AtomicI64::new(looks), stays, error };
+            let layout = Layout::new(&disk, root.path());
+            let repaired = Results::repair(&layout);
+            let has_failed = disk.looks_left.load(Ordering::Relaxed) < 0;
+            let case = format!("{error} at look {looks}");
+            match repaired {
+                Ok(verification) => assert!(verification.whole, "{case}: {:?}", verification.problems),
+                Err(error) => assert!(error.kind == ErrorKind::Disk, "{case}: {error}"),
+            }
+            assert!(tables_of(root.path()) == before && !layout.quarantine().exists(), "{case}");
+            if !has_failed {
+                break;
+            }
         }
     }
 }
