@@ -167,13 +167,23 @@ pub trait Storage: Sync {
         for (from, to) in moves {
             if self.exists(from)? {
                 let free = self.free_name(to)?;
-                self.link(from, &free)?;
-                moved.push((*from, free));
+                // A folder has no second name, nor can what is damaged always be copied.
+                let has_both = self.link(from, &free).is_ok();
+                moved.push((*from, free, has_both));
             }
         }
         let sync = |file: &Path| file.parent().map_or(Ok(()), |folder| self.sync_folder(folder));
-        moved.iter().try_for_each(|(_, free)| sync(free))?;
-        moved.iter().try_for_each(|(from, _)| self.remove(from).and_then(|()| sync(from)))
+        moved.iter().try_for_each(|(_, free, _)| sync(free))?;
+        for (from, free, has_both) in moved {
+            if has_both {
+                self.remove(from)?;
+            } else {
+                self.rename(from, &free)?;
+                sync(&free)?;
+            }
+            sync(from)?;
+        }
+        Ok(())
     }
 
     /// A name like this one that is free, in a folder that is there.
