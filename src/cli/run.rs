@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
     let options = Options {
         threads: threads.count,
-        stop: signals::catch()?,
+        stop,
         retry_failed: arguments.retry_failed,
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,

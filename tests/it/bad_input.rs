@@ -92,7 +92,7 @@ fn all_errors_of_a_sweep_file_are_reported_at_once() {
     let expected = "\
 error: bad.toml: has 4 mistakes:
   bad.toml:1: name is missing in the file: it becomes a folder, such as name = \"fig3\"
-  bad.toml:2: slips = 0: must be a whole number from 1 to 2^53 - 1
+  bad.toml:2: slips = 0: must be a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each
   bad.toml:4: N = 0: must be a whole number from 1 to 100000
   bad.toml:5: M = 0: must be a finite number > 0, in kg
 ";
