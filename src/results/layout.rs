@@ -132,7 +132,7 @@ impl<'a> Layout<'a> {
     pub fn sweeps(&self) -> Result<Vec<PathBuf>, StorageError> {
         let names: HashSet<OsString> = self.storage.list(&self.run())?.into_iter().collect();
         let is_there = |path: &PathBuf| path.file_name().is_some_and(|name| names.contains(name));
-        Ok((0..).map(|extension| self.sweep(extension)).take_while(is_there).collect())
+        Ok((0..names.len()).map(|extension| self.sweep(extension)).take_while(is_there).collect())
     }
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.

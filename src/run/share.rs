@@ -133,7 +133,7 @@ impl<'a> Share<'a> {
                 }
                 Standing::Free(_) => left.has_abandoned = true,
                 Standing::Own => {
-                    let path = self.results.part_file(tables::JOBS, &part);
+                    let path = self.results.part_file(tables::JOBS, part);
                     return Err(ResultsError::damaged(&path, "it was committed and is gone"));
                 }
             }

@@ -79,7 +79,9 @@ impl<'a> Host<'a> {
         act: impl FnOnce() -> Result<T, StorageError>,
     ) -> Result<T, StorageError> {
         self.turn(action, paths[1])?;
-        paths.into_iter().for_each(|path| self.forget(path));
+        for path in paths {
+            self.forget(path);
+        }
         act()
     }
 }

@@ -38,6 +38,11 @@ impl State {
     }
 }
 
+/// A random index.
+pub fn random_index(random: &mut ChaCha8Rng, count: usize) -> usize {
+    usize::try_from(random.next_u64() % count as u64).unwrap()
+}
+
 /// Gives turns to processes.
 pub struct Schedule {
     state: Mutex<State>,
@@ -49,8 +54,7 @@ impl Schedule {
     pub fn new(seed: u64, processes: usize, kill_before: Option<u64>) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let weights = (0..processes).map(|_| 1 << (random.next_u64() % 8)).collect();
-        let kill =
-            kill_before.map(|below| ((random.next_u64() % processes as u64) as usize, random.next_u64() % below));
+        let kill = kill_before.map(|below| (random_index(&mut random, processes), random.next_u64() % below));
         let state = State {
             random,
             weights,

@@ -4,14 +4,14 @@
 
 use super::faults::{files_below, results, small_sweep};
 use super::host::Host;
-use super::schedule::Schedule;
+use super::schedule::{Schedule, random_index};
 use super::*;
 use crate::reduce::{ReduceError, reduce};
 use crate::results::commit::tests::KNOWN_NUMBER;
 use crate::results::tables::Names;
 use crate::results::verify::{Remedy, Verification};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
 
@@ -189,10 +189,10 @@ fn is_allowed(error: &anyhow::Error, there: There) -> bool {
 /// Goes through one schedule; who did what.
 fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut below = |most: usize| (random.next_u64() % most as u64) as usize;
+    let mut below = |count| random_index(&mut random, count);
     let there = There::ALL[below(There::ALL.len())];
     let mut processes = vec![Process::Run];
-    processes.extend((0..1 + below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
+    processes.extend((0..=below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
     let (has_caches, is_killing) = (below(2) == 0, below(3) == 0);
     let case = format!(
         "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}",
