@@ -29,7 +29,7 @@ impl Sweep {
     /// When the file cannot be read, or as [`Sweep::parse`].
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {
         let text = Disk.read(path).map_err(|error| error.source).and_then(|bytes| {
-            String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+            String::from_utf8(bytes).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
         });
         Self::parse(&text.map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })?, path)
     }
