@@ -61,6 +61,7 @@ impl Axis {
 
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
+        let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
         let decades = libm::log10(high / low);
         let mantissas: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         // Every decade up to 7 of them, then every second, third, ...
@@ -216,6 +217,11 @@ mod tests {
         let huge = [1.0, f64::MAX, f64::INFINITY, f64::NAN, 1e-320];
         assert!(logarithmic_bounds(huge.into_iter()).unwrap().1 < 10.0);
         assert_eq!(bounds(huge.into_iter()), Some((1e-320, 1.0)));
+        let logarithmic = [(-1.0, 1.0), (0.0, 1.0), (1.0, f64::INFINITY)];
+        for (low, high) in logarithmic {
+            let axis = Axis::logarithmic("", low, high);
+            assert!(axis.ticks.len() + axis.minor.len() <= 2 * MAX_MULTIPLES && axis.place(1.0).is_finite());
+        }
         for axis in [
             Axis::angle("", 0.0, 1e300),
             Axis::linear("", 1e300, 1e300_f64.next_up()),
