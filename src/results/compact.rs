@@ -8,7 +8,7 @@
 //! New table folders are built aside and take the place of the old ones by one exchange of two folder names, for all
 //! tables at once: who lists a table sees all rows once, before and after. Names hold checksums, so a reader that has
 //! listed the old folder and opens the new one finds the same bytes or no file, never a mixture. The old folders stay as
-//! they are until the next compaction, or for [`GRACE`] at least: a reader may have one open, and would find it empty. A
+//! they are until the next compaction, or for `GRACE` at least: a reader may have one open, and would find it empty. A
 //! kill at any step leaves the old tables or the new ones.
 
 use crate::results::error::ResultsError;

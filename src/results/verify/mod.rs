@@ -28,7 +28,7 @@ use std::time::Duration;
 
 /// How often to look at a directory whose manifest and sweep files do not fit, and the time in between: together longer
 /// than a network file system shows an old file.
-const LOOKS: u32 = 8;
+const LOOKS: u32 = if cfg!(test) { 20 } else { 5 };
 const LOOK: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 1000 });
 /// Version of [`Verification`] as JSON.
 const FORMAT: u32 = 3;
@@ -147,7 +147,8 @@ impl<'a> Results<'a> {
             let (results, verification) = layout.read_tables(|| Self::examine(layout))??;
             looks += 1;
             // A run is about to add a sweep, or was killed there; or this host does not see the new manifest yet.
-            let is_unsettled = layout.sweeps()?.len() > results.extensions().len();
+            let is_unsettled =
+                layout.sweeps()?.len() > results.extensions().len() || !layout.storage.exists(&layout.manifest())?;
             if verification.whole || !is_unsettled || looks == LOOKS {
                 return Ok((results, verification));
             }
@@ -162,7 +163,7 @@ impl<'a> Results<'a> {
     /// same can be tried again.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
-        let (results, _) = Self::examined(layout)?;
+        let (results, _) = layout.read_tables(|| Self::examine(layout))??;
         results.exclusively(|| {
             let (results, verification) = Self::examined(layout)?;
             let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];

@@ -72,12 +72,10 @@ impl Process {
             Self::Repair => assert_sound(&Results::repair(layout)?),
             Self::Verify => assert_sound(&Results::verify(layout)?),
             Self::Reduce => Ok(reduce(&Results::read(layout)?).map(|_| ())?),
-            Self::Read => {
-                for batch in layout.dataset("jobs")?.rows::<Names>() {
-                    batch?;
-                }
+            Self::Read => layout.read_tables(|| {
+                layout.dataset("jobs")?.rows::<Names>().try_for_each(|batch| batch.map(drop))?;
                 Ok(())
-            }
+            })?,
         }
     }
 }
