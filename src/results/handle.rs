@@ -228,7 +228,7 @@ impl Found {
 }
 
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.
-fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
+pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let storage = layout.storage;
     let first_sweep = layout.sweep(0);
     let ours = |name: &std::ffi::OsString| {

@@ -29,8 +29,8 @@ const LOOK_AT_OTHERS: Duration = Duration::from_secs(10);
 /// that its time has doubled.
 const LONG: Duration = if cfg!(test) { Duration::from_millis(50) } else { Duration::from_secs(5) };
 const LONG_BY_PREDICTION: f64 = 20.0;
-/// Jobs are handed out ahead of those that run while all that are out are predicted to take less than this, in s for each
-/// thread, so that threads have work during a commit; and so many at most.
+/// Threads have jobs in advance, to work on during a commit: as many as are predicted to take this time on each thread, in
+/// s, and at most [`MAX_AHEAD`] for each.
 const AHEAD: f64 = 0.5;
 const MAX_AHEAD: usize = 256;
 

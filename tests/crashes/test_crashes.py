@@ -128,8 +128,7 @@ def test_a_power_cut_loses_nothing_that_was_committed(kind, tmp_path):
     with Disk(first, tmp_path / "mount") as folder:
         prepare(folder)
         local = Path(shutil.copytree(folder, tmp_path / "local", ignore=shutil.ignore_patterns("lost+found")))
-    for command in commands[:1]:
-        stickslip(local, command, codes=(0, 4))
+    stickslip(local, commands[0], codes=(0, 4))
     stickslip(local, RUN)
     stickslip(local, "compact out")
     expected = tables(local)
@@ -167,7 +166,7 @@ def test_a_power_cut_loses_nothing_that_was_committed(kind, tmp_path):
             begun = (folder / "out/run/manifest.json").exists()
             if begun and kind != "repair":
                 stickslip(folder, "verify out")
-            if "compact" not in kind and kind != "repair":
+            if kind in ("run", "share"):
                 there = {path.stem for path in (folder / "out/tables/jobs").glob("*")}
                 assert parts <= there, f"{case}: {parts - there} are lost"
             if kind == "repair":

@@ -1,7 +1,7 @@
 """System calls of the built program fail or kill it, one in each trial, under strace. Whatever fails: no good file is lost,
 damaged or moved, the exit code is that of an error of the disk, and the same command then ends with the same bytes.
 
-The usual tests take every so many of the calls; STICKSLIP_FAULTS=1 takes all of them, in some minutes.
+The tests try one in 41 of the faults; STICKSLIP_FAULTS=1 tries all of them.
 """
 
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-# One of so many trials is made.
+# Tries one in this number of faults.
 EVERY = int(os.environ.get("STICKSLIP_FAULTS", 41))
 
 SWEEP = """
@@ -34,7 +34,7 @@ discard = 0
 max_events = {max_events}
 """
 
-# What each call that uses the disk may fail with; the first is tried at every call, all of them at some.
+# What each call that uses the disk may fail with.
 FAULTS = {
     "openat": ["error=EIO", "error=EACCES", "error=EMFILE", "error=ENOSPC", "signal=KILL"],
     "read": ["error=EIO", "error=ESTALE"],

@@ -3,7 +3,7 @@
 use super::{Problem, Remedy};
 use crate::results::commit::alone;
 use crate::results::error::{ErrorKind, ResultsError};
-use crate::results::handle::Results;
+use crate::results::handle::{Results, is_fresh};
 use crate::results::layout::Layout;
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
 use crate::results::missing::no_results;
@@ -80,7 +80,8 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
             }
             Some(problem) => problem,
         },
-        Ok(None) if copies.is_empty() => return Err(no_results(layout)),
+        // A run that begins here has written the copy first.
+        Ok(None) if copies.is_empty() || is_fresh(layout)? => return Err(no_results(layout)),
         Ok(None) => "it is missing".to_owned(),
         Err(error) if error.kind == ErrorKind::Damaged => error.problem,
         Err(error) => return Err(error),

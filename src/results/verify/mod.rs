@@ -144,11 +144,11 @@ impl<'a> Results<'a> {
     pub(super) fn examined(layout: &Layout<'a>) -> Result<(Self, Verification), ResultsError> {
         let mut looks = 0;
         loop {
+            let has_manifest = layout.storage.exists(&layout.manifest())?;
             let (results, verification) = layout.read_tables(|| Self::examine(layout))??;
             looks += 1;
             // A run is about to add a sweep, or was killed there; or this host does not see the new manifest yet.
-            let is_unsettled =
-                layout.sweeps()?.len() > results.extensions().len() || !layout.storage.exists(&layout.manifest())?;
+            let is_unsettled = !has_manifest || layout.sweeps()?.len() > results.extensions().len();
             if verification.whole || !is_unsettled || looks == LOOKS {
                 return Ok((results, verification));
             }

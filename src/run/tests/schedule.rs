@@ -50,7 +50,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Of so many processes, of which one may be killed before an operation of its own below `kill_before`.
+    /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at most.
     pub fn new(seed: u64, processes: usize, kill_before: Option<u64>) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let weights = (0..processes).map(|_| 1 << (random.next_u64() % 8)).collect();
