@@ -9,7 +9,7 @@ use clap_complete::Shell;
 
 /// Print completions for a shell
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  stickslip completions bash > /etc/bash_completion.d/stickslip")]
+#[command(after_help = "Example:\n  stickslip completions bash > ~/.local/share/bash-completion/completions/stickslip")]
 pub struct Arguments {
     /// Shell
     #[arg(value_enum)]

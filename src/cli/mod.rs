@@ -5,6 +5,8 @@ mod batch;
 mod compact;
 mod completions;
 mod exit;
+mod init;
+mod man;
 mod merge;
 mod output;
 mod plan;
@@ -12,9 +14,11 @@ mod planning;
 mod progress;
 mod reduce;
 mod run;
+mod schema;
 mod signals;
 mod simulate;
 mod status;
+mod sweep;
 mod threads;
 mod time;
 mod verify;
@@ -33,6 +37,7 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
+  stickslip init mine.toml                   a commented sweep file to start from
   stickslip plan sweeps/fig3.toml            what would run, and what it would cost
   stickslip run sweeps/fig3.toml             run or resume it, down to its figures
   stickslip simulate --slips 10 --plot a.png one realisation, drawn
@@ -42,6 +47,7 @@ Exit codes: 0 done, 1 failed jobs remain, 2 bad usage or bad sweep file, 3 stopp
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Arguments),
     Plan(plan::Arguments),
     Run(run::Arguments),
     Batch(batch::Arguments),
@@ -53,12 +59,15 @@ enum Command {
     Merge(merge::Arguments),
     Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
+    Schema(schema::Arguments),
     Completions(completions::Arguments),
+    Man(man::Arguments),
 }
 
 /// Parses the command line, does what it asks, and says how it ended.
 pub fn main() -> ExitCode {
     let ended = match Cli::parse().command {
+        Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Batch(arguments) => batch::batch(&arguments),
@@ -70,7 +79,9 @@ pub fn main() -> ExitCode {
         Command::Merge(arguments) => merge::merge(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
+        Command::Schema(_) => schema::schema(),
         Command::Completions(arguments) => completions::completions(&arguments),
+        Command::Man(arguments) => man::man(&arguments),
     };
     let exit = ended.unwrap_or_else(|error| {
         output::report(&format!("error: {}", message(&error)));

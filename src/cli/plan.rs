@@ -2,6 +2,7 @@
 
 use super::exit::Exit;
 use super::planning::Planning;
+use super::sweep::{self, Preset};
 use super::{output, signals};
 use anyhow::Result;
 use clap::Args;
@@ -19,11 +20,15 @@ use stickslip::table::storage::{Disk, Storage};
 #[command(after_help = "\
 Examples:
   stickslip plan sweeps/fig3.toml --json
+  stickslip plan --preset fig3
   stickslip plan sweeps/fig3.toml --out /scratch/fig3")]
 pub struct Arguments {
     /// Sweep file
-    #[arg(value_name = "SWEEP.toml")]
-    sweep: PathBuf,
+    #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
+    sweep: Option<PathBuf>,
+    /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
+    preset: Option<Preset>,
     /// Results directory to compare with, if it is there [default: results/<name of the sweep>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -96,7 +101,7 @@ struct Axis {
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let planning = Planning::watch(signals::catch()?, None)?;
-    let sweep = Sweep::from_file(&arguments.sweep)?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();

@@ -3,6 +3,7 @@
 use super::exit::Exit;
 use super::planning::Planning;
 use super::progress::Progress;
+use super::sweep::{self, Preset};
 use super::threads::{self, Threads};
 use super::{output, reduce, signals, time};
 use anyhow::Result;
@@ -17,7 +18,6 @@ use stickslip::reduce::ReduceError;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::run::{Options, RunReport, Shard};
-use stickslip::sweep::Sweep;
 use stickslip::table::shown::shown;
 use stickslip::table::storage::Disk;
 
@@ -27,6 +27,7 @@ use stickslip::table::storage::Disk;
 Examples:
   stickslip run sweeps/fig3.toml
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
+  stickslip run --preset fig3                    a sweep of the paper, without a file
   stickslip run results/fig3                     resume, without the sweep file
   stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; `merge` puts the parts together
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
@@ -41,8 +42,11 @@ LSB_DJOB_NUMPROC; the first that is set counts. `stickslip batch` prints a scrip
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Sweep file, or results directory to resume
-    #[arg(value_name = "SWEEP.toml|DIR")]
-    sweep: PathBuf,
+    #[arg(value_name = "SWEEP.toml|DIR", required_unless_present = "preset")]
+    sweep: Option<PathBuf>,
+    /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
+    preset: Option<Preset>,
     /// Results directory [default: results/<name of the sweep>, or the one to resume]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -84,11 +88,10 @@ struct Report<'a> {
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
     let planning = Planning::watch(stop, arguments.walltime)?;
-    let (sweep, default_root) = if arguments.sweep.is_dir() {
-        let sweep = Results::read(&Layout::new(&Disk, &arguments.sweep))?.sweep().clone();
-        (sweep, arguments.sweep.clone())
+    let (sweep, default_root) = if let Some(directory) = arguments.sweep.as_deref().filter(|path| path.is_dir()) {
+        (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
     } else {
-        let sweep = Sweep::from_file(&arguments.sweep)?;
+        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset)?;
         let root = Layout::default_root(&sweep);
         (sweep, root)
     };

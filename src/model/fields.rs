@@ -27,6 +27,8 @@
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
+use std::ops::Bound;
+
 /// Description of one field.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
@@ -42,8 +44,8 @@ pub struct Description {
     pub allowed: &'static str,
     /// What else must hold, beside other fields; empty for nothing.
     pub rule: &'static str,
-    /// Whether the field can take a number by itself.
-    pub contains: fn(f64) -> bool,
+    /// Ends of the range of a number.
+    pub ends: (Bound<f64>, Bound<f64>),
 }
 
 impl Description {
@@ -54,55 +56,55 @@ impl Description {
     }
 }
 
-/// The ranges of values, each with the words for it and its test.
+/// The ranges of values, each with the words for it and its ends.
 macro_rules! range {
     (words size) => {
         "a whole number from 1 to 100000"
     };
-    (test size) => {
-        |number| (1.0..=1e5).contains(&number)
+    (ends size) => {
+        (Included(1.0), Included(1e5))
     };
     (words held) => {
         "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each"
     };
-    (test held) => {
-        |number| (1.0..=1e7).contains(&number)
+    (ends held) => {
+        (Included(1.0), Included(1e7))
     };
     (words count) => {
         "a whole number from 1 to 2^53 - 1"
     };
-    (test count) => {
-        |number| (1.0..9_007_199_254_740_992.0).contains(&number)
+    (ends count) => {
+        (Included(1.0), Excluded(9_007_199_254_740_992.0))
     };
     (words count_or_zero) => {
         "a whole number from 0 to 2^53 - 1"
     };
-    (test count_or_zero) => {
-        |number| (0.0..9_007_199_254_740_992.0).contains(&number)
+    (ends count_or_zero) => {
+        (Included(0.0), Excluded(9_007_199_254_740_992.0))
     };
     (words positive) => {
         "a finite number > 0"
     };
-    (test positive) => {
-        |number| number > 0.0 && number < f64::INFINITY
+    (ends positive) => {
+        (Excluded(0.0), Excluded(f64::INFINITY))
     };
     (words not_negative) => {
         "a finite number >= 0"
     };
-    (test not_negative) => {
-        |number| (0.0..f64::INFINITY).contains(&number)
+    (ends not_negative) => {
+        (Included(0.0), Excluded(f64::INFINITY))
     };
     (words flag) => {
         "true or false"
     };
-    (test flag) => {
-        |_| false
+    (ends flag) => {
+        (Unbounded, Unbounded)
     };
     (words break_on) => {
         "\"magnitude\" (either sign) or \"tension\""
     };
-    (test break_on) => {
-        |_| false
+    (ends break_on) => {
+        (Unbounded, Unbounded)
     };
 }
 
@@ -164,7 +166,11 @@ macro_rules! fields {
                             $crate::model::fields::range!(words $range), $crate::model::fields::in_unit!($unit)
                         ),
                         rule: concat!($($rule)?),
-                        contains: $crate::model::fields::range!(test $range),
+                        ends: {
+                            #[allow(unused_imports, reason = "no range needs all of them")]
+                            use std::ops::Bound::{Excluded, Included, Unbounded};
+                            $crate::model::fields::range!(ends $range)
+                        },
                     },
                 )+}
             }
@@ -185,10 +191,12 @@ macro_rules! fields {
             #[must_use]
             pub fn checked(self, value: $crate::model::Value) -> Option<$crate::model::Value> {
                 use $crate::model::value::FieldType;
+                use std::ops::RangeBounds;
                 let value = match self {$(
                     Self::$variant => <$type as FieldType>::from_value(value)?.to_value(),
                 )+};
-                value.number().is_none_or(self.description().contains).then_some(value)
+                let ends = self.description().ends;
+                value.number().is_none_or(|number| ends.contains(&number)).then_some(value)
             }
         }
 

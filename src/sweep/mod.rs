@@ -21,6 +21,7 @@ mod plan;
 mod quantity;
 mod read_axes;
 mod samples;
+mod schema;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use schema::schema;
 pub(crate) use source::nearest;
 pub use source::{Mistake, SweepError};
 pub use walked::walked;

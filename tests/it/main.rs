@@ -13,6 +13,7 @@ mod energy_ledger;
 mod equation_of_motion;
 mod failures;
 mod figures;
+mod first_steps;
 mod fuzz;
 mod golden;
 mod grid;

@@ -1,0 +1,187 @@
+//! JSON Schema of a sweep file, for editors that complete and check TOML.
+//!
+//! Keys, units, meanings and ranges are those of the one description of each field. What depends on several keys, such as
+//! `dfs <= fs`, is left to [`Sweep::parse`](super::Sweep::parse).
+
+use super::quantity::Quantity;
+use crate::model::{BreakOn, Description, Parameters, Value};
+use crate::observe::{Recording, RecordingKey};
+use crate::solver::{Resolve, Solver, TOLERANCES};
+use serde_json::{Map, Value as Json, json};
+use std::ops::Bound;
+
+/// The schema, JSON Schema draft 7.
+#[must_use]
+pub fn schema() -> Json {
+    let model = Quantity::all().map(|quantity| (quantity.key(), described(quantity, single(quantity))));
+    let axes = Quantity::all().map(|quantity| (quantity.key(), described(quantity, axis(quantity))));
+    let zip = closed(Quantity::all().map(|quantity| (quantity.key(), described(quantity, axis(quantity)))));
+    let [sobol, latin] = ["Sobol sequence", "Latin hypercube"].map(|kind| one_or_several(&sample(kind)));
+    let tables = [
+        ("zip", json!({ "type": "array", "items": zip, "description": "Columns of equal length that move together" })),
+        ("sobol", sobol),
+        ("latin", latin),
+    ];
+    let record = RecordingKey::ALL.map(|key| {
+        let description = key.description();
+        let value = value(&description, |value| key.checked(value));
+        (description.key, with_words(value, &description, Recording::default().get(key)))
+    });
+    let text_or_texts = json!({ "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "string" } }] });
+    let mut file = closed([
+        (
+            "name",
+            json!({ "type": "string", "pattern": "^[A-Za-z0-9_][A-Za-z0-9_-]{0,99}$",
+            "description": "Name of the sweep and of its results directory" }),
+        ),
+        ("where", with(text_or_texts, "description", "Conditions that drop points, such as \"frequency < 500\"")),
+        ("model", with(closed(model), "description", "Parameters that differ from those of Fig. 1, in SI units")),
+        ("axes", with(closed(axes.chain(tables)), "description", "What is varied; every combination is a job")),
+        ("record", with(closed(record), "description", "What each job records, and when it ends")),
+        ("solver", with(solver(), "description", "How motion is computed, and how accurately")),
+    ]);
+    file["$schema"] = json!("http://json-schema.org/draft-07/schema#");
+    file["title"] = json!("Sweep file of stickslip");
+    file["required"] = json!(["name"]);
+    file
+}
+
+/// An object with these properties and no others.
+fn closed<'a>(properties: impl IntoIterator<Item = (&'a str, Json)>) -> Json {
+    let properties: Map<String, Json> = properties.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    json!({ "type": "object", "additionalProperties": false, "properties": properties })
+}
+
+fn with(mut schema: Json, key: &str, value: &str) -> Json {
+    schema[key] = json!(value);
+    schema
+}
+
+fn one_or_several(table: &Json) -> Json {
+    json!({ "anyOf": [table, { "type": "array", "items": table }] })
+}
+
+/// Adds meaning, allowed values and default of a field to its schema.
+fn with_words(schema: Json, field: &Description, default: Value) -> Json {
+    let mut schema = with(schema, "description", &format!("{}: {}", field.meaning, field.requirement()));
+    if default != Value::Absent {
+        schema["default"] = json!(default);
+    }
+    schema
+}
+
+fn described(quantity: Quantity, schema: Json) -> Json {
+    match quantity {
+        Quantity::Parameter(symbol) => with_words(schema, &symbol.description(), Parameters::default().get(symbol)),
+        Quantity::Eta => with(schema, "description", "2 pi Delta / (T V0), fixes the period T"),
+        Quantity::Frequency => with(schema, "description", "1/T, in Hz, fixes the period T"),
+    }
+}
+
+/// A single value of a quantity.
+fn single(quantity: Quantity) -> Json {
+    match quantity {
+        Quantity::Parameter(symbol) => value(&symbol.description(), |value| symbol.checked(value)),
+        Quantity::Eta | Quantity::Frequency => json!({ "type": "number", "exclusiveMinimum": 0 }),
+    }
+}
+
+/// A value of a field, by what the field takes.
+fn value(field: &Description, checked: impl Fn(Value) -> Option<Value>) -> Json {
+    if checked(Value::Flag(true)).is_some() {
+        return json!({ "type": "boolean" });
+    }
+    if checked(Value::BreakOn(BreakOn::Magnitude)).is_some() {
+        return json!({ "enum": [BreakOn::Magnitude.word(), BreakOn::Tension.word()] });
+    }
+    let takes_fractions = checked(Value::Real(1.5)).is_some();
+    let mut number = json!({ "type": if takes_fractions { "number" } else { "integer" } });
+    let mut bound = |key: &str, end: f64| {
+        if end.is_finite() {
+            number[key] = json!(end);
+        }
+    };
+    let (low, high) = field.ends;
+    match low {
+        Bound::Included(low) => bound("minimum", low),
+        Bound::Excluded(low) => bound("exclusiveMinimum", low),
+        Bound::Unbounded => {}
+    }
+    match high {
+        Bound::Included(high) => bound("maximum", high),
+        Bound::Excluded(high) => bound("exclusiveMaximum", high),
+        Bound::Unbounded => {}
+    }
+    number
+}
+
+/// Values of a quantity in one of the forms of an axis.
+fn axis(quantity: Quantity) -> Json {
+    let value = single(quantity);
+    let mut forms = vec![json!({ "type": "array", "items": value, "minItems": 1 })];
+    if quantity != Quantity::BREAK_ON {
+        forms.extend(["linear", "log"].map(|spacing| {
+            let mut form = closed([(spacing, ends(&value)), ("points", json!({ "type": "integer", "minimum": 2 }))]);
+            form["required"] = json!([spacing, "points"]);
+            form
+        }));
+    }
+    if quantity.is_count() {
+        let mut form = closed([
+            ("count", json!({ "type": "integer", "minimum": 1 })),
+            ("first", json!({ "type": "integer", "minimum": 0 })),
+        ]);
+        form["required"] = json!(["count"]);
+        forms.push(form);
+    }
+    json!({ "anyOf": forms })
+}
+
+/// Both ends of a range.
+fn ends(value: &Json) -> Json {
+    json!({ "type": "array", "items": value, "minItems": 2, "maxItems": 2 })
+}
+
+fn sample(kind: &str) -> Json {
+    let ranges = Quantity::all().filter(|quantity| *quantity != Quantity::BREAK_ON).map(|quantity| {
+        let value = single(quantity);
+        let forms = ["linear", "log"].map(|spacing| {
+            let mut form = closed([(spacing, ends(&value))]);
+            form["required"] = json!([spacing]);
+            form
+        });
+        (quantity.key(), described(quantity, json!({ "anyOf": forms })))
+    });
+    // `seed` is that of the sample, a number, or the range of a quantity.
+    let mut table = closed(ranges.chain([("points", json!({ "type": "integer", "minimum": 1 }))]));
+    table["properties"]["seed"] = json!({ "type": "integer", "minimum": 0, "description": "Seed of the sample" });
+    table["required"] = json!(["points"]);
+    with(table, "description", &format!("A space-filling sample: {kind}"))
+}
+
+fn solver() -> Json {
+    let resolves = Resolve::ALL.map(|(_, word)| word);
+    let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+    let mut tolerance = json!({ "type": "number", "minimum": min, "maximum": max,
+        "description": "Target error of displacement, relative to the contact reach fs/k" });
+    if let Solver::EventDriven { tolerance: default, .. } = Solver::default() {
+        tolerance["default"] = json!(default);
+    }
+    closed([
+        ("method", json!({ "enum": ["event-driven", "fixed-step"], "default": "event-driven" })),
+        ("tolerance", tolerance),
+        ("resolve", json!({ "enum": resolves, "default": Resolve::default().word() })),
+        ("dt", json!({ "type": "number", "exclusiveMinimum": 0, "description": "The fixed step, in s" })),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::documented::assert_documented;
+
+    #[test]
+    fn the_documented_schema_is_the_one_printed() {
+        assert_documented("sweep.schema.json", &format!("{:#}\n", schema()));
+    }
+}
