@@ -158,23 +158,41 @@ macro_rules! part {
 }
 pub(crate) use part;
 
-/// The section of a table in the documentation, in Markdown.
+/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
+/// share one line; a unit with `?` is that of a column that may be null.
 #[must_use]
 pub fn markdown<T: Table>() -> String {
-    let row = |column: Column| {
-        let kind = match column.kind {
-            Kind::Real => "real",
-            Kind::Count => "count",
-            Kind::Flag => "flag",
-            Kind::Text => "text",
-        };
-        let nullable = if column.nullable { ", may be null" } else { "" };
-        let Column { name, unit, meaning, .. } = column;
-        format!("| `{name}` | {kind}{nullable} | {unit} | {} |\n", meaning.replace('|', "\\|").replace('<', "\\<"))
+    let is_parameter = |column: &Column| {
+        Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
-    let rows: String = T::columns().into_iter().map(row).collect();
-    format!("## {}\n\n{}.\n\n| column | type | unit | meaning |\n|---|---|---|---|\n{rows}", T::NAME, T::MEANING)
+    let columns = T::columns();
+    let rows: String = columns
+        .chunk_by(|one, next| is_parameter(one) && is_parameter(next))
+        .map(|columns| {
+            let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
+            if columns.len() > 1 {
+                return format!("| {} | | [parameters](model.md#parameters); null where there is none |\n", names.join(" "));
+            }
+            let Column { unit, meaning, kind, nullable, .. } = &columns[0];
+            let unit = match kind {
+                Kind::Real if unit.is_empty() => "1",
+                Kind::Real => unit,
+                Kind::Count => "count",
+                Kind::Flag => "flag",
+                Kind::Text => "text",
+            };
+            let nullable = if *nullable { "?" } else { "" };
+            let meaning = meaning.replace('|', "\\|").replace('<', "\\<");
+            format!("| {} | {unit}{nullable} | {meaning} |\n", names[0])
+        })
+        .collect();
+    format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
 }
+
+/// How the pages of tables show units and kinds.
+#[cfg(test)]
+pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
+    A `?` marks columns that may be null.\n";
 
 /// Describes the columns of a row type: see the head of `table/columns.rs`.
 macro_rules! columns {
@@ -387,6 +405,6 @@ pub(crate) mod tests {
     fn the_documentation_has_a_line_for_each_column() {
         let text = markdown::<Readings>();
         assert!(text.starts_with("## readings\n\nOne row per reading.\n"), "{text}");
-        assert!(text.contains("| `phase` | real, may be null | rad | phase of the onset |\n"), "{text}");
+        assert!(text.contains("| `phase` | rad? | phase of the onset |\n"), "{text}");
     }
 }
