@@ -69,7 +69,8 @@ class Estimate:
     def text(self, digits: int = 3) -> str:
         """Value and interval with `digits` decimals."""
         value, low, high = (f"{x:.{digits}f}".replace("-", "−") for x in (self.value, self.low, self.high))
-        return value if low == high else f"{value} ({low} to {high})"
+        # A dash between numbers, but for negative ones.
+        return value if low == high else f"{value} ({low}{' to ' if '−' in low else '–'}{high})"
 
 
 def mean(values: pandas.Series) -> Estimate:

@@ -19,7 +19,7 @@ class Check:
     def row(self) -> dict:
         """Its row of a table."""
         agrees = "yes" if self.agrees else "**no**"
-        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "agrees": agrees}
+        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "": agrees}
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Section:
             "statement": self.title,
             "verdict": verdict.word,
             "why": verdict.reason,
-            "checks that agree": f"{agree} of {len(self.checks)}",
+            "checks": f"{agree}/{len(self.checks)}",
         }
 
     def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
