@@ -159,7 +159,7 @@ macro_rules! part {
 pub(crate) use part;
 
 /// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
-/// share one line; a unit with `?` is that of a column that may be null.
+/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
 #[must_use]
 pub fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
@@ -167,11 +167,16 @@ pub fn markdown<T: Table>() -> String {
     };
     let columns = T::columns();
     let rows: String = columns
-        .chunk_by(|one, next| is_parameter(one) && is_parameter(next))
+        .chunk_by(|one, next| {
+            (is_parameter(one) && is_parameter(next))
+                || (one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name))
+                    && one.meaning.starts_with(LOWER_END))
+        })
         .map(|columns| {
             let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
-            if columns.len() > 1 {
-                return format!("| {} | | [parameters](model.md#parameters); null where there is none |\n", names.join(" "));
+            let names = names.join(" ");
+            if columns.iter().all(is_parameter) {
+                return format!("| {names} | | [parameters](model.md#parameters) |\n");
             }
             let Column { unit, meaning, kind, nullable, .. } = &columns[0];
             let unit = match kind {
@@ -182,12 +187,15 @@ pub fn markdown<T: Table>() -> String {
                 Kind::Text => "text",
             };
             let nullable = if *nullable { "?" } else { "" };
-            let meaning = meaning.replace('|', "\\|").replace('<', "\\<");
-            format!("| {} | {unit}{nullable} | {meaning} |\n", names[0])
+            let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
+            format!("| {names} | {unit}{nullable} | {meaning} |\n")
         })
         .collect();
     format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
 }
+
+/// How the meaning of the lower end of an interval begins.
+const LOWER_END: &str = "lower end of";
 
 /// How the pages of tables show units and kinds.
 #[cfg(test)]
