@@ -19,7 +19,7 @@ class Check:
     def row(self) -> dict:
         """Its row of a table."""
         agrees = "yes" if self.agrees else "**no**"
-        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "": agrees}
+        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "agrees": agrees}
 
 
 @dataclass(frozen=True)

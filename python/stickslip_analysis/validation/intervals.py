@@ -167,11 +167,11 @@ def integer_multiples(results: Path) -> Section:
         )
     for what, intervals, column in (
         (
-            "... from the largest precursor to its slip, {} Hz",
+            "so do times from the largest precursor to its slip, {} Hz",
             lead_times(sweep),
             "lead",
         ),
-        ("... between precursors, if longer than T/2, {} Hz", precursors, "interval"),
+        ("so do those between precursors, if longer than T/2, {} Hz", precursors, "interval"),
     ):
         for frequency in (29, 58):
             index, chance = (

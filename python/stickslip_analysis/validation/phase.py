@@ -57,7 +57,7 @@ def phase(results: Path) -> Section:
         "An onset is a largest load by definition, so only inertia can put it below φ_min:"
         f" a share of {under_minimum(high['phase'], high['eta'], 0.15).mean():.4f} falls more than 0.15 rad below.",
         "The first break is free; its phase is taken modulo 2π.",
-        f"At η > 2 {is_late.mean():.3f} of the first breaks come after the onset,"
+        f"At η > 2, {is_late.mean():.3f} of the first breaks come after the onset,"
         f" {((late['nucleation'] - late['onset']) / late['T']).median():.2f} T in the median,"
         f" {100 * (1 / late['T'] > 100).mean():.0f} % of them above 100 Hz.",
         f"These slips had precursors of {late['largest_precursor'].min()} breaks or more, and fewer contacts are attached"
