@@ -10,7 +10,7 @@ from scipy import stats
 from ..statistics import Estimate, difference, jackknife, share
 from ..tables import Sweep, parameters, read, select
 from .document import Section, Verdict
-from .intervals import LARGE, of_same_jobs, without_modulation
+from .intervals import LARGE, without_modulation
 from .kinematics import under_minimum
 
 #: Frequencies in Hz at which friction is compared.
@@ -116,17 +116,14 @@ def slow_fronts(results: Path) -> Section:
     slow, fast = {}, {}
     for frequency in (None, 29, 58, 116, 200):
         mine = select(slips, Delta=1e-6, frequency=frequency) if frequency else select(slips, Delta=0.0)
-        reaches = of_same_jobs(large, mine)["reach"].quantile([0.5, 0.25, 0.75])
         slow[frequency], fast[frequency], count = (
             jackknife(lambda rows: rows[column].mean(), mine) for column in ("slow", "fast", "precursors")
         )
         section.rows.append(
             {
                 "modulation": f"{frequency} Hz" if frequency else "none",
-                "slips": len(mine),
                 "with a slow front": slow[frequency].text(2),
                 f"with a precursor of {LARGE} breaks": fast[frequency].text(2),
-                "blocks reached by it (quartiles)": "{:.0f} ({:.0f}–{:.0f})".format(*reaches),
                 "precursors per slip": count.text(2),
             }
         )

@@ -225,7 +225,6 @@ def many_periods(results: Path) -> Section:
             {
                 "η": f"{low} to {min(high, 1000)}",
                 "sets": near.units,
-                "slips in locked sets": f"{mine['locked'].mean():.2f}",
                 "within 0.1 T of nT": near.text(),
                 "random loads": f"{mine['expected'].mean():.3f}",
                 "beyond, V0 < 1e-4 m/s": beyond_text(mine[~fast]),

@@ -178,8 +178,7 @@ def below_one(results: Path) -> Section:
         section.rows.append(
             {
                 "V0 (m/s)": f"{velocity:.2g}",
-                "sets": len(rows),
-                "locked by φ": rows["locked"].sum(),
+                f"of {len(rows)} sets locked by φ": rows["locked"].sum(),
                 "by load phase": rows["in_load"].sum(),
                 "its resultant": f"{resultant_length(load):.3f}",
                 "p": f"{rayleigh_p(load):.2g}",
@@ -187,8 +186,8 @@ def below_one(results: Path) -> Section:
         )
     section.remark(
         "The first cannot hold: slips at random loads have the density 1 − η sin φ, with a resultant of η/2 at −π/2.",
-        "In the load phase φ + η cos φ slips of slow drives are uniform, which is what the paper means.",
-        "The values of p take slips as independent.",
+        "Slow drives are uniform in the load phase φ + η cos φ, which is what the paper means.",
+        "p takes slips as independent.",
     )
     lengths = []
     for eta, rows in low.groupby(low["eta"].round(4)):
