@@ -165,32 +165,29 @@ pub fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
     };
-    let columns = T::columns();
-    let rows: String = columns
-        .chunk_by(|one, next| {
-            (is_parameter(one) && is_parameter(next))
-                || (one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name))
-                    && one.meaning.starts_with(LOWER_END))
-        })
-        .map(|columns| {
-            let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
-            let names = names.join(" ");
-            if columns.iter().all(is_parameter) {
-                return format!("| {names} | | [parameters](model.md#parameters) |\n");
-            }
-            let Column { unit, meaning, kind, nullable, .. } = &columns[0];
-            let unit = match kind {
-                Kind::Real if unit.is_empty() => "1",
-                Kind::Real => unit,
-                Kind::Count => "count",
-                Kind::Flag => "flag",
-                Kind::Text => "text",
-            };
-            let nullable = if *nullable { "?" } else { "" };
-            let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
-            format!("| {names} | {unit}{nullable} | {meaning} |\n")
-        })
-        .collect();
+    let share_a_line = |one: &Column, next: &Column| {
+        let is_pair = one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
+        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
+    };
+    let line = |columns: &[Column]| {
+        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
+        let names = names.join(" ");
+        let Column { unit, meaning, kind, nullable, .. } = &columns[0];
+        if is_parameter(&columns[0]) {
+            return format!("| {names} | | [parameters](model.md#parameters) |\n");
+        }
+        let unit = match kind {
+            Kind::Real if unit.is_empty() => "1",
+            Kind::Real => unit,
+            Kind::Count => "count",
+            Kind::Flag => "flag",
+            Kind::Text => "text",
+        };
+        let nullable = if *nullable { "?" } else { "" };
+        let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
+        format!("| {names} | {unit}{nullable} | {meaning} |\n")
+    };
+    let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
     format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
 }
 
