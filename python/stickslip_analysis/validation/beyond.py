@@ -174,8 +174,7 @@ def dependence(results: Path, *, sweep: str, column: str, what: str, symbol: str
     locked = [row[symbol] for row, length in zip(section.rows, weakest, strict=True) if length.low > 0.5]
     where = "everywhere" if len(locked) == len(weakest) else f"at {', '.join(locked)}" if locked else "nowhere"
     section.remark(
-        f"At {', '.join(map(str, FREQUENCIES))} Hz phases are locked {where}: the least resultant is above 0.5, beyond its"
-        " interval."
+        f"At {', '.join(map(str, FREQUENCIES))} Hz phases are locked {where} (resultant and interval above 0.5)."
     )
     return section
 
@@ -195,17 +194,20 @@ def choices(results: Path) -> Section:
     slips = sweep.slips()
     changes = []
     for name, values in (
-        ("no modulation", {"Delta": 0.0}),
-        ("29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
-        ("58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
-        ("Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
+        ("without modulation", {"Delta": 0.0}),
+        ("at 29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
+        ("at 58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
+        ("at Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
     ):
         tension, magnitude = (select(slips, break_on=rule, **values) for rule in ("tension", "magnitude"))
         change = difference(tension, magnitude, "interval").scaled(1e3)
         pairs = tension.merge(magnitude, on=["seed", "slip"], suffixes=("", "_other"))
         same = (pairs["interval"] == pairs["interval_other"]).mean()
-        changes.append(f"{name}: {change.text(3)} ms, {100 * same:.0f} % of {len(pairs)} intervals the same bits")
-    section.item(f'`break_on = "tension"`: mean τ differs by, {"; ".join(changes)}.')
+        changes.append(f"{change.text(3)} ms {name} ({100 * same:.0f} %)")
+    section.item(
+        '`break_on = "tension"` changes mean τ, and leaves a share of the intervals as they are to the last bit:'
+        f" {'; '.join(changes)}."
+    )
     still = select(slips, Delta=0.0, break_on="magnitude")
     precursors = of_same_jobs(sweep.table("precursors"), still)
     counts = (f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
