@@ -33,7 +33,9 @@ fn table(fields: &[(Description, Value)]) -> String {
     let mut text = "| key | symbol | meaning | default | allowed |\n|---|---|---|---|---|\n".to_owned();
     for (field, default) in fields {
         let Description { key, symbol, meaning, .. } = field;
-        writeln!(text, "| `{key}` | {symbol} | {meaning} | {default} | {} |", field.requirement()).unwrap();
+        // Shorter than in messages: most values are finite numbers.
+        let allowed = field.requirement().replace("a finite number ", "").replace("a whole number from", "whole,");
+        writeln!(text, "| `{key}` | {symbol} | {meaning} | {default} | {allowed} |").unwrap();
     }
     // A column that is empty everywhere says nothing.
     if fields.iter().all(|(field, _)| field.symbol.is_empty()) {

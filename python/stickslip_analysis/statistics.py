@@ -68,8 +68,11 @@ class Estimate:
 
     def text(self, digits: int = 3) -> str:
         """Value and interval with `digits` decimals."""
-        value, low, high = (f"{x:.{digits}f}".replace("-", "−") for x in (self.value, self.low, self.high))
-        return value if low == high else f"{value} ({low} to {high})"
+        # Adding zero turns a negative one into zero.
+        ends = (round(x, digits) + 0.0 for x in (self.value, self.low, self.high))
+        value, low, high = (f"{x:.{digits}f}".replace("-", "−") for x in ends)
+        # A dash between numbers, but for negative ones.
+        return value if low == high else f"{value} ({low}{' to ' if '−' in low else '–'}{high})"
 
 
 def mean(values: pandas.Series) -> Estimate:

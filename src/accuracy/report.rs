@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn every_field_of_the_json_is_documented() {
-        let page = include_str!("../../docs/results.md");
+        let page = include_str!("../../docs/commands.md");
         let (study, findings, scaling) = (
             Study { velocities: vec![1e-4], ..Study::quick() },
             findings(),

@@ -215,8 +215,8 @@ columns! {
 
 impl Table for DistanceRow {
     const NAME: &'static str = "distances";
-    const MEANING: &'static str = "One row per drive, solver setting and quantity; means, deviations, their biases and w1 are \
-                                   in its unit, that of the column of this name in `slips`";
+    const MEANING: &'static str =
+        "One row per drive, solver setting and quantity, in the unit of its column in `slips`";
 }
 
 /// All that a study finds.

@@ -51,7 +51,7 @@ impl Part for Solver {
 mod tests {
     use super::super::{DistanceRow, Exponents, MethodRow, SizeRow, Stability};
     use crate::documented::assert_documented;
-    use crate::table::columns::markdown;
+    use crate::table::columns::{UNITS, markdown};
 
     #[test]
     fn documented_tables_of_accuracy_are_those_written() {
@@ -63,9 +63,9 @@ mod tests {
             markdown::<Stability>(),
         ];
         let text = format!(
-            "# Tables of `stickslip accuracy`\n\nUnits are SI.\n\
+            "# Tables of `stickslip accuracy`\n\n{UNITS}\
              Times are CPU times of one thread; the processor is in the footer of each file, under `processor`.\n\
-             The JSON has the same rows, see [results.md](results.md#json-output).\n\n{}",
+             [JSON](commands.md#json) has the same rows.\n\n{}",
             tables.join("\n")
         );
         assert_documented("accuracy-tables.md", &text);

@@ -102,7 +102,7 @@ fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
 }
 
-/// The table of the README, and how far the distributions of slips are from those of the reference.
+/// The table of docs/numerics.md, and how far the distributions of slips are from those of the reference.
 fn study_text(study: &Study, findings: &Findings) -> String {
     let mut lines = vec![format!("{}; one thread; first {} breaks", accuracy::cost::processor(), study.breaks)];
     for is_modulated in [false, true] {

@@ -66,7 +66,7 @@ impl PhaseLimits {
 mod tests {
     use super::*;
     use crate::documented::assert_documented;
-    use crate::table::columns::markdown;
+    use crate::table::columns::{UNITS, markdown};
 
     #[test]
     fn documented_reduced_tables_are_those_written() {
@@ -78,9 +78,7 @@ mod tests {
             markdown::<Point>(),
         ];
         let text = format!(
-            "# Reduced tables\n\nUnits are SI.\n\
-             How they follow from the [tables](tables.md) of a sweep is described in \
-             [results.md](results.md#reduced-data).\n\n{}",
+            "# Reduced tables\n\n[How they follow from the tables](results.md#reduced-data) of a sweep.\n{UNITS}\n{}",
             tables.join("\n")
         );
         assert_documented("reduced-tables.md", &text);

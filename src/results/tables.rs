@@ -194,7 +194,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::documented::assert_documented;
     use crate::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
-    use crate::table::columns::{Row, markdown};
+    use crate::table::columns::{Row, UNITS, markdown};
     use std::collections::HashSet;
 
     pub(crate) fn slip(number: u64) -> Slip {
@@ -234,8 +234,7 @@ pub(crate) mod tests {
             markdown::<ContactRow>(),
         ];
         let text = format!(
-            "# Tables\n\nUnits are SI. Every file of a table has these columns in this order; units and meanings are \
-             also in its metadata.\n\n{}",
+            "# Tables\n\nThe columns of every file of a table, in order; units and meanings are also in its metadata.\n{UNITS}\n{}",
             tables.join("\n")
         );
         assert_documented("tables.md", &text);

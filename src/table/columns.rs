@@ -158,23 +158,46 @@ macro_rules! part {
 }
 pub(crate) use part;
 
-/// The section of a table in the documentation, in Markdown.
+/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
+/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
 #[must_use]
 pub fn markdown<T: Table>() -> String {
-    let row = |column: Column| {
-        let kind = match column.kind {
-            Kind::Real => "real",
+    let is_parameter = |column: &Column| {
+        Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
+    };
+    let share_a_line = |one: &Column, next: &Column| {
+        let is_pair = one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
+        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
+    };
+    let line = |columns: &[Column]| {
+        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
+        let names = names.join(" ");
+        let Column { unit, meaning, kind, nullable, .. } = &columns[0];
+        if is_parameter(&columns[0]) {
+            return format!("| {names} | | [parameters](model.md#parameters) |\n");
+        }
+        let unit = match kind {
+            Kind::Real if unit.is_empty() => "1",
+            Kind::Real => unit,
             Kind::Count => "count",
             Kind::Flag => "flag",
             Kind::Text => "text",
         };
-        let nullable = if column.nullable { ", may be null" } else { "" };
-        let Column { name, unit, meaning, .. } = column;
-        format!("| `{name}` | {kind}{nullable} | {unit} | {} |\n", meaning.replace('|', "\\|").replace('<', "\\<"))
+        let nullable = if *nullable { "?" } else { "" };
+        let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
+        format!("| {names} | {unit}{nullable} | {meaning} |\n")
     };
-    let rows: String = T::columns().into_iter().map(row).collect();
-    format!("## {}\n\n{}.\n\n| column | type | unit | meaning |\n|---|---|---|---|\n{rows}", T::NAME, T::MEANING)
+    let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
+    format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
 }
+
+/// How the meaning of the lower end of an interval begins.
+const LOWER_END: &str = "lower end of";
+
+/// How the pages of tables show units and kinds.
+#[cfg(test)]
+pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
+    A `?` marks columns that may be null.\n";
 
 /// Describes the columns of a row type: see the head of `table/columns.rs`.
 macro_rules! columns {
@@ -387,6 +410,6 @@ pub(crate) mod tests {
     fn the_documentation_has_a_line_for_each_column() {
         let text = markdown::<Readings>();
         assert!(text.starts_with("## readings\n\nOne row per reading.\n"), "{text}");
-        assert!(text.contains("| `phase` | real, may be null | rad | phase of the onset |\n"), "{text}");
+        assert!(text.contains("| `phase` | rad? | phase of the onset |\n"), "{text}");
     }
 }

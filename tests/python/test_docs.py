@@ -1,8 +1,11 @@
-"""The documentation names every parameter and every column, its sweep files run, and its links lead somewhere."""
+"""The documentation names every parameter and every column, its commands and sweep files run, its links lead somewhere."""
 
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 
 import pyarrow.parquet as pq
 import pytest
@@ -50,7 +53,7 @@ def test_every_column_of_a_simulation_is_documented(stickslip, tmp_path):
     files = {flag: tmp_path / f"{flag}.parquet" for flag in ("trace", "map", "contacts")}
     flags = [argument for flag, file in files.items() for argument in (f"--{flag}", file)]
     stickslip("simulate", "--set", "N=9", "--time", 0.01, *flags)
-    text = (ROOT / "docs" / "results.md").read_text()
+    text = (ROOT / "docs" / "commands.md").read_text()
     for flag, file in files.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `--{flag}` |"))
         for field in pq.read_schema(file):
@@ -69,7 +72,7 @@ def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):
         "compact": ("compact", copy),
         "simulate": ("simulate", "--set", "N=9", "--time", 0.01),
     }
-    text = (ROOT / "docs" / "results.md").read_text()
+    text = (ROOT / "docs" / "commands.md").read_text()
     for command, arguments in outputs.items():
         row = next(line for line in text.splitlines() if line.startswith(f"| `{command}` |"))
         for field in json.loads(stickslip(*arguments, "--json").stdout):
@@ -83,8 +86,90 @@ def test_the_sweep_files_in_the_documentation_can_run(stickslip, tmp_path, text)
     stickslip("plan", sweep)
 
 
+def test_the_tutorial_runs_as_written(program, tmp_path):
+    (tmp_path / "stickslip").symlink_to(program.resolve())
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    duckdb = "import duckdb, sys; rows = duckdb.sql(sys.argv[1]).fetchall(); assert len(rows) == 3, rows"
+    shells = {
+        "sh": ["bash", "-euc"],
+        "python": [sys.executable, "-c"],
+        "sql": [sys.executable, "-c", duckdb],
+    }
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / "docs" / "tutorial.md").read_text(), re.M | re.S)
+    assert {language for language, _ in blocks} == {"toml", "text", *shells}
+    printed = ""
+    for language, block in blocks:
+        if language == "toml":
+            (tmp_path / "tour.toml").write_text(block)
+        elif language == "text":
+            # Predictions depend on the number of cores.
+            lines = [line for line in block.splitlines() if "predicted" not in line and line != "..."]
+            assert [line for line in lines if line not in printed] == []
+        else:
+            command = [*shells[language], block]
+            done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+            assert done.returncode == 0, f"{block}\n{done.stdout}\n{done.stderr}"
+            printed += done.stdout
+    assert (tmp_path / "results/tour/figures/tau-histograms.png").exists()
+    assert (tmp_path / "trace.svg").exists()
+
+
+def commands(page):
+    """The commands of `stickslip` on a page, in blocks and in lines, with values for what stands for one."""
+    text = page.read_text()
+    blocks = "".join(re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S))
+    found = re.findall(r"^(?:exec )?stickslip (.*?)(?: -- .*| [>#] .*)?$", blocks, re.M)
+    found += re.findall(r"`stickslip ([^`]+)`", text)
+    found += re.findall(r"^    stickslip (.*?)(?:   .*)?$", text, re.M)
+    return [command.replace("SHELL", "bash") for command in found if not command.startswith("COMMAND")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_commands_in_the_documentation_can_be_given(program, page):
+    for command in commands(page):
+        # With --help, what precedes it is parsed, and nothing is done.
+        done = subprocess.run([program, *command.split(), "--help"], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0 and done.stdout, f"{name(page)}: stickslip {command}\n{done.stderr}"
+    for script in re.findall(r"\bscripts/[\w-]+", page.read_text()):
+        assert os.access(ROOT / script, os.X_OK), f"{name(page)} names {script}"
+
+
+def test_the_readme_has_the_commands_for_the_figure_and_the_tests():
+    text = (ROOT / "README.md").read_text()
+    assert "scripts/fig3" in text
+    assert "scripts/test " in text
+    assert "10.1103/PhysRevLett.107.024301" in text
+    assert len(commands(ROOT / "docs" / "guide.md")) > 8
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_lines_outside_tables_have_at_most_120_characters(page):
+    for number, line in enumerate(page.read_text().splitlines(), 1):
+        assert len(line) <= 120 or line.startswith("|"), f"{name(page)}:{number}: {len(line)} characters"
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text()):
-        if not target.startswith(("http://", "https://")):
-            assert (page.parent / target).exists(), f"{name(page)} links to {target}"
+    for target in re.findall(r"\]\(([^)\s]+)[^)]*\)", page.read_text()):
+        path, _, anchor = target.partition("#")
+        if path.startswith(("http://", "https://")):
+            continue
+        linked = page.parent / path if path else page
+        assert linked.exists(), f"{name(page)} links to {target}"
+        assert not anchor or anchor in anchors(linked), f"{name(page)} links to {target}"
+
+
+def test_pages_named_in_sources_exist():
+    folders = ("src", "scripts", "sweeps", "python", "tests")
+    files = [file for folder in folders for file in (ROOT / folder).rglob("*") if file.suffix in ("", ".rs", ".py", ".toml")]
+    assert len(files) > 100
+    for file in files:
+        if file.is_file() and "__pycache__" not in file.parts:
+            for page in re.findall(r"docs/[\w-]+\.md", file.read_text(errors="replace")):
+                assert (ROOT / page).exists(), f"{name(file)} names {page}"

@@ -43,15 +43,13 @@ def document(results: Path) -> str:
     parts = [
         "# Validation",
         paragraph(
-            "Written by `scripts/reproduce` from measured results; no measured number here is typed by hand.",
-            "Brackets hold 95 % intervals: the jackknife over seeds with Student's t, or the bootstrap over parameter"
-            " sets or seeds where a statistic is not smooth"
-            " ([`stickslip_analysis.statistics`](../python/stickslip_analysis/statistics.py)).",
-            "Slips of one job are correlated, jobs are not; so seeds and sets are what is left out or drawn again.",
-            "Differences between parameter sets are taken seed by seed, as equal seeds have the same contacts.",
-            "Where the paper gives no number, the criterion is a choice and stands beside the result.",
-            "*Kinematics* is what slips show that come at a random load among those that exceed all before:"
-            " they are bunched in φ for η > 1, and their intervals near multiples of T, without any locking.",
+            "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
+            "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
+            " is not smooth ([`statistics.py`](../python/stickslip_analysis/statistics.py)).",
+            "Differences between sets are taken seed by seed, since equal seeds have the same contacts.",
+            "Where the paper gives no number, the criterion is a choice.",
+            "*Random loads* are slips that come at a random load among those that exceed all before: without any locking"
+            " they are bunched in φ for η > 1, and their intervals near multiples of T.",
         ),
         table(summary),
         "## The paper's statements",

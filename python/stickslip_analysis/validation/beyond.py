@@ -25,7 +25,7 @@ WHOLE_WINDOW = 1.014
 
 def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
     """Whether intervals follow a period that changes slowly, and whether they remember where it came from."""
-    title = f"Drag: the period changed slowly within one run, Δ = {amplitude}"
+    title = f"Drag: T changed slowly within one run, Δ = {amplitude}"
     section = Section(title, f"`sweeps/{sweep}.toml`", sweep)
     slips = Sweep(results / sweep).slips()
     slips = slips[slips["interval"].notna() & (slips["onset"] < 2 * slips["ramp_time"])]
@@ -33,34 +33,20 @@ def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
     slips = slips.assign(is_up=slips["onset"] < slips["ramp_time"], bin=numpy.digitize(slips["T_onset"], edges[1:-1]))
     near = share(near_whole(slips["interval"] / slips["T_onset"]), slips["seed"])
     section.check(
-        "T changed during a run drags τ with it (page 3)",
-        "more than 0.5 of the intervals within 0.1 T of nT, while T changes",
+        "T drags τ with it (page 3)",
+        "more than 0.5 of the intervals within 0.1 T of nT while T changes",
         near.text(),
         near.low > 0.5,
     )
     differences = []
-    for (low, high), (_, mine) in zip(pairwise(edges), slips.groupby("bin"), strict=True):
-        up, down = mine[mine["is_up"]], mine[~mine["is_up"]]
-        differences.append(difference(down, up, "n"))
-        section.rows.append(
-            {
-                "T (ms)": f"{1e3 * low:.1f} to {1e3 * high:.1f}",
-                "median τ (ms), T up": f"{1e3 * up['interval'].median():.1f}",
-                "median τ (ms), T down": f"{1e3 * down['interval'].median():.1f}",
-                "mean n, T up": f"{up['n'].mean():.2f}",
-                "mean n, T down": f"{down['n'].mean():.2f}",
-                "n down − n up, paired by seed": differences[-1].text(2),
-            }
-        )
+    for _, mine in slips.groupby("bin"):
+        differences.append(difference(mine[~mine["is_up"]], mine[mine["is_up"]], "n"))
     means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
     whole = mean((means[False] - means[True]).groupby("seed").mean())
     section.remark(
-        "Hysteresis: n while T goes down differs from n while T goes up, beyond its 95 % interval,"
-        f" in {sum(one.excludes_zero() for one in differences)} of {len(differences)} bins of T"
-        f" (by chance about {0.05 * len(differences):.1f}), and by {whole.text(3)} averaged over the bins.",
-        "So where T came from leaves a trace, of a small part of a period."
-        if whole.excludes_zero()
-        else "No memory of where T came from is seen: n is drawn again at each slip, and follows T alike up and down.",
+        f"Hysteresis: n while T falls minus n while T rises is {whole.text(3)} in the mean, and beyond its interval in"
+        f" {sum(one.excludes_zero() for one in differences)} of {len(differences)} bins of T"
+        f" (by chance {0.05 * len(differences):.1f}): {'a small memory' if whole.excludes_zero() else 'no memory is seen'}.",
     )
     return section
 
@@ -88,11 +74,11 @@ def locking_map(results: Path) -> Section:
             {
                 "η": f"{low:g} to {high:g}",
                 "sets": len(mine),
-                "share with locked phases": mean(mine["locked"].astype(float)).text(2),
-                "of slips at random loads": f"{mine['chance'].mean():.2f}",
-                f"mean locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text() if len(short) > 1 else "",
-                "beyond that of slips at random loads": mean(short - expected).text() if len(short) > 1 else "",
-                f"share of these above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
+                "locked by φ": mean(mine["locked"].astype(float)).text(2),
+                "random loads": f"{mine['chance'].mean():.2f}",
+                f"locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text(2) if len(short) > 1 else "",
+                "beyond random loads": mean(short - expected).text(2) if len(short) > 1 else "",
+                f"above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
             }
         )
     natural = without_modulation(Sweep(results / "fig2").slips())["interval"]
@@ -102,12 +88,11 @@ def locking_map(results: Path) -> Section:
     over = sets[(sets["eta"] > 1) & (sets["eta"] < 2)]
     section.remark(
         f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
-        "Slips at random loads that exceed all before count as locked by their phases, too:"
-        f" {over['chance'].mean():.2f} of the sets for η from 1 to 2, where {over['locked'].mean():.2f} are locked.",
-        f"Below η = 1 they give {under['chance'].sum():.0f} of {len(under)}, and {under['locked'].sum()} are locked;"
-        f" by the load phase φ + η cos φ, in which random loads are uniform, {in_load.sum()} are.",
-        f"Random loads leave out that τ varies little: even without modulation its locking index is"
-        f" {locking_index(29 * natural):.2f} at 29 Hz, so not all that is beyond random loads is locking.",
+        f"For η from 1 to 2 {over['locked'].mean():.2f} are locked by φ, random loads {over['chance'].mean():.2f}; below 1"
+        f" {under['locked'].sum()} of {len(under)}, random loads {under['chance'].sum():.0f}, and by the load phase"
+        f" {in_load.sum()}.",
+        "Not all beyond random loads is locking, as τ varies little: unmodulated, its locking index is"
+        f" {locking_index(29 * natural):.2f} at 29 Hz.",
     )
     # How well a tongue locks may depend on where τ without modulation lies between two multiples of T.
     tongues = sets[(sets["eta"] > 1) & (sets["eta"] < 3)]
@@ -118,9 +103,9 @@ def locking_map(results: Path) -> Section:
     ]
     matters = max(one.low for one in quarters) > min(one.high for one in quarters)
     section.remark(
-        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the interval without modulation,"
-        f" τ_0 = {natural.mean():.4f} s, lies between two multiples of T: for τ_0/T modulo 1 in the four quarters of a"
-        f" turn the mean locking index is {', '.join(one.text(2) for one in quarters)}."
+        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the unmodulated interval,"
+        f" {natural.mean():.4f} s, lies between multiples of T: in the four quarters of a period the locking index is"
+        f" {', '.join(one.text(2) for one in quarters)}."
     )
     return section
 
@@ -150,62 +135,54 @@ def staircase(results: Path) -> Section:
         medians, on_step = median_periods(mine)
         shares[amplitude] = jackknife(lambda rows: median_periods(rows)[1].mean(), mine)
         rises.append(f"{(medians[on_step].round().diff() > 0).sum()} times at {1e6 * amplitude:.1f} µm")
-        stated = "share of the periods T whose median τ is within 0.05 T of nT"
+        stated = "on a step"
         steps = {f"n = {n}: T (ms)": stretches(on_step & (medians.round() == n)) for n in range(1, 7)}
         section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", stated: shares[amplitude].text(2)} | steps)
     weakest, strongest = min(shares), max(shares)
     widens = shares[strongest].low > shares[weakest].high
     section.remark(
-        "By chance the share would be 0.1.",
-        f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude:"
-        f" {shares[weakest].text(2)} of the periods lie on one at {1e6 * weakest:.1f} µm,"
-        f" {shares[strongest].text(2)} at {1e6 * strongest:.1f} µm.",
-        f"As T grows n should fall from step to step; it rises again {', '.join(rises)}, over {slips['T'].nunique()}"
-        " periods: steps of neighbouring n overlap, since each slip draws its n.",
-        "Only steps of whole n are looked for; a median halfway between two means that slips take both in turn or at"
-        " random.",
+        f"A period T is on a step if the median τ is within 0.05 T of nT: 0.1 are by chance, of {slips['T'].nunique()}.",
+        f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude.",
+        f"As T grows n should fall from step to step; it rises {', '.join(rises)}: steps of neighbouring n overlap.",
     )
     return section
 
 
-def dependence(results: Path, *, sweep: str, column: str, what: str, digits: int = 0) -> Section:
+def dependence(results: Path, *, sweep: str, column: str, what: str, symbol: str, digits: int = 0) -> Section:
     """How interval and locking depend on a parameter of the interface."""
     section = Section(f"Locking against {what}", f"`sweeps/{sweep}.toml`, Δ = 1 µm", sweep)
     slips = Sweep(results / sweep).slips()
     slips = slips.assign(disorder=slips["dfs"] / slips["fs"])
-    weakest = {}
+    weakest = []
     for value, mine in slips.groupby(column):
         still = select(mine, Delta=0.0)
         tau = jackknife(lambda rows: 1e3 * rows["interval"].mean(), still)
         spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), still)
-        lengths = {
-            f"resultant length of φ at {frequency} Hz": jackknife(
-                lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency)
-            )
+        lengths = (
+            jackknife(lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency))
             for frequency in FREQUENCIES
-        }
-        shown = f"{value:.{digits}f}"
-        weakest[shown] = min(lengths.values(), key=lambda length: length.value)
-        section.rows.append(
-            {what: shown, "τ without modulation (ms)": tau.text(1), "its s.d. over mean": spread.text(2)}
-            | {head: length.text(2) for head, length in lengths.items()}
         )
-    locked = [shown for shown, length in weakest.items() if length.low > 0.5]
-    where = "all of these values" if len(locked) == len(weakest) else ", ".join(locked) or "none of these values"
+        weakest.append(min(lengths, key=lambda length: length.value))
+        section.rows.append(
+            {
+                symbol: f"{value:.{digits}f}",
+                "τ unmodulated (ms)": tau.text(1),
+                "s.d. over mean": spread.text(2),
+                "least resultant of φ": weakest[-1].text(2),
+            }
+        )
+    locked = [row[symbol] for row, length in zip(section.rows, weakest, strict=True) if length.low > 0.5]
+    where = "everywhere" if len(locked) == len(weakest) else f"at {', '.join(locked)}" if locked else "nowhere"
     section.remark(
-        "The phases are locked at all three frequencies (resultant length above 0.5 beyond its 95 % interval)"
-        f" at {where}.",
-        "At its weakest the resultant length is "
-        + ", ".join(f"{length.text(2)} at {shown}" for shown, length in weakest.items())
-        + ".",
+        f"At {', '.join(map(str, FREQUENCIES))} Hz phases are locked {where} (resultant and interval above 0.5)."
     )
     return section
 
 
 DEPENDENCES = (
-    partial(dependence, sweep="size", column="N", what="the number of blocks N"),
-    partial(dependence, sweep="contacts", column="Ns", what="the number of contacts per block N_s"),
-    partial(dependence, sweep="disorder", column="disorder", what="the disorder of the thresholds Δf_s/f_s", digits=3),
+    partial(dependence, sweep="size", column="N", what="the number of blocks", symbol="N"),
+    partial(dependence, sweep="contacts", column="Ns", what="the contacts per block", symbol="N_s"),
+    partial(dependence, sweep="disorder", column="disorder", what="the disorder", symbol="Δf_s/f_s", digits=3),
 )
 
 
@@ -215,42 +192,41 @@ def choices(results: Path) -> Section:
     section = Section("What the model's choices change", source, "choices")
     sweep = Sweep(results / "choices")
     slips = sweep.slips()
+    changes = []
     for name, values in (
-        ("no modulation", {"Delta": 0.0}),
-        ("29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
-        ("58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
-        ("Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
+        ("without modulation", {"Delta": 0.0}),
+        ("at 29 Hz", {"Delta": 1e-6, "T": 1 / 29}),
+        ("at 58 Hz", {"Delta": 1e-6, "T": 1 / 58}),
+        ("at Δ = 5 µm, 200 Hz", {"Delta": 5e-6, "T": 1 / 200}),
     ):
         tension, magnitude = (select(slips, break_on=rule, **values) for rule in ("tension", "magnitude"))
         change = difference(tension, magnitude, "interval").scaled(1e3)
         pairs = tension.merge(magnitude, on=["seed", "slip"], suffixes=("", "_other"))
         same = (pairs["interval"] == pairs["interval_other"]).mean()
-        section.item(
-            f'`break_on = "tension"` instead of `"magnitude"`, {name}: mean τ differs by {change.text(3)} ms, paired'
-            " by seed;"
-            f" {100 * same:.0f} % of {len(pairs)} intervals are the same to the last bit."
-        )
+        changes.append(f"{change.text(3)} ms {name} ({100 * same:.0f} %)")
+    section.item(
+        '`break_on = "tension"` changes mean τ, and leaves a share of the intervals as they are to the last bit:'
+        f" {'; '.join(changes)}."
+    )
     still = select(slips, Delta=0.0, break_on="magnitude")
     precursors = of_same_jobs(sweep.table("precursors"), still)
     counts = (f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
     section.item(
-        "`precursor_size`: precursors per slip without modulation, by the minimum number of breaks:"
-        f" {', '.join(counts)}."
+        f"`precursor_size`: precursors per slip by their least number of breaks: {', '.join(counts)}."
     )
     phases = Sweep(results / "fig3").slips()
     phases = phases[phases["eta"] > WHOLE_WINDOW]
     past = phases["phase"] - numpy.arcsin(1 / phases["eta"])
     section.item(
         f"Window of the phase: {100 * (past > 0).mean():.2f} % of the slips of `fig3` at η > {WHOLE_WINDOW} lie past"
-        f" Φ_max, by at most {past.max():.3f} rad; the window reaches 0.5 rad past it."
+        f" Φ_max, by at most {past.max():.3f} rad of 0.5."
     )
     startup = Sweep(results / "startup").reduced("startup")
     p = startup[["interval_holm_p", "drop_holm_p"]].min(axis=1)
     needed = startup["slip"][p < 0.05].max() + 1 if (p < 0.05).any() else 0
     section.item(
-        f"Start-up (`discard`; F_S(0) = 0): over {startup['set_id'].nunique()} sets of {startup['jobs'].max()} seeds,"
-        " intervals and stress drops differ from those of slips 20 on (Mann-Whitney, Holm's correction, 5 %)"
-        f" in the first {needed} slips; from then on the smallest corrected p is"
+        f"Start-up (`discard`): in {startup['set_id'].nunique()} sets of {startup['jobs'].max()} seeds the first {needed}"
+        " slips differ from those from 20 on (Mann-Whitney, Holm's correction, 5 %); after them the least p is"
         f" {p[startup['slip'] >= needed].min():.2f}."
     )
     return section
@@ -265,12 +241,11 @@ def energies(results: Path) -> Section:
         section.rows.append(
             {
                 "modulation": "none" if numpy.isnan(period) else f"{1 / period:.0f} Hz",
-                "work of the drive per slip (mJ)": mean(1e3 * mine.groupby("seed")["drive_work"].mean()).text(2),
-                "share lost in broken contacts": broken.text(3),
+                "work per slip (mJ)": mean(1e3 * mine.groupby("seed")["drive_work"].mean()).text(2),
+                "lost in broken contacts": broken.text(3),
             }
         )
     section.remark(
-        "The rest is lost in damping; what the springs store comes back from slip to slip.",
-        "The paper introduces damping to avoid artificial vibrations of the blocks; it takes most of the energy.",
+        "The rest is lost in damping, which the paper introduces to avoid artificial vibrations of the blocks.",
     )
     return section

@@ -54,7 +54,7 @@ class Section:
             "statement": self.title,
             "verdict": verdict.word,
             "why": verdict.reason,
-            "checks that agree": f"{agree} of {len(self.checks)}",
+            "checks": f"{agree}/{len(self.checks)}",
         }
 
     def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
@@ -73,9 +73,13 @@ class Section:
         """The section, with the checks before the table."""
         parts = [f"### {self.title}", f"From {self.source}."]
         if self.picture:
-            parts.append(f"![{self.title}](../results/{self.picture}.png)")
+            parts.append(f"![{self.picture}](../results/{self.picture}.png)")
         if self.checks:
-            parts.append(table([check.row() for check in self.checks]))
+            rows = [check.row() for check in self.checks]
+            for before, check, row in zip(self.checks, self.checks[1:], rows[1:], strict=False):
+                if check.criterion == before.criterion:
+                    row["agrees if"] = "the same"
+            parts.append(table(rows))
         if self.rows:
             parts.append(table(self.rows))
         return "\n\n".join(parts + self.remarks)

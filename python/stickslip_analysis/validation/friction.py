@@ -10,7 +10,7 @@ from scipy import stats
 from ..statistics import Estimate, difference, jackknife, share
 from ..tables import Sweep, parameters, read, select
 from .document import Section, Verdict
-from .intervals import LARGE, of_same_jobs, without_modulation
+from .intervals import LARGE, without_modulation
 from .kinematics import under_minimum
 
 #: Frequencies in Hz at which friction is compared.
@@ -33,9 +33,10 @@ def friction(results: Path) -> Section:
             f: difference(select(jobs, Delta=amplitude, T=1 / f), still, "mean_friction").scaled(100 / reference)
             for f in FREQUENCIES
         }
-        section.rows.append(
-            {"K_d Δ / F_m": f"{ratio:.3f}"} | {f"change at {f} Hz (%)": change.text(1) for f, change in changes.items()}
-        )
+        # Half of the amplitudes show the curve; the figure has all.
+        if len(curves[FREQUENCIES[0]]) % 2:
+            cells = {f"% at {f} Hz": change.text(1) for f, change in changes.items()}
+            section.rows.append({"K_d Δ / F_m": f"{ratio:.3f}"} | cells)
         for f, change in changes.items():
             curves[f].append((ratio, change.value))
     tenth = {f: first_below(curve, -10) for f, curve in curves.items()}
@@ -45,15 +46,10 @@ def friction(results: Path) -> Section:
         f"from {tenth[f]:.2f} at {f} Hz" for f in (min(tenth, key=tenth.get), max(tenth, key=tenth.get))
     )
     section.remark(
-        "Weak modulation raises friction: locked slips wait for a maximum of the load, the next multiple of T, and"
-        " the force keeps growing meanwhile.",
-        f"At 29 Hz and ΔF/F_m = {stiffness * 6e-7 / peak:.2f} the mean interval is {waits:.0f} ms instead of"
-        f" {free:.0f} ms.",
-        f"Strong modulation lowers it by 10 %, {weakest} and {strongest}.",
-    )
-    section.remark(
         f"F_m = {peak:.1f} N is the mean peak force, {reference:.1f} N the mean friction at Δ = 0.",
-        "Differences are taken seed by seed.",
+        "Weak modulation raises friction: locked slips wait for a maximum of the load while the force grows, at 29 Hz and"
+        f" ΔF/F_m = {stiffness * 6e-7 / peak:.2f} for {waits:.0f} ms instead of {free:.0f} ms.",
+        f"Strong modulation lowers it, by 10 % {weakest} and {strongest}.",
     )
     return section
 
@@ -70,25 +66,24 @@ def at_velocities(section: Section, sweep: Sweep) -> None:
         small = changes[(changes.index > 0.04) & (changes.index < 0.11)]
         least, most = small["50%"].min(), small["50%"].max()
         section.check(
-            f"at the amplitudes of Fig. 3 (ΔF/F_m from 0.05 to 0.1) the effect is negligible, V0 = {velocity:g} m/s",
-            "mean friction changed by less than 10 % at the median of eight frequencies from 15 to 300 Hz",
-            f"by {least:.1f} to {most:.1f} %; at single frequencies by {small['min'].min():.1f} to"
+            f"negligible effect at the amplitudes of Fig. 3, ΔF/F_m from 0.05 to 0.1, V0 = {velocity:g} m/s",
+            "mean friction changes by less than 10 %, median of eight frequencies",
+            f"{least:.1f} to {most:.1f} %; at single frequencies {small['min'].min():.1f} to"
             f" {small['max'].max():.1f} %".replace("-", "−"),
             max(abs(least), abs(most)) < 10,
         )
         threshold = first_below(list(changes["50%"].items()), -20)
         changed[velocity] = f"{least:.0f} to {most:.0f} %".replace("-", "−")
         section.check(
-            f"a significant reduction needs ΔF/F_m > 0.2 to 0.3, V0 = {velocity:g} m/s",
-            "reduced by 20 % at the median of these frequencies between 0.2 and 0.3",
-            f"at {threshold:.2f}; at 0.5 by {changes['50%'].iloc[-1]:.0f} %".replace("-", "−"),
+            f"significant reduction from ΔF/F_m of 0.2 to 0.3 on, V0 = {velocity:g} m/s",
+            "20 % less, in the median, between 0.2 and 0.3",
+            f"at {threshold:.2f}; {changes['50%'].iloc[-1]:.0f} % at 0.5".replace("-", "−"),
             0.2 <= threshold <= 0.3,
         )
     slow, fast = min(changed), max(changed)
     section.verdict = Verdict(
         f"holds for V0 = {fast:g} m/s",
-        f"at ΔF/F_m from 0.05 to 0.1 the median change over eight frequencies is {changed[slow]} at {slow:g} m/s,"
-        f" {changed[fast]} at {fast:g} m/s",
+        f"the median change at small amplitudes is {changed[slow]} at {slow:g} m/s, {changed[fast]} at {fast:g} m/s",
     )
 
 
@@ -121,52 +116,46 @@ def slow_fronts(results: Path) -> Section:
     slow, fast = {}, {}
     for frequency in (None, 29, 58, 116, 200):
         mine = select(slips, Delta=1e-6, frequency=frequency) if frequency else select(slips, Delta=0.0)
-        reaches = of_same_jobs(large, mine)["reach"].quantile([0.5, 0.25, 0.75])
         slow[frequency], fast[frequency], count = (
             jackknife(lambda rows: rows[column].mean(), mine) for column in ("slow", "fast", "precursors")
         )
         section.rows.append(
             {
                 "modulation": f"{frequency} Hz" if frequency else "none",
-                "slips": len(mine),
-                "share with a slow front": slow[frequency].text(2),
-                f"share with a large precursor (at least {LARGE} breaks)": fast[frequency].text(2),
-                "blocks reached by these, median and quartiles": "{:.0f} ({:.0f} to {:.0f})".format(*reaches),
-                "precursors per slip (at least 20 breaks)": count.text(2),
+                "with a slow front": slow[frequency].text(2),
+                f"with a precursor of {LARGE} breaks": fast[frequency].text(2),
+                "precursors per slip": count.text(2),
             }
         )
     for frequency in (29, 58, 116, 200):
         section.check(
-            f"perturbations eliminate slow fronts, {frequency} Hz",
-            "share of slips with a slow front less than half of that without modulation",
-            f"{slow[frequency].text(2)}, without modulation {slow[None].text(2)}",
+            f"no slow fronts, {frequency} Hz",
+            "fewer than half as many slips have one as unmodulated",
+            f"{slow[frequency].value:.2f}, unmodulated {slow[None].value:.2f}",
             slow[frequency].high < 0.5 * slow[None].low,
         )
     section.check(
-        "slow fronts give way to fast rupture, 58 Hz",
-        "share of slips with a large precursor higher than without modulation",
-        f"{fast[58].text(2)}, without modulation {fast[None].text(2)}",
+        "... but fast rupture, 58 Hz",
+        f"more slips with a precursor of {LARGE} breaks than unmodulated",
+        f"{fast[58].value:.2f}, unmodulated {fast[None].value:.2f}",
         fast[58].low > fast[None].high,
     )
     section.remark(
-        f"A *slow front* is counted where, within {1e3 * FRONT_TIME:.0f} ms before a slip, {FRONT_STEPS} or more"
-        f" precursors of fewer than {LARGE} breaks (ten blocks' worth) follow one another over more than"
-        f" {1e3 * FRONT_TIME / 5:.0f} ms: the detached region then grows in small steps.",
-        "This cut was chosen on other seeds than those counted here.",
-        "At 200 Hz a period is shorter than such a front.",
+        f"A *slow front* is {FRONT_STEPS} or more precursors of fewer than {LARGE} breaks (ten blocks' worth) over more than"
+        f" {1e3 * FRONT_TIME / 5:.0f} ms, within {1e3 * FRONT_TIME:.0f} ms before a slip; this cut was chosen on other seeds.",
     )
     still = select(slips, Delta=0.0)
     slow_speed, fast_speed = (still[column].median() for column in ("slow_front_speed", "front_speed"))
     section.check(
-        "slow fronts are some two orders of magnitude slower than fast ones",
-        "ratio of the median speeds without modulation from 30 to 300",
+        "slow fronts are two orders of magnitude slower",
+        "ratio of median speeds, unmodulated, from 30 to 300",
         f"{slow_speed:.1f} m/s, {fast_speed:.0f} m/s",
         30 <= fast_speed / slow_speed <= 300,
     )
     first = still["nucleation_block"]
     section.check(
         "ruptures start at the loaded edge",
-        "more than half of the slips begin in a tenth of the blocks there, 1 to 7",
+        "more than half of the slips begin in blocks 1 to 7",
         f"{(first <= 7).mean():.2f} of {len(first)}; in blocks 1 to 10 {(first <= 10).mean():.2f}",
         (first <= 7).mean() > 0.5,
     )
@@ -174,7 +163,7 @@ def slow_fronts(results: Path) -> Section:
     gone = [f for f in (29, 58, 116, 200) if slow[f].high < 0.5 * slow[None].low]
     section.verdict = Verdict(
         f"holds for {', '.join(map(str, gone))} Hz",
-        "at 200 Hz slow fronts remain, as staircases, arrested in each period: it is shorter than a front"
+        "at 200 Hz slow fronts remain, arrested in each period, which is shorter than a front"
         if 200 not in gone
         else "",
     )
@@ -196,13 +185,13 @@ def arrest(section: Section, small: pandas.DataFrame) -> None:
 
         last, chance = outside(rows, "last"), outside(still, "last")
         begins.append(f"{outside(rows, 'nucleation').value:.3f}")
-        found.append(f"{last.text(2)} at {frequency} Hz, by chance {chance.value:.2f}")
+        found.append(f"{last.text(2)} of {chance.value:.2f} at {frequency} Hz")
         agrees = agrees and last.high < 0.5 * chance.low
     section.check(
         "slow fronts are arrested for φ < φ_min",
-        f"fewer than half as many precursors of fewer than {LARGE} breaks have their last break under φ_min or on"
-        " falling load as by chance, which is the same clock on the precursors without modulation",
-        f"{'; '.join(found)}; of first breaks {', '.join(begins)}",
+        f"fewer than half as many precursors of fewer than {LARGE} breaks end below φ_min or on falling load as by"
+        " chance, the same clock on unmodulated precursors",
+        f"{'; '.join(found)}; first breaks {', '.join(begins)}",
         agrees,
     )
 
@@ -246,22 +235,20 @@ def edge(results: Path) -> Section:
     of_strength = [part * peak * carried / strength for part in (0.04, 0.05)]
     section.check(
         "4 to 5 % of modulation overall become 20 % near the edge",
-        "the first block carries at least 5 times the mean of all blocks",
-        f"{given['N'] * carried:.2f} times: 4 to 5 % are"
-        f" {4 * given['N'] * carried:.0f} to {5 * given['N'] * carried:.0f} % of the mean stress",
+        "the first block carries at least 5 times the mean of all",
+        f"{given['N'] * carried:.2f} times",
         given["N"] * carried >= 5,
     )
     section.check(
-        "... of the critical stress, since fast rupture takes 20 % more",
-        "4 to 5 % of the peak force load the first block by at least 20 % of its strength N_s f_s",
+        "... of the critical stress",
+        "4 to 5 % of the peak force load the first block by 20 % of its strength N_s f_s",
         f"{100 * of_strength[0]:.1f} to {100 * of_strength[1]:.1f} % of {strength:.1f} N",
         of_strength[1] >= 0.2,
     )
     section.remark(
-        "Until the first break the model is linear, so a slow modulation spreads over the blocks as the load does:"
-        " a block carries a part of it in proportion to its displacement.",
-        f"The first block carries {carried:.3f} of F_S.",
-        "After precursors the edge holds contacts of different ages; how the modulation spreads then is not recorded.",
+        "Until the first break the model is linear, and a slow modulation spreads over the blocks as their displacement"
+        f" does: the first block carries {carried:.3f} of F_S.",
+        "After precursors it may spread otherwise, which is not recorded.",
     )
     section.verdict = Verdict(
         "holds in part",

@@ -40,38 +40,35 @@ def phase(results: Path) -> Section:
     chance = direction(random_load_phases(lowest, numpy.linspace(0, 1, 1001)))
     section.check(
         "slips appear with a phase of −π for small η",
-        "at the least η > 1 the mean φ is nearer to −π than to −π/2, the mean of slips at random loads for η → 1",
-        f"{start.text(2)} rad at η = {lowest:.2f}; of slips at random loads {chance:.2f} rad".replace("-", "−"),
+        "at the least η > 1 the mean φ is nearer to −π than to −π/2, the limit of random loads",
+        f"{start.text(2)} rad at η = {lowest:.2f}; random loads {chance:.2f} rad".replace("-", "−"),
         start.high < -0.75 * numpy.pi,
     )
     tops = jackknife(lambda rows: direction(rows["first"]), high[high["eta"] > 300], unit="set_id")
     section.check(
         "φ saturates to zero for η ≫ 1",
-        "mean phase of the first breaks within 0.1 rad of 0 for η > 300",
-        f"{tops.text()} rad; of the onsets, which lie between φ_min and Φ_max by definition,"
-        f" {direction(high['phase'][high['eta'] > 300]):.3f} rad".replace("-", "−"),
+        "mean phase of first breaks within 0.1 rad of 0 for η > 300",
+        f"{tops.text()} rad; onsets {direction(high['phase'][high['eta'] > 300]):.3f} rad".replace("-", "−"),
         max(-tops.low, tops.high) < 0.1,
     )
     is_late = high["nucleation"] > high["onset"]
     late, others = high[is_late], high[~is_late]
     section.remark(
-        "The onset is a largest load by definition, so it cannot lie under φ_min but by inertia:"
-        f" a share of {under_minimum(high['phase'], high['eta'], 0.15).mean():.4f} does by more than 0.15 rad.",
-        "The phase of the first break is free; it is taken modulo 2π.",
-        f"A share of {is_late.mean():.3f} of the first breaks at η > 2 come after the onset,"
+        "An onset is a largest load by definition, so only inertia can put it below φ_min:"
+        f" a share of {under_minimum(high['phase'], high['eta'], 0.15).mean():.4f} falls more than 0.15 rad below.",
+        "The first break is free; its phase is taken modulo 2π.",
+        f"At η > 2, {is_late.mean():.3f} of the first breaks come after the onset,"
         f" {((late['nucleation'] - late['onset']) / late['T']).median():.2f} T in the median,"
-        f" {100 * (1 / late['T'] > 100).mean():.0f} % of them at more than 100 Hz.",
-        f"Each of these slips had a precursor, of {late['largest_precursor'].min()} breaks or more, and fewer contacts"
-        f" are attached than before the others, {late['attached_before'].mean():.3f} instead of"
-        f" {others['attached_before'].mean():.3f}.",
-        "So the load seems to break contacts at its maximum without a slip, and the slip begins as it rises again,"
-        " before it is as large: a period is too short for all of them to attach again.",
+        f" {100 * (1 / late['T'] > 100).mean():.0f} % of them above 100 Hz.",
+        f"These slips had precursors of {late['largest_precursor'].min()} breaks or more, and fewer contacts are attached"
+        f" than before others, {late['attached_before'].mean():.3f} instead of {others['attached_before'].mean():.3f}:"
+        " the load seems to break contacts at its maximum, and a period is too short for all to reattach.",
     )
     section.verdict = Verdict(
         "holds in part; for slow drives it follows from kinematics",
-        f"onsets lie above φ_min by definition; by the first break {last.text(2)} of the slips lie under the back-bone"
-        f" for η > 200; φ begins at {start.text(2)}, not −π; below 1e-4 m/s the phases are bunched as those of slips at"
-        f" random loads, {excess['slow'].text()} beyond; from 1e-4 m/s on {excess['fast'].text()} beyond",
+        f"onsets lie above φ_min by definition; of first breaks {last.text(2)} lie below for η > 200; φ begins at"
+        f" {start.text(2)}, not −π; the resultant exceeds that of random loads by {excess['slow'].text()} below"
+        f" 1e-4 m/s, by {excess['fast'].text()} from there on",
     )
     return section
 
@@ -89,8 +86,8 @@ def first_breaks(section: Section, slips: pandas.DataFrame) -> Estimate:
             continue
         under = share(under_minimum(rows["first"], rows["eta"], 0.15), rows["set_id"])
         section.check(
-            f"almost no slip under the back-bone, by the first break, η from {low} to {min(high, 1000)}",
-            "share of slips whose first break is more than 0.15 rad under φ_min below 0.02",
+            f"almost no slip below the back-bone, η from {low} to {min(high, 1000)}",
+            "fewer than 0.02 of the first breaks more than 0.15 rad below φ_min",
             f"{under.text(4)} of {len(rows)}",
             under.high < 0.02,
         )
@@ -108,9 +105,9 @@ def beyond_kinematics(section: Section, sets: pandas.DataFrame) -> dict[str, Est
     ):
         found[name] = mean(rows["resultant_length"] - rows["expected_resultant"])
         section.check(
-            f"above η = 1 slips lock to the modulation, V0 {velocity}",
-            "resultant length of φ beyond that of slips at random loads by more than 0.05, 1 < η < 5",
-            f"{found[name].text()} beyond; {rows['resultant_length'].mean():.3f} in the mean",
+            f"slips lock above η = 1, V0 {velocity}",
+            "resultant of φ exceeds that of random loads by 0.05, 1 < η < 5",
+            f"by {found[name].text()}; mean resultant {rows['resultant_length'].mean():.3f}",
             found[name].low > 0.05,
         )
     return found
@@ -134,11 +131,9 @@ def envelope(slips: pandas.DataFrame) -> tuple[str, str, str, bool]:
     etas = numpy.unique(slips["eta"])
     exact = stats.linregress(numpy.log(etas), numpy.log([-minimum_phase(eta) for eta in etas])).slope
     return (
-        "φ ∝ −η^(−1/2), by the first break",
-        "the interval of the exponent of the lower envelope (2 % quantile, 5 < η < 200) lies within 0.1 of −1/2, which"
-        " excludes −1/3, −2/3 and −1",
-        f"{fitted.text()}; the exact φ_min over the same η gives {exact:.3f}, onsets, which follow it by definition,"
-        f" {exponent(slips, 'phase'):.3f}".replace("-", "−"),
+        "φ ∝ −η^(−1/2)",
+        "exponent of the lower envelope of first breaks (2 % quantile, 5 < η < 200) within 0.1 of −1/2",
+        f"{fitted.text()}; exact φ_min {exact:.3f}, onsets {exponent(slips, 'phase'):.3f}".replace("-", "−"),
         -0.6 < fitted.low and fitted.high < -0.4,
     )
 
@@ -154,14 +149,14 @@ def below_one(results: Path) -> Section:
     section.check(
         "below η = 1 all phases are equally probable",
         "Rayleigh p > 0.01 for η < 0.7",
-        f"p = {rayleigh_p(low['phase']):.1e}, resultant length {resultant_length(low['phase']):.3f} at"
+        f"p = {rayleigh_p(low['phase']):.1e}, resultant {resultant_length(low['phase']):.3f} at"
         f" {direction(low['phase']):.2f} rad, {len(low)} slips".replace(" -", " −"),
         rayleigh_p(low["phase"]) > 0.01,
     )
     load_p = rayleigh_p(load_phase(low))
     section.check(
-        '... "the loading force changes monotonically with time and harmonic oscillations do not influence" the slips',
-        "the same for the load phase φ + η cos φ",
+        "... as the loading force is monotonic and oscillations have no influence",
+        "the same for the load phase",
         f"p = {load_p:.3f}",
         load_p > 0.01,
     )
@@ -173,11 +168,9 @@ def below_one(results: Path) -> Section:
         locked[name] = f"{rows['in_load'].sum()} of {len(rows)}"
         found = proportion(rows["in_load"])
         section.check(
-            f"no phase-locking is observed, V0 {name}",
-            "fewer than 0.05 of the sets with η < 1 locked by the load phase"
-            " (Rayleigh p < 0.001 by effective numbers, resultant length > 0.5)",
-            f"{locked[name]}, {found.text(2)}; by φ {rows['locked'].sum()}, where slips at random loads give"
-            f" {rows['chance'].sum():.1f}",
+            f"no phase-locking, V0 {name}",
+            "fewer than 0.05 of the sets with η < 1 locked by the load phase",
+            f"{locked[name]}, {found.text(2)}; by φ {rows['locked'].sum()}, random loads {rows['chance'].sum():.1f}",
             found.high < 0.05,
         )
     for velocity, rows in sets.groupby("V0"):
@@ -185,38 +178,32 @@ def below_one(results: Path) -> Section:
         section.rows.append(
             {
                 "V0 (m/s)": f"{velocity:.2g}",
-                "sets with η < 1": len(rows),
-                "locked by φ": rows["locked"].sum(),
-                "of slips at random loads": f"{rows['chance'].sum():.1f}",
-                "locked by the load phase": rows["in_load"].sum(),
-                "resultant length of the load phase": f"{resultant_length(load):.3f}",
-                "p, slips taken as independent": f"{rayleigh_p(load):.2g}",
+                f"of {len(rows)} sets locked by φ": rows["locked"].sum(),
+                "by load phase": rows["in_load"].sum(),
+                "its resultant": f"{resultant_length(load):.3f}",
+                "p": f"{rayleigh_p(load):.2g}",
             }
         )
     section.remark(
-        "The first does not hold, and cannot: slips that come at a random *load* have the density 1 − η sin φ in φ,"
-        " since the load changes faster there.",
-        "That is a resultant of η/2 at −π/2, which near η = 1 is itself long enough to count as locked by chance.",
-        "In the load itself, slips of slow drives are uniform: there the modulation does not influence them, which is"
-        " what the paper means.",
+        "The first cannot hold: slips at random loads have the density 1 − η sin φ, with a resultant of η/2 at −π/2.",
+        "Slow drives are uniform in the load phase φ + η cos φ, which is what the paper means.",
+        "p takes slips as independent.",
     )
     lengths = []
     for eta, rows in low.groupby(low["eta"].round(4)):
         length = jackknife(lambda rows: resultant_length(rows["phase"]), rows, unit="set_id")
-        lengths.append(f"{length.text(2)} at η = {eta:.2f} (η/2 = {eta / 2:.2f})")
-    section.remark(f"Resultant length of φ: {'; '.join(lengths)}.")
+        lengths.append(f"{length.text(2)} for {eta / 2:.2f}")
+    section.remark(f"Resultant of φ against η/2: {', '.join(lengths)}.")
     ratios = 1 / sets["periods_mean"][sets["in_load"]]
     section.remark(
-        f"In the {len(ratios)} sets that are locked by the load phase T lies between {ratios.min():.2f} and"
-        f" {ratios.max():.2f} τ, at {ratios.median():.2f} τ in the median.",
-        "The paper asks only whether the load ever falls; why fast drives lock without that was not investigated.",
+        f"In the {len(ratios)} sets locked by the load phase T lies between {ratios.min():.2f} and {ratios.max():.2f} τ"
+        f" (median {ratios.median():.2f}). Why fast drives lock although the load never falls was not investigated.",
     )
     slow_locked, fast_locked = locked.values()
     section.verdict = Verdict(
         "holds for V0 below 1e-4 m/s",
         f"by the load phase {slow_locked} sets are locked there, from 1e-4 m/s on {fast_locked}; by φ"
-        f" {sets['locked'].sum()} of {len(sets)} seem locked, and slips at random loads give"
-        f" {sets['chance'].sum():.0f}",
+        f" {sets['locked'].sum()} of {len(sets)}, random loads {sets['chance'].sum():.0f}",
     )
     return section
 
@@ -233,7 +220,7 @@ def stiff_drive(results: Path) -> Section:
     section.check(*envelope(high))
     section.verdict = Verdict(
         "holds in part",
-        f"the envelope of first breaks has the exponent, but {under.text(2)} of them lie under it for η from 30 to 200",
+        f"the envelope of first breaks has the exponent, but {under.text(2)} of them lie below it for η from 30 to 200",
     )
     for low, high in ((0, 0.7), (1, 2), (2, 5), (5, 20), (20, 100), (100, 1001)):
         mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
@@ -243,7 +230,7 @@ def stiff_drive(results: Path) -> Section:
                 {
                     "η": f"{low} to {min(high, 1000)}",
                     "sets": lengths.units,
-                    "resultant length of φ, mean over sets": lengths.text(2),
+                    "mean resultant of φ": lengths.text(2),
                 }
             )
     return section
