@@ -41,6 +41,11 @@ impl Axis {
         Self::linear_with(label, low, high, 0.5 * MAX_TICKS)
     }
 
+    /// Linear from `low` to `high` with two or three ticks, for strips.
+    pub(super) fn few(label: &str, low: f64, high: f64) -> Self {
+        Self { minor: Vec::new(), ..Self::linear_with(label, low, high, 0.3 * MAX_TICKS) }
+    }
+
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
         let high = above(low, high);
         let step = nice_step((high - low) / max_ticks);
@@ -105,6 +110,14 @@ impl Axis {
         match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Logarithmic => libm::log(value / self.low) / libm::log(self.high / self.low),
+        }
+    }
+
+    /// The value halfway between two others, as the axis places them.
+    pub(super) fn middle(&self, low: f64, high: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => 0.5 * (low + high),
+            Scale::Logarithmic => (low * high).sqrt(),
         }
     }
 

@@ -81,16 +81,45 @@ pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
         Value::Real(real) => three_digits(real),
         value => value.to_string(),
     };
-    format!("{} = {value} {}", description.key, description.unit).trim_end().to_owned()
+    format!("{} = {value} {}", symbol_of(symbol), description.unit).trim_end().to_owned()
 }
 
-fn three_digits(value: f64) -> String {
+/// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
+pub(super) fn symbol_of(symbol: Symbol) -> String {
+    let description = symbol.description();
+    let name = if description.symbol.is_empty() { description.key } else { description.symbol };
+    name.replace("V0", "V₀").replace("_s", "ₛ").replace("_r", "ᵣ")
+}
+
+/// The parameters that all sets have in common, in symbols.
+pub(super) fn common(sets: &[SetSummary]) -> String {
+    let Some(first) = sets.first() else { return String::new() };
+    // What is off, or enters nothing that figures show, is left out.
+    let is_shown = |symbol: &Symbol| {
+        let value = first.parameters.get(*symbol);
+        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && value != Value::Absent
+            && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
+            && sets.iter().all(|set| set.parameters.get(*symbol) == value)
+    };
+    let settings = Symbol::ALL.into_iter().filter(is_shown).map(|symbol| setting(&first.parameters, symbol));
+    settings.collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
     // Through the decimal form, so that 29.000000000000004 is 29.
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+/// A count with commas between thousands.
+pub(super) fn thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    groups.join(",")
 }
 
 /// Values of a swept quantity and how they are spaced.
@@ -105,6 +134,16 @@ impl Grid {
     pub(super) fn of(values: Vec<f64>) -> Self {
         let is_linear = has_even_steps(&values) || values.first().is_none_or(|&least| least <= 0.0);
         Self { values, is_linear }
+    }
+
+    /// Spaced logarithmically. `values` > 0 ascend.
+    pub(super) const fn logarithmic(values: Vec<f64>) -> Self {
+        Self { values, is_linear: false }
+    }
+
+    /// Cells around all values.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (f64, f64)> {
+        (0..self.values.len()).map(|index| self.cell(index))
     }
 
     /// An axis for cells: it ends half a step beyond the values.
@@ -127,7 +166,8 @@ impl Grid {
     pub(super) fn cell(&self, index: usize) -> (f64, f64) {
         let at = |index: usize| if self.is_linear { self.values[index] } else { libm::log(self.values[index]) };
         let last = self.values.len() - 1;
-        let below = if index > 0 { at(index) - at(index - 1) } else { at(1.min(last)) - at(0) };
+        let alone = if last == 0 { 1.0 } else { 0.0 };
+        let below = if index > 0 { at(index) - at(index - 1) } else { at(1.min(last)) - at(0) + alone };
         let above = if index < last { at(index + 1) - at(index) } else { below };
         let (low, high) = (at(index) - 0.5 * below, at(index) + 0.5 * above);
         if self.is_linear { (low, high) } else { (libm::exp(low), libm::exp(high)) }
@@ -135,7 +175,12 @@ impl Grid {
 
     /// The cell around a value of the grid.
     pub(super) fn cell_of(&self, value: f64) -> (f64, f64) {
-        self.cell(self.values.partition_point(|&other| other < value).min(self.values.len() - 1))
+        self.cell(self.index_of(value))
+    }
+
+    /// The index of a value of the grid.
+    pub(super) fn index_of(&self, value: f64) -> usize {
+        self.values.partition_point(|&other| other < value).min(self.values.len() - 1)
     }
 }
 
