@@ -308,7 +308,13 @@ mod tests {
     fn a_scaling_is_drawn_whatever_the_order_of_its_rows_and_not_without_any() {
         let sizes = sizes_of_two();
         let svg = scaling_figure(&ScalingFindings { sizes, exponents: Vec::new() }).unwrap().svg();
-        for name in ["costs: tolerance 1e-6", "costs: tolerance 1e-10", "counts: steps, 1e-6", "counts: steps, 1e-10", "counts: breaks"] {
+        for name in [
+            "costs: tolerance 1e-6",
+            "costs: tolerance 1e-10",
+            "counts: steps, 1e-6",
+            "counts: steps, 1e-10",
+            "counts: breaks",
+        ] {
             assert_eq!(svg.matches(&format!(">{name}<")).count(), 1, "{name}");
         }
         assert!(matches!(scaling_figure(&ScalingFindings::default()), Err(AccuracyError::Figure(_))));

@@ -158,9 +158,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = match (arguments.own(), &arguments.output) {
         (None, _) => draw_all(layout, &look, &arguments.formats())?,
-        (Some(figure), None) => {
-            write_own(layout, draw_own(layout, &figure, &look)?, &look, &arguments.formats())?
-        }
+        (Some(figure), None) => write_own(layout, draw_own(layout, &figure, &look)?, &look, &arguments.formats())?,
         (Some(figure), Some(file)) => {
             let format = format_of(file)?;
             let picture = draw_own(layout, &figure, &look)?;

@@ -7,7 +7,7 @@ use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Picture, Sheet, Stroke};
 use super::scatter::Scatter;
 use super::sets::Grid;
-use super::style::{BAR_WIDTH, BLUE, Look, RED, REFERENCE, dot, shade};
+use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetSummary};
 use std::collections::BTreeMap;
@@ -16,6 +16,8 @@ use std::f64::consts::PI;
 const WIDTH: f64 = 580.0;
 const HEIGHTS: &[f64] = &[390.0];
 const AVERAGE: Dot = dot(BLUE);
+/// Around it, so that it is seen on dark cells.
+const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 const CURVE_POINTS: u32 = 400;
@@ -31,12 +33,7 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn backbone(
-    points: &[Point],
-    bins: &[BackboneBin],
-    sets: &[SetSummary],
-    look: &Look,
-) -> Option<Picture> {
+pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let slips = Scatter::new(points, 1.6, 0.45, |point| Some((point.eta, point.phase?)));
     let density = (slips.xs().count() >= MIN_SLIPS).then(|| Density::of(&slips));
     let (low, high) = match &density {
@@ -71,7 +68,9 @@ pub(super) fn backbone(
                 frame.error_bar(sheet, eta, ends, Stroke::solid(BLUE, BAR_WIDTH));
             }
         }
-        frame.points(sheet, averages.iter().map(|&(eta, mean, _)| (eta, mean)), AVERAGE);
+        let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean));
+        frame.points(sheet, means(), EDGE);
+        frame.points(sheet, means(), AVERAGE);
     });
     frame.axes(&mut sheet);
     if let Some(density) = &density {
@@ -172,9 +171,7 @@ mod tests {
 
     #[test]
     fn the_density_of_a_column_integrates_to_one() {
-        let point = |step: u32| {
-            (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5)
-        };
+        let point = |step: u32| (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5);
         let slips = Scatter::of((0..3000).map(point));
         let density = Density::of(&slips);
         for eta in [2.0, 8.0] {

@@ -169,7 +169,9 @@ mod tests {
         }
         assert!(dependence(&sets[..4], &Look::default()).is_none(), "two values");
         assert!(dependence(&sets[..5], &Look::default()).is_none(), "two values of one modulation");
-        assert!(dependence(&[set(0.0, 1.0, 1.0), set(1e-6, 0.1, 1.0), set(1e-6, 0.2, 1.0)], &Look::default()).is_none());
+        assert!(
+            dependence(&[set(0.0, 1.0, 1.0), set(1e-6, 0.1, 1.0), set(1e-6, 0.2, 1.0)], &Look::default()).is_none()
+        );
         let mut two = sets;
         two[0].parameters.blocks = 9;
         assert!(dependence(&two, &Look::default()).is_none(), "two parameters");

@@ -9,10 +9,11 @@ use crate::reduce::{Point, RampStage, quantile};
 
 /// Space right of the frames for the numbers of lines.
 const NUMBERS: f64 = 66.0;
+/// Space above the longest interval for them, over the range of intervals.
+const NUMBERS_ABOVE: f64 = 0.14;
 const LAYOUT: Layout = Layout::column(520.0, &[320.0, 210.0], ROW_GAP, NUMBERS);
 /// The stages of the ramp, their names and inks.
-const STAGES: [(RampStage, &str, Ink); 2] =
-    [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
+const STAGES: [(RampStage, &str, Ink); 2] = [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
 /// Bins of the modulation, and least intervals in one that has a median.
@@ -54,7 +55,8 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let margin = 0.03 * (high - low);
     let x = Axis::linear(label, low - margin, high + margin);
     let margin = 0.04 * (longest - shortest);
-    let upper = Axis::linear("Slip interval τ (s)", shortest - margin, longest + margin);
+    // Above the longest is room for the numbers of lines.
+    let upper = Axis::linear("Slip interval τ (s)", shortest - margin, longest + NUMBERS_ABOVE * (longest - shortest));
     let slip_entries = STAGES.map(|(_, name, ink)| entry(Mark::Dot(slip_dot(ink)), format!("slips, {name}")));
     let medians =
         STAGES.map(|(_, name, ink)| entry(Mark::Bar(Dot::solid(ink, 4.5)), format!("median and quartiles, {name}")));

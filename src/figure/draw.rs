@@ -3,7 +3,7 @@
 use super::{FigureError, Format, Look, OwnFigure, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, regimes, staircase};
 use super::{own, sets};
-use crate::reduce::{SetRow, SetSummary, WRITER, read_reduced, read_sets};
+use crate::reduce::{SetRow, WRITER, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     check_reduced(layout)?;
     let points = read_reduced(layout)?;
     let sets = read_sets(layout, MAX_SETS)?;
-    let look = &look.with_note(&sets::common(&sets));
+    let look = &look.with_note(&sets::common(sets.iter().map(|set| &set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(backbone::backbone(&points, &read_reduced(layout)?, &sets, look));
     pictures.extend(intervals::intervals(&points, look));
@@ -53,8 +53,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
     check_reduced(layout)?;
     let rows: Vec<SetRow> = read_reduced(layout)?;
-    let summaries: Vec<SetSummary> = rows.iter().cloned().map(SetSummary::from).collect();
-    let picture = own::own(&rows, figure, &look.with_note(&sets::common(&summaries)))?;
+    let look = &look.with_note(&sets::common(rows.iter().map(|row| &row.parameters.parameters)));
+    let picture = own::own(&rows, figure, look)?;
     check_size(&picture, look)?;
     Ok(picture)
 }
@@ -116,8 +116,8 @@ fn write(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::super::style::{Size, Style};
+    use super::*;
     use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
     use crate::table::columns::Table;
     use crate::table::file::{Footer, TableWriter};

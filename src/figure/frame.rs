@@ -2,11 +2,10 @@
 //! small print under them.
 
 use super::axis::Axis;
+use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Dot, Fill, Sheet, Stroke, snapped};
-use super::style::{
-    AXIS, BAR_WIDTH, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, LETTER, Look, NOTE_TEXT, TICK_TEXT, WHITE,
-};
+use super::style::{AXIS, BAR_WIDTH, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, TICK_TEXT, WHITE};
 use crate::reduce::Statistic;
 use kuva::render::color::Color;
 
@@ -103,20 +102,19 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// A text in lines that fit a width, broken at spaces.
+/// A text in lines that fit a width, broken at spaces that may be broken at.
 fn wrapped(text: &str, width: f64) -> Vec<String> {
-    let letters = width / (LETTER * f64::from(NOTE_TEXT));
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {
         match lines.last_mut() {
-            Some(line) if ((line.chars().count() + 1 + word.chars().count()) as f64) <= letters => {
+            Some(line) if font::width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
                 line.push(' ');
                 line.push_str(word);
             }
             _ => lines.push(word.to_owned()),
         }
     }
-    lines
+    lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
 }
 
 /// Where frames lie on a sheet.
@@ -239,7 +237,8 @@ impl Frame {
 
     /// An upright bar between two values; what lies under a logarithmic axis runs out of the frame.
     pub(super) fn error_bar(&self, sheet: &mut Sheet, x: f64, (low, high): (f64, f64), stroke: Stroke) {
-        let bottom = if self.y.place(low).is_finite() { self.y_of(low).min(2.0 * self.bottom()) } else { self.bottom() };
+        let bottom =
+            if self.y.place(low).is_finite() { self.y_of(low).min(2.0 * self.bottom()) } else { self.bottom() };
         sheet.line(vec![(self.x_of(x), bottom), (self.x_of(x), self.y_of(high))], stroke);
     }
 
@@ -280,7 +279,7 @@ impl Frame {
         }
         let mut free = f64::NEG_INFINITY;
         for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
-            let (x, half) = (self.x_of(*value), 0.5 * LETTER * height * number.chars().count() as f64);
+            let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
             if x - half >= free {
                 sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
@@ -316,8 +315,7 @@ impl Frame {
 
     /// A short text in the frame, on the ground that it needs to be read.
     pub(super) fn tag(&self, sheet: &mut Sheet, (x, y): (f64, f64), text: &str, anchor: Anchor) {
-        let (size, letters) = (f64::from(LEGEND_TEXT), text.chars().count() as f64);
-        let width = letters * LETTER * size;
+        let (size, width) = (f64::from(LEGEND_TEXT), font::width(text, LEGEND_TEXT));
         let left = match anchor {
             Anchor::Start => x,
             Anchor::Middle => x - 0.5 * width,
@@ -359,8 +357,8 @@ mod tests {
 
     #[test]
     fn small_print_is_wrapped_at_spaces_and_complete() {
-        let lines = wrapped("alpha beta  gamma delta", 12.0 * LETTER * f64::from(NOTE_TEXT));
-        assert_eq!(lines, ["alpha beta", "gamma delta"]);
+        let lines = wrapped("alpha beta  gamma\u{a0}delta epsilon", font::width("alpha beta g", NOTE_TEXT));
+        assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
         assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);
         assert!(wrapped("", 10.0).is_empty());
     }

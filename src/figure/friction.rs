@@ -32,12 +32,9 @@ pub(super) fn friction(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let (_, widest) = bounds(points().map(|point| point.0))?;
     let (least, most) = bounds(points().flat_map(|point| point.1.ends()))?;
     let (x_label, y_label) = if units.is_some() {
-        (
-            "Amplitude ΔFₛ = K_d Δ of the force / peak force Fₘ at Δ = 0",
-            "Mean friction ⟨Fₛ⟩ / mean friction at Δ = 0",
-        )
+        ("Amplitude ΔFₛ = Kd Δ of the force / peak force Fₘ at Δ = 0", "Mean friction ⟨Fₛ⟩ / mean friction at Δ = 0")
     } else {
-        ("Amplitude ΔFₛ = K_d Δ of the force (N)", "Mean friction ⟨Fₛ⟩ (N)")
+        ("Amplitude ΔFₛ = Kd Δ of the force (N)", "Mean friction ⟨Fₛ⟩ (N)")
     };
     let x = Axis::linear(x_label, -0.02 * widest, 1.04 * widest);
     let modulated = periods.iter().zip(INKS).map(|(&period, ink)| (Some(period), ink, frequency(period)));

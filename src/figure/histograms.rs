@@ -2,6 +2,7 @@
 
 use super::axis::{Axis, bounds};
 use super::colour_bar::OVERLAP;
+use super::font;
 use super::frame::{Frame, Layout, RIGHT};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
@@ -117,7 +118,7 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
     let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
     let multiples = panels.iter().any(|panel| panel.period.is_some());
     let multiples = multiples.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
-    [entry(Mark::Patch(BAR), "all seeds")].into_iter().chain(overlay).chain(multiples).collect()
+    [entry(Mark::Patch(BAR), "slips of all seeds")].into_iter().chain(overlay).chain(multiples).collect()
 }
 
 fn draw(sheet: &mut Sheet, frame: &Frame, panel: &Panel<'_>, multiples: &[f64]) {
@@ -126,7 +127,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, panel: &Panel<'_>, multiples: &[f64]) 
     for &multiple in multiples {
         let (x, n) = (frame.x_of(multiple), (multiple / period).round());
         let text = if free == f64::NEG_INFINITY { format!("n = {n}") } else { format!("{n}") };
-        let half = 0.5 * 0.6 * f64::from(LEGEND_TEXT) * text.chars().count() as f64;
+        let half = 0.5 * font::width(&text, LEGEND_TEXT);
         let mut top = frame.top;
         if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {
             top += NUMBERS - 2.0;
@@ -203,7 +204,10 @@ mod tests {
         }
         assert!(histograms(&sets, &[], &Look::default()).is_none() && histograms(&[], &[], &Look::default()).is_none());
         let five = [1.0, 2.0, 3.0, 4.0, 5.0].map(|frequency| set("58", 6.9e-3, Some(frequency)));
-        assert!(histograms(&five[..4], &bins, &Look::default()).is_some() && histograms(&five, &bins, &Look::default()).is_none());
+        assert!(
+            histograms(&five[..4], &bins, &Look::default()).is_some()
+                && histograms(&five, &bins, &Look::default()).is_none()
+        );
     }
 
     #[test]

@@ -1,38 +1,38 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which locked intervals fall.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Frame, Layout};
+use super::frame::{Frame, Layout, ROW_GAP};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Anchor, Dot, Picture, Sheet};
+use super::picture::{Dot, Picture, Sheet};
 use super::sets::three_digits;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::Point;
 
 const WIDTH: f64 = 560.0;
-const HEIGHTS: &[f64] = &[430.0];
+const HEIGHTS: [f64; 2] = [180.0, 340.0];
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
-/// Whole numbers whose lines can be distinguished, and those that are labelled.
+/// Whole numbers whose lines can be distinguished.
 const LINES: u32 = 12;
-const LABELLED: [u32; 8] = [1, 2, 3, 4, 5, 6, 8, 10];
 
-/// Draws intervals in periods against the period, both logarithmic, with the lines τ = nT; `None` without any interval
-/// under modulation. Slips of locked sets have the colour of their drive velocity.
+/// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
+/// τ = nT; `None` without any interval under modulation. Slips of locked sets have the colour of their drive velocity.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let (period, interval) = (point.period?, point.interval?);
         Some((period, interval / period))
     };
-    let slips: Vec<(&Point, (f64, f64))> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let slips: Vec<Slip> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
     let x = Axis::logarithmic("Modulation period T (s)", low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
-    let y = Axis::logarithmic("Slip interval in periods, τ / T", low, high);
+    let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
+    let few = Axis::counts("τ / T: up to 12 periods", LINES);
 
-    let locked = || slips.iter().filter(|slip| slip.0.is_locked);
+    let locked = slips.iter().filter(|slip| slip.0.is_locked);
     let velocity = |value: f64| format!("V₀ = {} m/s", three_digits(value));
-    let hues = Hues::of("V₀ (m/s)", locked().map(|slip| slip.0.drive_velocity), velocity);
+    let hues = Hues::of("V₀ (m/s)", locked.map(|slip| slip.0.drive_velocity), velocity);
     let mut entries: Vec<Entry> = hues.entries(3.0);
     if hues.bar().is_some() {
         entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of locked sets"));
@@ -41,37 +41,31 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
-    let (page, mut sheet) = Layout::column(WIDTH, HEIGHTS, 0.0, hues.right()).page("tau-T", look, &entries);
-    let frame = page.frame(0, 0, x, y);
-    frame.clipped(&mut sheet, |sheet| {
-        for n in 1..=LINES {
-            frame.level(sheet, f64::from(n), GRID);
+    let (page, mut sheet) = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, hues.right()).page("tau-T", look, &entries);
+    for (row, y) in [all, few].into_iter().enumerate() {
+        let frame = page.frame(row, 0, x.clone(), y);
+        let lines = if row == 0 { 1 } else { LINES };
+        draw(&mut sheet, &frame, &slips, &hues, lines);
+        frame.axes(&mut sheet);
+        if let Some(bar) = hues.bar() {
+            bar.draw(&mut sheet, &frame);
         }
-        let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
-        frame.points(sheet, others, OTHER);
-        for &(point, place) in locked() {
-            frame.points(sheet, [place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 });
-        }
-    });
-    labels(&mut sheet, &frame);
-    frame.axes(&mut sheet);
-    if let Some(bar) = hues.bar() {
-        bar.draw(&mut sheet, &frame);
     }
     Some(sheet.finish())
 }
 
-/// The numbers of lines, at their left ends, where no slips are: short periods go often into an interval.
-fn labels(sheet: &mut Sheet, frame: &Frame) {
-    let mut free = f64::INFINITY;
-    for n in LABELLED.map(f64::from).into_iter().filter(|&n| frame.y.contains(n)) {
-        let y = frame.y_of(n);
-        if y < free {
-            let text = if free.is_finite() { format!("{n}") } else { format!("n = {n}") };
-            frame.tag(sheet, (frame.left + 12.0, y), &text, Anchor::Start);
-            free = y - 16.0;
+/// A slip and its place.
+type Slip<'a> = (&'a Point, (f64, f64));
+
+fn draw(sheet: &mut Sheet, frame: &Frame, slips: &[Slip<'_>], hues: &Hues, lines: u32) {
+    frame.clipped(sheet, |sheet| {
+        (1..=lines).for_each(|n| frame.level(sheet, f64::from(n), GRID));
+        let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
+        frame.points(sheet, others, OTHER);
+        for &(point, place) in slips.iter().filter(|slip| slip.0.is_locked) {
+            frame.points(sheet, [place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 });
         }
-    }
+    });
 }
 
 #[cfg(test)]
@@ -100,7 +94,7 @@ mod tests {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
-        assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "n = 1", "4"]));
+        assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "4", "12"]));
         points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..points[0] }));
         assert!(texts(&points, &["V₀ (m/s)", "slips of locked sets", "other slips"]));
     }

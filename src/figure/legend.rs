@@ -1,11 +1,13 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
+use super::font;
 use super::picture::{Anchor, Dot, Fill, Ink, Sheet, Stroke};
-use super::style::{LEGEND_TEXT, LETTER, WHITE};
+use super::style::{LEGEND_TEXT, WHITE};
 use kuva::render::color::Color;
 
-/// Width of a mark.
+/// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
+const DOT: f64 = 10.0;
 /// Between a mark and its text, and between entries.
 const GAP: f64 = 7.0;
 const ENTRY_GAP: f64 = 20.0;
@@ -32,8 +34,15 @@ pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
     (mark, text.into())
 }
 
-fn width(text: &str) -> f64 {
-    MARK + GAP + LETTER * f64::from(LEGEND_TEXT) * text.chars().count() as f64
+fn width((mark, text): &Entry) -> f64 {
+    mark_width(*mark) + GAP + font::width(text, LEGEND_TEXT)
+}
+
+const fn mark_width(mark: Mark) -> f64 {
+    match mark {
+        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) => DOT,
+        Mark::Line(_) | Mark::Patch(_) => MARK,
+    }
 }
 
 /// Entries in rows that fit a width.
@@ -41,7 +50,7 @@ pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
     let mut rows: Vec<Vec<&Entry>> = Vec::new();
     let mut taken = 0.0;
     for entry in entries {
-        let needed = width(&entry.1) + ENTRY_GAP;
+        let needed = width(entry) + ENTRY_GAP;
         match rows.last_mut() {
             Some(row) if taken + needed - ENTRY_GAP <= room => {
                 row.push(entry);
@@ -61,16 +70,16 @@ pub(super) fn draw_legend(sheet: &mut Sheet, entries: &[Entry], left: f64, right
     for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
         let middle = TOP + (row as f64 + 0.5) * row_height;
         let mut start = left;
-        for (mark, text) in entries {
-            draw_mark(sheet, *mark, (start, middle));
-            sheet.centred_text((start + MARK + GAP, middle), text, LEGEND_TEXT, Anchor::Start);
-            start += width(text) + ENTRY_GAP;
+        for entry in entries {
+            draw_mark(sheet, entry.0, (start, middle));
+            sheet.centred_text((start + mark_width(entry.0) + GAP, middle), &entry.1, LEGEND_TEXT, Anchor::Start);
+            start += width(entry) + ENTRY_GAP;
         }
     }
 }
 
 fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
-    let (end, centre) = (start + MARK, (start + 0.5 * MARK, middle));
+    let (end, centre) = (start + MARK, (start + 0.5 * mark_width(mark), middle));
     match mark {
         Mark::Dot(dot) => {
             // A single faint dot could not be seen.
@@ -97,10 +106,11 @@ mod tests {
 
     #[test]
     fn a_legend_takes_as_many_rows_as_it_needs() {
-        let entries: Vec<Entry> = ["short", "a longer text", "another"].map(|text| entry(Mark::Line(curve(BLACK)), text)).to_vec();
+        let entries: Vec<Entry> =
+            ["short", "a longer text", "another"].map(|text| entry(Mark::Line(curve(BLACK)), text)).to_vec();
         let rows = |room: f64| legend_rows(&entries, room).iter().map(Vec::len).collect::<Vec<_>>();
         assert_eq!(rows(1000.0), [3]);
-        assert_eq!(rows(width("short") + ENTRY_GAP + width("a longer text")), [2, 1]);
+        assert_eq!(rows(width(&entries[0]) + ENTRY_GAP + width(&entries[1])), [2, 1]);
         assert_eq!(rows(1.0), [1, 1, 1]);
         assert!(legend_rows(&[], 100.0).is_empty());
     }

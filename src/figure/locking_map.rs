@@ -20,12 +20,12 @@ const MIN_VALUES: usize = 8;
 /// Numbers of periods that have a colour of their own; larger ones share one.
 const MAX_PERIODS: usize = 12;
 /// Share of the scale at n = 1, which is not to be taken for the ground.
-const FIRST_SHADE: f64 = 0.12;
+const FIRST_SHADE: f64 = 0.22;
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
 /// Sets that are not locked.
-const FREE: Ink = "#ececec";
+const FREE: Ink = "#f2f2f0";
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.

@@ -15,6 +15,7 @@ mod colour_bar;
 mod dependence;
 mod drag;
 mod draw;
+mod font;
 mod frame;
 mod friction;
 mod histograms;

@@ -4,8 +4,9 @@ use super::FigureError;
 use super::axis::{Axis, bounds, logarithmic_bounds};
 use super::frame::{Frame, LEFT, Layout, RIGHT};
 use super::hues::Hues;
+use super::legend::{Mark, entry};
 use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
-use super::style::{BAR_WIDTH, INKS, Look, RADIUS};
+use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
 use super::values::Values;
 pub use super::values::columns;
 use crate::model::Symbol;
@@ -100,24 +101,29 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     };
     let inside = sets.iter().filter(|set| is_inside(set)).count();
     if inside == 0 {
-        return Err(asked_x.refuse(format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len())));
+        return Err(
+            asked_x.refuse(format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len()))
+        );
     }
 
     let hues = colour.as_ref().map(hues).transpose()?;
     let groups = groups(panels.as_ref(), &sets)?;
     let layout = layout(groups.len(), hues.as_ref().map_or(RIGHT, Hues::right));
     let radius = if inside > FEW_SETS { SMALL_RADIUS } else { RADIUS };
-    let entries = hues.as_ref().map_or_else(Vec::new, |hues| hues.entries(RADIUS));
+    let mut entries = hues.as_ref().map_or_else(Vec::new, |hues| hues.entries(RADIUS));
+    if let Some(colour) = colour.as_ref().filter(|colour| sets.iter().any(|&set| colour.numbers[set].is_none())) {
+        entries.push(entry(Mark::Dot(dot(GREY)), format!("no {}", colour.name())));
+    }
     let left_out = rows.len() - inside;
     let note = match left_out {
         0 => String::new(),
-        _ => format!("{left_out} of {} sets have no value here or lie outside", rows.len()),
+        _ => format!("not shown: {left_out} of {} sets, without a value or outside the axes", rows.len()),
     };
     let name = format!("{}-{}", figure.y, figure.x);
     let (page, mut sheet) = layout.page(&name, &look.with_note(&note), &entries);
     let ink = |set: usize| {
-        let value = colour.as_ref().and_then(|colour| colour.numbers[set]);
-        hues.as_ref().zip(value).map_or(INKS[0], |(hues, value)| hues.ink(value))
+        let Some((colour, hues)) = colour.as_ref().zip(hues.as_ref()) else { return INKS[0] };
+        colour.numbers[set].map_or(GREY, |value| hues.ink(value))
     };
     let lines = lines(rows, &figure.x, &sets, &x);
     for (index, (title, members)) in groups.iter().enumerate() {
@@ -192,7 +198,9 @@ impl Asked<'_> {
         let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value".to_owned()))?;
         let (low, high) = (self.limits.0.unwrap_or(low), self.limits.1.unwrap_or(high));
         if low >= high {
-            return Err(self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's"));
+            return Err(
+                self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's")
+            );
         }
         Ok(if self.is_log { Axis::logarithmic(&label, low, high) } else { Axis::linear(&label, low, high) })
     }
@@ -208,7 +216,8 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
 /// The colours of a column.
 fn hues(values: &Values) -> Result<Hues, FigureError> {
     if values.is_worded() && values.words.len() > INKS.len() {
-        let problem = format!("has {} words, and there are {} colours; take another column", values.words.len(), INKS.len());
+        let problem =
+            format!("has {} words, and there are {} colours; take another column", values.words.len(), INKS.len());
         return Err(FigureError::Option { option: "colour", value: values.column.name.to_string(), problem });
     }
     let Some(_) = values.numbers.iter().flatten().next() else {
@@ -363,7 +372,11 @@ pub(super) mod tests {
         let plain = svg(&figure());
         assert!(plain.contains(">Drive velocity V₀ (m/s)<") && plain.contains(">Mean interval, tau_mean (s)<"));
         // A bar and a dot for each set.
-        assert_eq!(plain.matches("<path").count() - svg(&OwnFigure { y: "eta".to_owned(), ..figure() }).matches("<path").count(), 8);
+        assert_eq!(
+            plain.matches("<path").count()
+                - svg(&OwnFigure { y: "eta".to_owned(), ..figure() }).matches("<path").count(),
+            8
+        );
         let logarithmic = svg(&OwnFigure { is_log_x: true, is_log_y: true, ..figure() });
         assert!(logarithmic.contains(">10⁻⁵<") && !plain.contains(">10⁻⁵<"));
         let colour = svg(&OwnFigure { colour: Some("Delta".to_owned()), ..figure() });
@@ -373,9 +386,11 @@ pub(super) mod tests {
         let panels = svg(&OwnFigure { panels: Some("Delta".to_owned()), ..figure() });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0 m<"));
         let limits = svg(&OwnFigure { x_limits: (Some(1e-6), Some(1e-5)), ..figure() });
-        assert!(limits.contains("4 of 8 sets have no value here or lie outside"), "{limits}");
+        assert!(limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"), "{limits}");
         let label = svg(&OwnFigure { y_label: Some("τ".to_owned()), ..figure() });
         assert!(label.contains(">τ<") && !label.contains("tau_mean (s)"));
+        let without = svg(&OwnFigure { colour: Some("T".to_owned()), ..figure() });
+        assert!(without.contains(">T = 0.02 s<") && without.contains(">no T<"));
         let words = svg(&OwnFigure { x: "break_on".to_owned(), ..figure() });
         assert!(words.contains(">magnitude<"));
     }
@@ -387,9 +402,15 @@ pub(super) mod tests {
             (OwnFigure { x: "v0".to_owned(), ..figure() }, "--x v0: no such column; did you mean V0?"),
             (OwnFigure { colour: named("colour"), ..figure() }, "--colour colour: no such column; there are set_id"),
             (OwnFigure { x: "break_on".to_owned(), is_log_x: true, ..figure() }, "--log x: break_on holds words"),
-            (OwnFigure { x: "break_on".to_owned(), x_limits: (Some(1.0), None), ..figure() }, "--xlim 1:: break_on holds words"),
+            (
+                OwnFigure { x: "break_on".to_owned(), x_limits: (Some(1.0), None), ..figure() },
+                "--xlim 1:: break_on holds words",
+            ),
             (OwnFigure { y: "drop_mean".to_owned(), ..figure() }, "no set has a value of both V0 and drop_mean"),
-            (OwnFigure { y: "eta".to_owned(), x: "T_to".to_owned(), is_log_y: true, ..figure() }, "no set has a value > 0"),
+            (
+                OwnFigure { y: "eta".to_owned(), x: "T_to".to_owned(), is_log_y: true, ..figure() },
+                "no set has a value > 0",
+            ),
             (OwnFigure { x_limits: (Some(2.0), Some(1.0)), ..figure() }, "--xlim 2:1: the lower end must be less"),
             (OwnFigure { x_limits: (Some(-1.0), None), is_log_x: true, ..figure() }, "--xlim -1:: must be > 0"),
             (OwnFigure { x_limits: (Some(1.0), Some(2.0)), ..figure() }, "none of 8 sets lies within"),
@@ -400,7 +421,10 @@ pub(super) mod tests {
         }
         let many = OwnFigure { panels: named("V0"), ..figure() };
         let error = own(&rows(12), &many, &Look::default()).err().unwrap().to_string();
-        assert!(error.contains("--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"), "{error}");
+        assert!(
+            error.contains("--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"),
+            "{error}"
+        );
     }
 
     #[test]

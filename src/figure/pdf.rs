@@ -1,6 +1,7 @@
 //! A scene as a PDF of one page: vectors, and text in the letters of one embedded font, so that it can be searched and
 //! looks the same everywhere. The same scene gives the same bytes on every machine.
 
+use super::font;
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
 use pdf_writer::types::{CidFontType, FontFlags, LineJoinStyle, SystemInfo, UnicodeCmap};
@@ -21,7 +22,7 @@ const COMPRESSION: u8 = 8;
 
 /// The scene, with this many points per unit.
 pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
-    let font = dejavu::sans::regular();
+    let font = font::file();
     let face = Face::parse(font, 0).map_err(|error| error.to_string())?;
     let mut page = Page {
         content: Content::new(),

@@ -97,8 +97,11 @@ impl Picture {
     /// # Errors
     /// When it cannot be encoded.
     pub fn pdf(&self) -> Result<Vec<u8>, FigureError> {
-        pdf(&self.scene, self.style.points())
-            .map_err(|reason| FigureError::Encoding { figure: self.name.clone(), format: Format::Pdf, reason })
+        pdf(&self.scene, self.style.points()).map_err(|reason| FigureError::Encoding {
+            figure: self.name.clone(),
+            format: Format::Pdf,
+            reason,
+        })
     }
 
     /// The figure as a PNG file.
@@ -225,7 +228,15 @@ impl Sheet {
     }
 
     pub(super) fn dot(&mut self, (cx, cy): (f64, f64), radius: f64, fill: Color) {
-        self.scene.add(Primitive::Circle { cx, cy, r: radius, fill, fill_opacity: None, stroke: None, stroke_width: None });
+        self.scene.add(Primitive::Circle {
+            cx,
+            cy,
+            r: radius,
+            fill,
+            fill_opacity: None,
+            stroke: None,
+            stroke_width: None,
+        });
     }
 
     pub(super) fn discs(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {

@@ -103,7 +103,11 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
         let place = |symbol, grid: &Grid| Some(grid.cell_of(number(&set.parameters, symbol)?));
         Some((place(horizontal, &columns)?, place(vertical, &rows)?))
     };
-    let (page, mut sheet) = MAP.page("regime-map", look, &[entry(Mark::Line(BORDER), "between regimes")]);
+    let (page, mut sheet) = MAP.page(
+        "regime-map",
+        look,
+        &[entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")],
+    );
     for (row, (bar_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
         let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
         let shades = if row == 0 { Axis::linear(bar_label, 0.0, 1.0) } else { scale(bar_label, values)? };
@@ -230,7 +234,9 @@ mod tests {
                 })
                 .collect()
         };
-        let map = |sets: &[SetSummary]| regime_map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count();
+        let map = |sets: &[SetSummary]| {
+            regime_map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count()
+        };
         let without = map(&grid(|_, _| 0.05));
         assert_eq!(map(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
         assert!(regime_map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(), "two rows");

@@ -96,8 +96,14 @@ mod tests {
         let picture = scaling(&[growth("Blocks N"), growth("Contacts")], &Look::default()).unwrap();
         let svg = picture.svg();
         assert_eq!(svg.matches("<clipPath").count(), 4);
-        for text in ["Blocks N", "Contacts", "(a) CPU time per slip (s)", "(c) Steps and breaks per slip", "slope 1", "costs: a"]
-        {
+        for text in [
+            "Blocks N",
+            "Contacts",
+            "(a) CPU time per slip (s)",
+            "(c) Steps and breaks per slip",
+            "slope 1",
+            "costs: a",
+        ] {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), 1, "{text}");
         }
         assert!(picture.png().unwrap().starts_with(b"\x89PNG"));

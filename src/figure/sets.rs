@@ -88,22 +88,13 @@ pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
 pub(super) fn symbol_of(symbol: Symbol) -> String {
     let description = symbol.description();
     let name = if description.symbol.is_empty() { description.key } else { description.symbol };
-    name.replace("V0", "V₀").replace("_s", "ₛ").replace("_r", "ᵣ")
-}
-
-/// The parameters that all sets have in common, in symbols.
-pub(super) fn common(sets: &[SetSummary]) -> String {
-    let Some(first) = sets.first() else { return String::new() };
-    // What is off, or enters nothing that figures show, is left out.
-    let is_shown = |symbol: &Symbol| {
-        let value = first.parameters.get(*symbol);
-        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
-            && value != Value::Absent
-            && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
-            && sets.iter().all(|set| set.parameters.get(*symbol) == value)
-    };
-    let settings = Symbol::ALL.into_iter().filter(is_shown).map(|symbol| setting(&first.parameters, symbol));
-    settings.collect::<Vec<_>>().join(", ")
+    match name.split_once('_') {
+        Some((letter, "s")) => format!("{letter}ₛ"),
+        Some((letter, "r")) => format!("{letter}ᵣ"),
+        // There is no letter for other subscripts.
+        Some(_) => description.key.to_owned(),
+        None => name.replace("V0", "V₀"),
+    }
 }
 
 pub(super) fn three_digits(value: f64) -> String {
@@ -115,10 +106,28 @@ pub(super) fn three_digits(value: f64) -> String {
     if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
+/// What some parameters have in common, in symbols.
+pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
+    let all: Vec<&Parameters> = all.collect();
+    let Some(first) = all.first() else { return String::new() };
+    // What is off, or enters nothing that figures show, is left out.
+    let is_shown = |symbol: &Symbol| {
+        let value = first.get(*symbol);
+        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && value != Value::Absent
+            && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
+            && all.iter().all(|parameters| parameters.get(*symbol) == value)
+    };
+    let settings = Symbol::ALL.into_iter().filter(is_shown).map(|symbol| setting(first, symbol));
+    // Lines are not broken within one.
+    settings.map(|setting| setting.replace(' ', "\u{a0}")).collect::<Vec<_>>().join(", ")
+}
+
 /// A count with commas between thousands.
 pub(super) fn thousands(count: u64) -> String {
     let digits = count.to_string();
-    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
     groups.join(",")
 }
 
@@ -260,6 +269,19 @@ pub(super) mod tests {
     fn numbers_in_titles_are_short() {
         let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
         assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
+    }
+
+    #[test]
+    fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
+        let mut other = set(1e-6, 0.02, 4.0).parameters;
+        other.blocks = 9;
+        let all = [set(1e-6, 0.02, 4.0).parameters, other];
+        let found = common(all.iter()).replace('\u{a0}', " ");
+        assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 1e8 N/m, Kd = 4e7 N/m"), "{found}");
+        assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1e-6 m, T = 0.02 s"), "{found}");
+        assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
+        let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
+        assert_eq!(symbols, ["ramp_time", "seed", "τᵣ", "V₀"]);
     }
 
     #[test]

@@ -6,8 +6,8 @@ use super::axis::{Axis, bounds};
 use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
-use super::picture::{Anchor, Picture, Sheet, Stroke, snapped};
-use super::sets::MICROMETRES;
+use super::picture::{Picture, Sheet, Stroke, snapped};
+use super::sets::{MICROMETRES, common};
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
 use kuva::render::color::Color;
@@ -62,6 +62,7 @@ pub struct Simulation<'a> {
 /// When what is given has fewer than two instants, or the map does not have one fraction per instant and block.
 pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture, FigureError> {
     let Simulation { parameters, trace, map, onsets } = *shown;
+    let look = &look.with_note(&format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed));
     let empty = |what| FigureError::Empty { figure: NAME, what };
     if map.is_some_and(|map| map.times.len() < 2 || map.fractions.len() != map.times.len() * map.blocks) {
         return Err(empty("fractions for every instant and block"));
@@ -110,19 +111,17 @@ pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture, Figure
         frame.axes(&mut sheet);
     }
     if let Some(map) = map {
-        let y = Axis::linear("Position x along the slider (mm)", 0.0, map.length * MILLIMETRES);
+        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, map.length * MILLIMETRES);
         let frame = page.frame(next_row(), 0, x(), y);
         frame.clipped(&mut sheet, |sheet| {
             sheet.rectangles(cells(&frame, &map));
             marks(sheet, &frame, &peaks, REFERENCE);
             marks(sheet, &frame, &onsets, ONSET);
         });
-        let left = frame.left + 12.0;
-        frame.tag(&mut sheet, (left, frame.top + 18.0), "leading edge", Anchor::Start);
-        frame.tag(&mut sheet, (left, frame.bottom() - 18.0), "trailing edge, driven", Anchor::Start);
         frame.axes(&mut sheet);
         let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0));
-        percent.ticks = [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
+        percent.ticks =
+            [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
         percent.draw(&mut sheet, &frame);
     }
     Ok(sheet.finish())
@@ -230,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let (force, position, bar) = ("Shear force Fₛ (N)<", "Position x along the slider (mm)<", ">detached (%)<");
+        let (force, position, bar) = ("Shear force Fₛ (N)<", "Position x (mm), trailing edge at 0<", ">detached (%)<");
         let panels =
             [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
         for (has_trace, has_map, labels) in panels {

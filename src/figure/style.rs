@@ -43,9 +43,7 @@ impl Style {
     pub(super) fn width(self, natural: f64) -> f64 {
         match self {
             Self::Screen => natural,
-            Self::Print => {
-                COLUMNS[usize::from(natural > MAX_ONE_COLUMN)] * POINTS_PER_MILLIMETRE / self.points()
-            }
+            Self::Print => COLUMNS[usize::from(natural > MAX_ONE_COLUMN)] * POINTS_PER_MILLIMETRE / self.points(),
         }
     }
 
@@ -94,7 +92,8 @@ impl FromStr for Size {
         // The x of px is none between sides.
         let between = text.match_indices('x').map(|(at, _)| at).find(|&at| !text[..at].ends_with('p'));
         let sides = between.and_then(|at| Some((length(&text[..at])?, length(&text[at + 1..])?)));
-        let (width, height) = sides.ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
+        let (width, height) =
+            sides.ok_or("must be WIDTHxHEIGHT in mm, cm, in, pt or px, up to 2 m, such as 86mmx60mm")?;
         Ok(Self { width, height })
     }
 }
@@ -127,8 +126,6 @@ pub(super) const LABEL_TEXT: u32 = 18;
 pub(super) const LEGEND_TEXT: u32 = 15;
 /// Size of small print.
 pub(super) const NOTE_TEXT: u32 = 12;
-/// Mean width of a letter over the size of the text.
-pub(super) const LETTER: f64 = 0.58;
 /// The digits' middle over their base line, over the size of the text.
 pub(super) const HALF_DIGIT: f64 = 0.36;
 
@@ -150,9 +147,8 @@ pub(super) const BLUE: Ink = "#1f55c4";
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
-pub(super) const SCALE: [Ink; 10] = [
-    "#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e", "#1e4e7c", "#1b3a68",
-];
+pub(super) const SCALE: [Ink; 10] =
+    ["#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e", "#1e4e7c", "#1b3a68"];
 
 /// Border and ticks of a frame.
 pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
@@ -221,8 +217,9 @@ mod tests {
 
     #[test]
     fn shades_darken_in_even_steps() {
-        let steps: Vec<f64> =
-            (0..70).map(|step| lightness(mixed(f64::from(step) / 70.0)) - lightness(mixed(f64::from(step + 1) / 70.0))).collect();
+        let steps: Vec<f64> = (0..70)
+            .map(|step| lightness(mixed(f64::from(step) / 70.0)) - lightness(mixed(f64::from(step + 1) / 70.0)))
+            .collect();
         let mean = steps.iter().sum::<f64>() / 70.0;
         assert!(steps.iter().all(|step| (0.6 * mean..1.4 * mean).contains(step)), "{steps:?}");
         assert!(lightness(mixed(0.0)) > 0.95);
@@ -235,7 +232,9 @@ mod tests {
         assert_eq!(size("8.6cmx6cm"), Size { width: 86.0, height: 60.0 });
         assert!((size("96pxx192px").height - 50.8).abs() < 1e-9);
         assert!((size("72ptx1in").width - 25.4).abs() < 1e-9);
-        for wrong in ["", "86mm", "86x60", "0mmx60mm", "-1mmx5mm", "nanmmx5mm", "9e9mmx5mm", "86mmx60furlong", "mmxmm", "µmxµm"] {
+        for wrong in
+            ["", "86mm", "86x60", "0mmx60mm", "-1mmx5mm", "nanmmx5mm", "9e9mmx5mm", "86mmx60furlong", "mmxmm", "µmxµm"]
+        {
             assert!(wrong.parse::<Size>().is_err(), "{wrong}");
         }
     }

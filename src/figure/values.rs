@@ -38,7 +38,8 @@ impl Values {
         let (mut cells, mut intervals) = (Vec::new(), Vec::new());
         for row in rows {
             let all = number_cells(row);
-            let number = |index: usize| if let Some(Given::Number(number)) = &all[index] { Some(*number) } else { None };
+            let number =
+                |index: usize| if let Some(Given::Number(number)) = &all[index] { Some(*number) } else { None };
             intervals.push(ends.and_then(|(low, high)| number(low).zip(number(high))));
             cells.push(all.into_iter().nth(column).flatten());
         }
@@ -71,9 +72,13 @@ impl Values {
 
     /// Its name and one of its values.
     pub(super) fn setting(&self, value: f64) -> String {
-        let Column { name, unit, .. } = &self.column;
-        let name = Symbol::from_key(name).map_or_else(|| name.to_string(), symbol_of);
-        format!("{name} = {} {unit}", self.word(value)).trim_end().to_owned()
+        format!("{} = {} {}", self.name(), self.word(value), self.column.unit).trim_end().to_owned()
+    }
+
+    /// Its symbol in the paper, or its name.
+    pub(super) fn name(&self) -> String {
+        let name = &self.column.name;
+        Symbol::from_key(name).map_or_else(|| name.to_string(), symbol_of)
     }
 
     fn word(&self, value: f64) -> String {
@@ -144,7 +149,10 @@ mod tests {
         let mut rows = super::super::own::tests::rows(3);
         rows[1].is_locked = true;
         let locked = Values::of(&rows, "x", "locked").unwrap();
-        assert_eq!((locked.numbers, locked.words), (vec![Some(0.0), Some(1.0), Some(0.0)], vec!["no".into(), "yes".into()]));
+        assert_eq!(
+            (locked.numbers, locked.words),
+            (vec![Some(0.0), Some(1.0), Some(0.0)], vec!["no".into(), "yes".into()])
+        );
         let tau = Values::of(&rows, "y", "tau_mean").unwrap();
         assert!(tau.intervals.iter().all(Option::is_some) && !tau.is_worded());
         assert!(Values::of(&rows, "y", "eta").unwrap().intervals.iter().all(Option::is_none));

@@ -5,7 +5,7 @@ use super::super::output::replace;
 use super::super::plot::format_of;
 use super::{Arguments, Panel};
 use anyhow::{Result, anyhow};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use stickslip::figure::{self, Look, Picture, Simulation};
 use stickslip::model::theory::typical_interval;
 use stickslip::model::{ContactEvent, Parameters};
