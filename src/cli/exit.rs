@@ -1,5 +1,6 @@
 //! Exit codes, and which error ends with which.
 
+use stickslip::figure::FigureError;
 use stickslip::reduce::ReduceError;
 use stickslip::results::{ErrorKind, ResultsError};
 use stickslip::solver::SimulationError;
@@ -57,6 +58,9 @@ impl Exit {
                 ReduceError::Storage(_) => None,
                 ReduceError::Results(error) => Self::of_cause(error),
             };
+        }
+        if let Some(FigureError::Option { .. } | FigureError::TooSmall { .. }) = cause.downcast_ref::<FigureError>() {
+            return Some(Self::Usage);
         }
         match cause.downcast_ref::<DatasetError>() {
             Some(DatasetError::Damaged { .. } | DatasetError::Stray { .. }) => Some(Self::Damaged),

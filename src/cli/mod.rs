@@ -11,6 +11,7 @@ mod merge;
 mod output;
 mod plan;
 mod planning;
+mod plot;
 mod progress;
 mod reduce;
 mod run;
@@ -52,8 +53,8 @@ enum Command {
     Run(run::Arguments),
     Batch(batch::Arguments),
     Status(status::Arguments),
-    Reduce(reduce::ReduceArguments),
-    Plot(reduce::PlotArguments),
+    Reduce(reduce::Arguments),
+    Plot(Box<plot::Arguments>),
     Verify(verify::Arguments),
     Compact(compact::Arguments),
     Merge(merge::Arguments),
@@ -73,7 +74,7 @@ pub fn main() -> ExitCode {
         Command::Batch(arguments) => batch::batch(&arguments),
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
-        Command::Plot(arguments) => reduce::plot(&arguments),
+        Command::Plot(arguments) => plot::plot(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Compact(arguments) => compact::compact(&arguments),
         Command::Merge(arguments) => merge::merge(&arguments),

@@ -1,11 +1,10 @@
-//! `stickslip reduce` and `stickslip plot`: tables to reduced data, reduced data to figures.
+//! `stickslip reduce`: tables to reduced data.
 
 use super::exit::Exit;
 use super::output;
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use stickslip::figure::draw_all;
 use stickslip::reduce::ReductionSummary;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
@@ -15,7 +14,7 @@ use stickslip::table::storage::Disk;
 /// Reduce the tables of a results directory to Fig. 3-style data
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  stickslip reduce results/fig3 --json")]
-pub struct ReduceArguments {
+pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
     directory: PathBuf,
@@ -24,16 +23,7 @@ pub struct ReduceArguments {
     json: bool,
 }
 
-/// Draw the figures of a results directory from its reduced data, as SVG and PNG
-#[derive(Debug, Args)]
-#[command(after_help = "Example:\n  stickslip plot results/fig3")]
-pub struct PlotArguments {
-    /// Results directory
-    #[arg(value_name = "DIR")]
-    directory: PathBuf,
-}
-
-pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
+pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let summary = stickslip::reduce::reduce(&results)?;
     if arguments.json {
@@ -43,14 +33,6 @@ pub fn reduce(arguments: &ReduceArguments) -> Result<Exit> {
     }
     report_missing(&results)?;
     Ok(if summary.failed_jobs > 0 { Exit::Failed } else { Exit::Done })
-}
-
-pub fn plot(arguments: &PlotArguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    for path in draw_all(results.layout())? {
-        output::print(&format!("{}\n", shown(&path)))?;
-    }
-    Ok(Exit::Done)
 }
 
 /// Says which jobs were not there to be reduced.

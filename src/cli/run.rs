@@ -5,14 +5,14 @@ use super::planning::Planning;
 use super::progress::Progress;
 use super::sweep::{self, Preset};
 use super::threads::{self, Threads};
-use super::{output, reduce, signals, time};
+use super::{output, plot, reduce, signals, time};
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
-use stickslip::figure::draw_all;
+use stickslip::figure::{Format, draw_all};
 use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
 use stickslip::results::Results;
@@ -160,7 +160,7 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
         }
         summary => summary?,
     };
-    let figures = draw_all(layout)?;
+    let figures = draw_all(layout, &plot::look(&results), &Format::DEFAULT)?;
     if !arguments.json {
         output::pairs(&reduce::summary_lines(&summary, layout))?;
         for path in figures {

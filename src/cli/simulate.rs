@@ -66,7 +66,7 @@ pub struct Arguments {
     /// Write the slips with the columns of a sweep, as Parquet
     #[arg(long, value_name = "FILE")]
     slip_table: Option<PathBuf>,
-    /// Draw the shear force and the attached fraction, as .svg or .png; repeatable
+    /// Draw the shear force and the attached fraction, as .svg, .png or .pdf; repeatable
     #[arg(long, value_name = "FILE")]
     plot: Vec<PathBuf>,
     /// Panels of the plot
@@ -249,7 +249,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
         write_table(path, &footer, rows)?;
     }
-    write_pictures(arguments, parameters, &trace.rows, &map.rows)?;
+    write_pictures(arguments, parameters, &trace.rows, &map.rows, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)
 }

@@ -36,9 +36,21 @@ impl Axis {
         Self::linear_with(label, low, high, MAX_TICKS)
     }
 
+    /// Linear from 0 to a little past `high`, with a number at each whole number.
+    pub(super) fn counts(label: &str, high: u32) -> Self {
+        let ticks = (0..=high).map(|count| (f64::from(count), count.to_string())).collect();
+        let high = f64::from(high) + 0.5;
+        Self { label: label.to_owned(), low: 0.0, high, scale: Scale::Linear, ticks, minor: Vec::new() }
+    }
+
     /// Linear from `low` to `high` with half as many ticks, for low frames.
     pub(super) fn sparse(label: &str, low: f64, high: f64) -> Self {
         Self::linear_with(label, low, high, 0.5 * MAX_TICKS)
+    }
+
+    /// Linear from `low` to `high` with about three ticks, for strips.
+    pub(super) fn few(label: &str, low: f64, high: f64) -> Self {
+        Self { minor: Vec::new(), ..Self::sparse(label, low, high) }
     }
 
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
@@ -105,6 +117,14 @@ impl Axis {
         match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Logarithmic => libm::log(value / self.low) / libm::log(self.high / self.low),
+        }
+    }
+
+    /// The value halfway between two others, as the axis places them.
+    pub(super) fn middle(&self, low: f64, high: f64) -> f64 {
+        match self.scale {
+            Scale::Linear => 0.5 * (low + high),
+            Scale::Logarithmic => (low * high).sqrt(),
         }
     }
 

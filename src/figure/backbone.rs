@@ -1,51 +1,199 @@
-//! φ against η (Fig. 3e): slips, the back-bone of Eq. 2, and averages over locked sets.
+//! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over locked sets.
 
-use super::axis::{Axis, angle_bounds, bounds};
-use super::frame::{Layout, LegendPlace, Mark, RIGHT, entry};
-use super::picture::{BLUE, Dot, Fill, LIGHT_GREY, Picture, RED, Stroke};
+use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
+use super::frame::{Frame, Layout, RIGHT};
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Dot, Picture, Sheet, Stroke};
 use super::scatter::Scatter;
+use super::sets::Grid;
+use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::reduce::{BackboneBin, Point};
+use crate::reduce::{BackboneBin, Point, SetSummary};
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
-const LAYOUT: Layout = Layout::column(558.0, &[398.0], 0.0, RIGHT);
-/// The paper's range of η; wider if the data are.
-const ETA: (f64, f64) = (0.2, 1000.0);
-const AVERAGE: Dot = Dot::solid(BLUE, 5.0);
-const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.6);
+const WIDTH: f64 = 580.0;
+const HEIGHTS: &[f64] = &[390.0];
+const AVERAGE: Dot = dot(BLUE);
+/// Around it, so that it is seen on dark cells.
+const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
+const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
-/// Where the theory has no back-bone.
-const SLOW: Fill = Fill { ink: LIGHT_GREY, opacity: 0.4 };
 const CURVE_POINTS: u32 = 400;
+/// Fewer slips are drawn one by one.
+const MIN_SLIPS: usize = 2000;
+/// Most values of η that have a column each; more are put into columns, this many a decade.
+const MAX_COLUMNS: usize = 60;
+const COLUMNS_PER_DECADE: f64 = 10.0;
+/// Rows of the density in half a turn.
+const ROWS: f64 = 36.0;
+/// Least density shown, in 1/rad: a quarter of that of phases spread over the whole turn.
+const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
-/// the axis holds them all.
-pub(super) fn backbone(points: &[Point], bins: &[BackboneBin]) -> Option<Picture> {
+/// the axes hold them all.
+pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let slips = Scatter::new(points, 1.6, 0.45, |point| Some((point.eta, point.phase?)));
-    let (low, high) = bounds(slips.xs())?;
-    let x = Axis::logarithmic("η = 2πΔ / (T V₀)", low.min(ETA.0), high.max(ETA.1));
+    let density = (slips.xs().count() >= MIN_SLIPS).then(|| Density::of(&slips));
+    let (low, high) = match &density {
+        Some(density) => bounds(density.cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?,
+        None => logarithmic_bounds(slips.xs())?,
+    };
+    let averages = averages(bins, sets);
+    let mut entries: Vec<Entry> = if density.is_some() { Vec::new() } else { slips.legend().to_vec() };
+    entries.extend([
+        entry(Mark::Bar(AVERAGE), "mean of locked sets, 95 %"),
+        entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
+        entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
+        entry(Mark::Line(REFERENCE), "η = 1"),
+    ]);
+    let right = if density.is_some() { COLOUR_BAR } else { RIGHT };
+    let (page, mut sheet) = Layout::column(WIDTH, HEIGHTS, 0.0, right).page("phi-eta", look, &entries);
+    let x = Axis::logarithmic("η = 2πΔ / (T V₀)", low, high);
     let (low, high) = angle_bounds(slips.ys());
-    let frame = LAYOUT.frame(0, 0, x, Axis::angle("Phase φ (rad)", low, high));
-    let mut sheet = LAYOUT.sheet("phi-eta");
+    let frame = page.frame(0, 0, x, Axis::angle("Phase φ (rad)", low, high));
 
     frame.clipped(&mut sheet, |sheet| {
-        frame.stripe(sheet, frame.x.low, 1.0, SLOW);
-        slips.draw(sheet, &frame);
+        match &density {
+            Some(density) => density.draw(sheet, &frame),
+            None => slips.draw(sheet, &frame),
+        }
+        frame.upright(sheet, 1.0, REFERENCE);
         let modulated = || frame.x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
         frame.curve(sheet, modulated().map(|eta| (eta, minimum_phase_asymptote(eta))), ASYMPTOTE);
         frame.curve(sheet, modulated().filter_map(|eta| Some((eta, minimum_phase(eta)?))), EXACT);
-        let averages = bins.iter().filter_map(|bin| Some((bin.eta_centre, bin.locked_phase_mean?)));
-        frame.points(sheet, averages, AVERAGE);
+        for &(eta, _, ends) in &averages {
+            if let Some(ends) = ends {
+                frame.error_bar(sheet, eta, ends, Stroke::solid(BLUE, BAR_WIDTH));
+            }
+        }
+        let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean));
+        frame.points(sheet, means(), EDGE);
+        frame.points(sheet, means(), AVERAGE);
     });
     frame.axes(&mut sheet);
-    frame.x_label(&mut sheet);
-    frame.y_label(&mut sheet);
-    let mut entries = slips.legend().to_vec();
-    entries.extend([
-        entry(Mark::Dot(AVERAGE), "mean of locked sets"),
-        entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
-        entry(Mark::Line(EXACT), "φₘᵢₙ, Eq. 2"),
-        entry(Mark::Patch(SLOW), "η < 1"),
-    ]);
-    frame.legend(&mut sheet, LegendPlace::LowerRight, &entries);
+    if let Some(density) = &density {
+        ColourBar::of_axis("density (1/rad)", &density.shades).draw(&mut sheet, &frame);
+    }
     Some(sheet.finish())
+}
+
+/// Mean phases of the locked sets of each bin, at the mean η of these sets, with their intervals.
+fn averages(bins: &[BackboneBin], sets: &[SetSummary]) -> Vec<(f64, f64, Option<(f64, f64)>)> {
+    let average = |bin: &BackboneBin| {
+        let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
+        let locked = sets.iter().filter(|set| set.is_locked).map(|set| set.parameters.eta()).filter(within);
+        let (count, sum) = locked.fold((0.0, 0.0), |(count, sum), eta| (count + 1.0, sum + libm::log(eta)));
+        let eta = if count > 0.0 { libm::exp(sum / count) } else { bin.eta_centre };
+        Some((eta, bin.locked_phase_mean?, bin.locked_phase_mean_low.zip(bin.locked_phase_mean_high)))
+    };
+    bins.iter().filter_map(average).collect()
+}
+
+/// A cell of the density: its ends along η and along φ.
+type Cell = ((f64, f64), (f64, f64));
+
+/// How slips at each η are spread over the phase.
+struct Density {
+    /// Densities in 1/rad as shares of the colour scale.
+    shades: Axis,
+    cells: Vec<(Cell, f64)>,
+}
+
+impl Density {
+    fn of(slips: &Scatter) -> Self {
+        let columns = columns(slips.xs());
+        let height = PI / ROWS;
+        let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
+        for (eta, phase) in slips.xs().zip(slips.ys()) {
+            let column = columns.partition_point(|column| column.1 <= eta).min(columns.len() - 1);
+            #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
+            let row = (phase / height).floor() as i64;
+            *counts[column].entry(row).or_default() += 1;
+        }
+        let cells: Vec<(Cell, f64)> = columns
+            .iter()
+            .zip(&counts)
+            .flat_map(|(&column, counts)| {
+                let slips = f64::from(counts.values().sum::<u32>());
+                counts.iter().map(move |(&row, &count)| {
+                    let ends = (row as f64 * height, (row + 1) as f64 * height);
+                    ((column, ends), f64::from(count) / (slips * height))
+                })
+            })
+            .collect();
+        let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
+        Self { shades: Axis::logarithmic("", FAINTEST, most), cells }
+    }
+
+    fn draw(&self, sheet: &mut Sheet, frame: &Frame) {
+        sheet.rectangles(self.cells.iter().map(|&((x, y), density)| {
+            let [left, top, width, height] = frame.box_of(x, y);
+            ([left, top, width + OVERLAP, height + OVERLAP], shade(self.shades.place(density)))
+        }));
+    }
+}
+
+/// Ends of the columns along η: one for each value if these are few, else evenly spaced.
+fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
+    /// Values that differ by rounding alone are one.
+    const SAME: f64 = 1.0 + 1e-9;
+    let mut values: Vec<f64> = etas.filter(|eta| *eta > 0.0).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup_by(|next, value| *next <= *value * SAME);
+    if values.len() <= MAX_COLUMNS {
+        let grid = Grid::logarithmic(values);
+        return grid.cells().collect();
+    }
+    let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
+    #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
+    let (first, last) = (place(values[0]).floor() as i32, place(values[values.len() - 1]).floor() as i32);
+    let edge = |column: i32| libm::exp10(f64::from(column) / COLUMNS_PER_DECADE);
+    (first..=last).map(|column| (edge(column), edge(column + 1))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sets::tests::set;
+    use super::*;
+
+    #[test]
+    fn columns_hold_every_slip_and_are_those_of_a_grid_where_there_is_one() {
+        let grid = columns([1.0, 2.0, 4.0, 2.0, 4.0 * (1.0 + 1e-13)].into_iter());
+        assert_eq!(grid.len(), 3);
+        assert!((grid[1].0 - 2.0_f64.sqrt()).abs() < 1e-12 && (grid[1].1 - 8.0_f64.sqrt()).abs() < 1e-12);
+        let etas: Vec<f64> = (0..1000).map(|step| 0.2 * 1.008_f64.powi(step)).collect();
+        let sample = columns(etas.iter().copied());
+        assert!(sample.len() < 50 && sample[0].0 <= etas[0] && sample[sample.len() - 1].1 > etas[999]);
+        assert!(sample.windows(2).all(|pair| pair[0].1 == pair[1].0));
+    }
+
+    #[test]
+    fn the_density_of_a_column_integrates_to_one() {
+        let point = |step: u32| (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5);
+        let slips = Scatter::of((0..3000).map(point));
+        let density = Density::of(&slips);
+        for eta in [2.0, 8.0] {
+            let column = density.cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));
+            let integral: f64 = column.map(|((_, y), density)| density * (y.1 - y.0)).sum();
+            assert!((integral - 1.0).abs() < 1e-12, "{integral}");
+        }
+    }
+
+    #[test]
+    fn means_lie_at_the_eta_of_the_sets_that_they_are_of() {
+        let sets = [set(1e-6, 0.02, 4.0), set(1e-6, 0.021, 4.0)];
+        let etas = [0, 1].map(|index| sets[index].parameters.eta());
+        let bin = BackboneBin {
+            eta_low: 2.0,
+            eta_high: 5.0,
+            eta_centre: 3.5,
+            locked_phase_mean: Some(-1.0),
+            ..BackboneBin::default()
+        };
+        let found = averages(&[bin], &sets);
+        assert!((found[0].0 - (etas[0] * etas[1]).sqrt()).abs() < 1e-9);
+        assert_eq!(averages(&[bin], &[])[0].0, 3.5);
+    }
 }

@@ -1,47 +1,35 @@
 //! Colour bars: what the colours of a map mean, beside its frame.
 
-use super::frame::{Frame, LEGEND_TEXT, TICK_TEXT};
-use super::picture::{Anchor, BLACK, Sheet, Stroke};
-use kuva::plot::ColorMap;
+use super::axis::Axis;
+use super::frame::Frame;
+use super::picture::{Anchor, Sheet};
+use super::style::{AXIS, LEGEND_TEXT, TICK_TEXT, shade};
 use kuva::render::color::Color;
 
 /// Space right of a frame for the bar and its numbers.
-pub(super) const COLOUR_BAR: f64 = 92.0;
-const GAP: f64 = 20.0;
+pub(super) const COLOUR_BAR: f64 = 96.0;
+const GAP: f64 = 18.0;
 const WIDTH: f64 = 18.0;
-const BORDER: Stroke = Stroke::solid(BLACK, 1.2);
 /// Between the label's end and that of the bar's space.
 const INSET: f64 = 14.0;
 /// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
 pub(super) const OVERLAP: f64 = 0.5;
 
 /// What a bar shows.
-pub(super) struct ColourBar {
-    pub(super) label: &'static str,
+pub(super) struct ColourBar<'a> {
+    pub(super) label: &'a str,
     /// Colours of equal height, from below.
     pub(super) colours: Vec<Color>,
     /// Places, 0 at the lower end and 1 at the upper, and their numbers.
     pub(super) ticks: Vec<(f64, String)>,
 }
 
-/// A share from 0 to 1 as a colour, in perceptually even steps from dark to bright, also to the colour-blind and in
-/// grey.
-pub(super) fn shade(share: f64) -> Color {
-    Color::from(ColorMap::Viridis.map(share.clamp(0.0, 1.0)))
-}
-
-impl ColourBar {
-    /// A bar of all shades, with numbers at these shares.
-    pub(super) fn of_shades(label: &'static str, ticks: impl IntoIterator<Item = (f64, f64)>) -> Self {
+impl<'a> ColourBar<'a> {
+    /// A bar of all shades, pale at the lower end, with the numbers of an axis.
+    pub(super) fn of_axis(label: &'a str, axis: &Axis) -> Self {
         const STEPS: u32 = 64;
         let colours = (0..STEPS).map(|step| shade(f64::from(step) / f64::from(STEPS - 1))).collect();
-        Self { label, colours, ticks: ticks.into_iter().map(|(share, number)| (share, number.to_string())).collect() }
-    }
-
-    /// A bar of all shades, dark at the upper end, with these ticks.
-    pub(super) fn of_reversed_shades(label: &'static str, ticks: Vec<(f64, String)>) -> Self {
-        let Self { mut colours, .. } = Self::of_shades(label, []);
-        colours.reverse();
+        let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
         Self { label, colours, ticks }
     }
 
@@ -55,13 +43,17 @@ impl ColourBar {
         });
         sheet.clipped([left, top, WIDTH, frame.height], |sheet| sheet.rectangles(boxes));
         let right = left + WIDTH;
-        sheet.line(vec![(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], BORDER);
+        sheet.line(vec![(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], AXIS);
+        let mut free = f64::INFINITY;
         for (place, number) in &self.ticks {
             let y = bottom - place * frame.height;
-            sheet.line(vec![(right, y), (right + 5.0, y)], BORDER);
-            sheet.centred_text((right + 9.0, y), number, TICK_TEXT, Anchor::Start);
+            sheet.line(vec![(right, y), (right + 5.0, y)], AXIS);
+            if y <= free {
+                sheet.centred_text((right + 9.0, y), number, TICK_TEXT, Anchor::Start);
+                free = y - 1.1 * f64::from(TICK_TEXT);
+            }
         }
         let end = frame.right() + COLOUR_BAR - INSET;
-        sheet.text((end, top - 13.0), self.label, LEGEND_TEXT, Anchor::End);
+        sheet.text((end, top - 12.0), self.label, LEGEND_TEXT, Anchor::End);
     }
 }

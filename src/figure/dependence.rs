@@ -1,38 +1,59 @@
 //! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line
 //! for each modulation.
 
-use super::axis::{Axis, bounds};
-use super::frame::{Layout, LegendPlace, Mark, ROW_GAP, entry};
-use super::picture::{INKS, Ink, Picture, Stroke};
+use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::legend::{Mark, entry};
+use super::picture::{Picture, Sheet};
 use super::sets::{Grid, distinct, modulation, swept};
+use super::style::{INKS, Look, RADIUS, curve, dot};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetSummary, Statistic};
 
-/// Between the columns stand the numbers of the right one; right of them amplitude and frequency in one line.
-const LAYOUT: Layout =
-    Layout { columns: 2, width: 300.0, column_gap: 92.0, heights: &[230.0; 2], row_gap: ROW_GAP, right: 270.0 };
+/// Of a column of panels; between columns stand the numbers of the right one.
+const WIDTH: f64 = 330.0;
+const COLUMN_GAP: f64 = 92.0;
+const HEIGHTS: [f64; 2] = [230.0; 2];
 /// Least values of a parameter that make a dependence; a rule has two.
 const MIN_VALUES: usize = 3;
+/// Ratio of the largest to the least value from which times are drawn on a logarithmic axis.
+const WIDE: f64 = 3.0;
+/// Lowest share at which an axis of shares begins, if all lie above.
+const HIGH_SHARE: f64 = 0.5;
 const MILLISECONDS: f64 = 1e3;
 
 type Getter = fn(&SetSummary) -> Option<Statistic>;
-/// The panels: in either row a share of one, and a length of time.
-const PANELS: [[(&str, Getter); 2]; 2] = [
-    [
-        ("Locking index", |set| set.locking_index),
-        ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS))),
-    ],
-    [
-        ("Resultant length of φ", |set| set.resultant_length),
-        ("Standard deviation of τ (ms)", |set| {
-            set.tau_deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
-        }),
-    ],
+
+/// A quantity of a panel.
+#[derive(Clone, Copy)]
+struct Quantity {
+    label: &'static str,
+    value: Getter,
+    /// Whether it lies between 0 and 1.
+    is_share: bool,
+}
+
+const QUANTITIES: [Quantity; 4] = [
+    Quantity {
+        label: "Mean interval τ (ms)",
+        value: |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS)),
+        is_share: false,
+    },
+    Quantity {
+        label: "Standard deviation of τ (ms)",
+        value: |set| {
+            let deviation = set.tau_deviation.filter(|deviation| *deviation > 0.0);
+            deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
+        },
+        is_share: false,
+    },
+    Quantity { label: "Locking index", value: |set| set.locking_index, is_share: true },
+    Quantity { label: "Resultant length of φ", value: |set| set.resultant_length, is_share: true },
 ];
 
 /// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
-/// modulations; `None` for others.
-pub(super) fn dependence(sets: &[SetSummary]) -> Option<Picture> {
+/// modulations; `None` for others. Quantities that no set has get no panel.
+pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let all: Vec<&SetSummary> = sets.iter().collect();
     let [symbol] = swept(&all)[..] else { return None };
     let min_values = if symbol == Symbol::BreakOn { 2 } else { MIN_VALUES };
@@ -44,27 +65,44 @@ pub(super) fn dependence(sets: &[SetSummary]) -> Option<Picture> {
         Symbol::BreakOn => Axis::categories("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
         _ => Grid::of(distinct(&all, |parameters| number(parameters, symbol))).wider_axis(&label(symbol)),
     };
-    let mut sheet = LAYOUT.sheet("dependence");
-    for (row, panels) in PANELS.into_iter().enumerate() {
-        for (column, (y_label, statistic)) in panels.into_iter().enumerate() {
-            let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
-            let high = if column == 0 { 1.0 } else { bounds(ends).map_or(1.0, |(_, high)| high) };
-            let frame = LAYOUT.frame(row, column, x.clone(), Axis::rounded(y_label, 0.0, high));
-            for (line, ink) in lines.iter().zip(INKS) {
-                let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, statistic(set)?)));
-                frame.statistics(&mut sheet, &points.collect::<Vec<_>>(), stroke(ink), 4.0);
-            }
-            frame.axes(&mut sheet);
-            frame.y_label(&mut sheet);
-            frame.x_label(&mut sheet);
-            if (row, column) == (0, 1) {
-                let names = lines.iter().map(|line| modulation(&line[0].parameters));
-                let entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Line(stroke(ink)), name)).collect();
-                frame.legend(&mut sheet, LegendPlace::Beside, &entries);
-            }
-        }
+    let present: Vec<Quantity> =
+        QUANTITIES.into_iter().filter(|quantity| sets.iter().any(|set| (quantity.value)(set).is_some())).collect();
+    let names = lines.iter().map(|line| modulation(&line[0].parameters));
+    let entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
+    let columns = present.len().min(2);
+    let heights = HEIGHTS.get(..present.len().div_ceil(2))?;
+    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, heights, ROW_GAP, RIGHT) };
+    let (page, mut sheet) = layout.page("dependence", look, &entries);
+    for (index, quantity) in present.iter().enumerate() {
+        let frame = page.frame(index / columns, index % columns, x.clone(), quantity.axis(sets)?);
+        draw(&mut sheet, &frame, &lines, symbol, quantity.value);
+        frame.axes(&mut sheet);
     }
     Some(sheet.finish())
+}
+
+impl Quantity {
+    /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
+    fn axis(&self, sets: &[SetSummary]) -> Option<Axis> {
+        let ends = || sets.iter().filter_map(self.value).flat_map(Statistic::ends);
+        let (low, high) = bounds(ends())?;
+        if self.is_share {
+            return Some(Axis::linear(self.label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0));
+        }
+        match logarithmic_bounds(ends()) {
+            Some((low_end, high_end)) if low > 0.0 && high > WIDE * low => {
+                Some(Axis::logarithmic(self.label, low_end, high_end))
+            }
+            _ => Some(Axis::rounded(self.label, 0.0, high)),
+        }
+    }
+}
+
+fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetSummary>], symbol: Symbol, value: Getter) {
+    for (line, ink) in lines.iter().zip(INKS) {
+        let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, value(set)?)));
+        frame.statistics(sheet, &points.collect::<Vec<_>>(), curve(ink), RADIUS);
+    }
 }
 
 /// The sets of each modulation, in their order, if there are enough inks.
@@ -110,10 +148,6 @@ pub(super) fn label(symbol: Symbol) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
-const fn stroke(ink: Ink) -> Stroke {
-    Stroke::solid(ink, 1.6)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::sets::tests::set;
@@ -129,18 +163,20 @@ mod tests {
         let sets: Vec<SetSummary> =
             [0.0, 0.0137, 0.137].iter().flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)]).collect();
         assert_eq!(number(&sets[5].parameters, Symbol::Dfs), Some(0.137 / 1.37));
-        let svg = dependence(&sets).unwrap().svg();
-        for text in ["Spread of thresholds Δfₛ / fₛ", "Locking index", "Δ = 0", "Δ = 1 µm, 1/T = 50 Hz"] {
+        let svg = dependence(&sets, &Look::default()).unwrap().svg();
+        for text in ["Spread of thresholds Δfₛ / fₛ", "(c) Locking index", "Δ = 0", "Δ = 1 µm, 1/T = 50 Hz"] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
-        assert!(dependence(&sets[..4]).is_none(), "two values");
-        assert!(dependence(&sets[..5]).is_none(), "two values of one modulation");
-        assert!(dependence(&[set(0.0, 1.0, 1.0), set(1e-6, 0.1, 1.0), set(1e-6, 0.2, 1.0)]).is_none());
+        assert!(dependence(&sets[..4], &Look::default()).is_none(), "two values");
+        assert!(dependence(&sets[..5], &Look::default()).is_none(), "two values of one modulation");
+        assert!(
+            dependence(&[set(0.0, 1.0, 1.0), set(1e-6, 0.1, 1.0), set(1e-6, 0.2, 1.0)], &Look::default()).is_none()
+        );
         let mut two = sets;
         two[0].parameters.blocks = 9;
-        assert!(dependence(&two).is_none(), "two parameters");
+        assert!(dependence(&two, &Look::default()).is_none(), "two parameters");
         let many = (0..7).flat_map(|step| [0.0, 0.0137, 0.137].map(|dfs| spread(dfs, 1e-6 + 1e-7 * f64::from(step))));
-        assert!(dependence(&many.collect::<Vec<_>>()).is_none(), "seven modulations");
+        assert!(dependence(&many.collect::<Vec<_>>(), &Look::default()).is_none(), "seven modulations");
     }
 
     #[test]
@@ -149,14 +185,14 @@ mod tests {
             let plain = set(amplitude, 0.02, 4.0);
             SetSummary { parameters: Parameters { break_on: BreakOn::Tension, ..plain.parameters.clone() }, ..plain }
         };
-        let svg = dependence(&[set(1e-6, 0.02, 4.0), tension(1e-6)]).unwrap().svg();
+        let svg = dependence(&[set(1e-6, 0.02, 4.0), tension(1e-6)], &Look::default()).unwrap().svg();
         assert!(svg.contains(">magnitude<") && svg.contains(">tension<"));
     }
 
     #[test]
     fn error_bars_are_those_of_the_data() {
         let mut sets: Vec<SetSummary> = [0.0, 0.01, 0.02].map(|dfs| spread(dfs, 1e-6)).to_vec();
-        let lines = |sets: &[SetSummary]| dependence(sets).unwrap().svg().matches("<path").count();
+        let lines = |sets: &[SetSummary]| dependence(sets, &Look::default()).unwrap().svg().matches("<path").count();
         let with = lines(&sets);
         for set in &mut sets {
             set.locking_index = set.locking_index.map(|index| Statistic { interval: None, ..index });

@@ -1,15 +1,19 @@
 //! Drag: τ on a ramp of the modulation, on the way there and on the way back, with the lines τ = nT, and τ/T in bins.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Entry, Frame, LEGEND, Layout, LegendPlace, Mark, entry};
-use super::picture::{Anchor, Dot, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
+use super::frame::{Frame, Layout, ROW_GAP};
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Anchor, Dot, Ink, Picture, Sheet, Stroke};
+use super::style::{GRID, INKS, LEGEND_TEXT, Look};
 use crate::reduce::{Point, RampStage, quantile};
 
-const LAYOUT: Layout = Layout::column(540.0, &[330.0, 230.0], 42.0, LEGEND);
+/// Space right of the frames for the numbers of lines.
+const NUMBERS: f64 = 66.0;
+/// Space above the longest interval for them, over the range of intervals.
+const NUMBERS_ABOVE: f64 = 0.14;
+const LAYOUT: Layout = Layout::column(520.0, &[320.0, 210.0], ROW_GAP, NUMBERS);
 /// The stages of the ramp, their names and inks.
-const STAGES: [(RampStage, &str, Ink); 2] =
-    [(RampStage::Up, "way there", INKS[0]), (RampStage::Down, "way back", INKS[1])];
-const LINE: Stroke = Stroke::solid(LIGHT_GREY, 1.4);
+const STAGES: [(RampStage, &str, Ink); 2] = [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
 /// Share of the intervals at either end that the axis of the medians leaves out.
 const RARE: f64 = 0.02;
 /// Bins of the modulation, and least intervals in one that has a median.
@@ -31,7 +35,7 @@ struct Slip {
 
 /// Draws interval against period at the onset, or against amplitude if it is the amplitude alone that is ramped; `None`
 /// if no slip has an interval on a ramp.
-pub(super) fn drag(points: &[Point]) -> Option<Picture> {
+pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let stage = |point: &Point| STAGES.iter().position(|(stage, ..)| point.ramp_stage == Some(*stage));
     let periods = bounds(points.iter().filter(|point| stage(point).is_some()).filter_map(|point| point.period));
     let is_period = periods.is_some_and(|(low, high)| high > low);
@@ -51,17 +55,18 @@ pub(super) fn drag(points: &[Point]) -> Option<Picture> {
     let margin = 0.03 * (high - low);
     let x = Axis::linear(label, low - margin, high + margin);
     let margin = 0.04 * (longest - shortest);
-    let upper = Axis::linear("Slip interval τ (s)", shortest - margin, longest + margin);
-    let upper = LAYOUT.frame(0, 0, x.clone(), upper);
-    let lower = LAYOUT.frame(1, 0, x, Axis::linear("Median interval in periods, τ/T", least - 0.3, most + 0.3));
-    let mut sheet = LAYOUT.sheet("drag");
+    // Above the longest is room for the numbers of lines.
+    let upper = Axis::linear("Slip interval τ (s)", shortest - margin, longest + NUMBERS_ABOVE * (longest - shortest));
+    let slip_entries = STAGES.map(|(_, name, ink)| entry(Mark::Dot(slip_dot(ink)), format!("slips, {name}")));
+    let medians =
+        STAGES.map(|(_, name, ink)| entry(Mark::Bar(Dot::solid(ink, 4.5)), format!("median and quartiles, {name}")));
+    let entries: Vec<Entry> =
+        slip_entries.into_iter().chain([entry(Mark::Line(GRID), "τ = nT")]).chain(medians).collect();
+    let (page, mut sheet) = LAYOUT.page("drag", look, &entries);
+    let upper = page.frame(0, 0, x.clone(), upper);
+    let lower = page.frame(1, 0, x, Axis::linear("Median interval in periods, τ / T", least - 0.3, most + 0.3));
     draw_intervals(&mut sheet, &upper, &slips, &multiples, is_period);
     draw_medians(&mut sheet, &lower, &slips, &multiples, (low, high));
-    lower.x_label(&mut sheet);
-    let slips = STAGES.map(|(_, name, ink)| entry(Mark::Dot(slip_dot(ink)), format!("slips, {name}")));
-    let quartiles = STAGES.map(|(_, name, ink)| entry(Mark::Line(quartiles(ink)), format!("quartiles, {name}")));
-    let entries: Vec<Entry> = slips.into_iter().chain(quartiles).chain([entry(Mark::Line(LINE), "τ = nT")]).collect();
-    lower.legend(&mut sheet, LegendPlace::Beside, &entries);
     Some(sheet.finish())
 }
 
@@ -79,7 +84,7 @@ fn draw_intervals(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &
     let line = |n: f64| [frame.x.low, frame.x.high].map(|x| (x, n * if is_period { x } else { period }));
     frame.clipped(sheet, |sheet| {
         for &n in multiples {
-            frame.curve(sheet, line(n), LINE);
+            frame.curve(sheet, line(n), GRID);
         }
         // Slip by slip, so that neither stage covers the other.
         for slip in slips {
@@ -87,17 +92,17 @@ fn draw_intervals(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &
         }
     });
     frame.axes(sheet);
-    frame.y_label(sheet);
-    // Where a line leaves the frame, at its right or upper edge.
+    // Where a line leaves the frame: at its right edge, or in it, under the upper edge.
     for &n in multiples {
         let [(left, start), (right, end)] = line(n);
         let top = frame.y.high;
         let text = format!("n = {n}");
         if frame.y.contains(end) {
-            sheet.text((frame.x_of(right) + 6.0, frame.y_of(end) + 5.0), &text, 14, Anchor::Start);
+            let place = (frame.x_of(right) + 6.0, frame.y_of(end));
+            sheet.centred_text(place, &text, LEGEND_TEXT, Anchor::Start);
         } else if end > top && start < top {
-            let x = left + (right - left) * (top - start) / (end - start);
-            sheet.text((frame.x_of(x), frame.y_of(top) - 5.0), &text, 14, Anchor::Middle);
+            let x = frame.x_of(left + (right - left) * (top - start) / (end - start));
+            frame.tag(sheet, (x.max(frame.left + 26.0) - 18.0, frame.top + 16.0), &text, Anchor::Middle);
         }
     }
 }
@@ -107,7 +112,7 @@ fn draw_medians(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f
     let width = (high - low) / f64::from(BINS);
     frame.clipped(sheet, |sheet| {
         for &n in multiples {
-            frame.level(sheet, n, LINE);
+            frame.level(sheet, n, GRID);
         }
         for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
             for bin in 0..BINS {
@@ -128,7 +133,6 @@ fn draw_medians(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f
         }
     });
     frame.axes(sheet);
-    frame.y_label(sheet);
 }
 
 /// τ/T of some slips, ascending.
@@ -161,18 +165,18 @@ mod tests {
     fn both_stages_of_the_ramp_are_drawn_and_what_comes_after_is_not() {
         let on = |stage, n| (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n));
         let points: Vec<Point> = on(RampStage::Up, 4.0).chain(on(RampStage::Down, 3.0)).collect();
-        let svg = drag(&points).unwrap().svg();
-        for text in ["n = 3", "n = 4", "way there", "way back", "τ/T"] {
+        let svg = drag(&points, &Look::default()).unwrap().svg();
+        for text in ["n = 3", "n = 4", "there", "back", "τ/T"] {
             assert!(svg.contains(text), "{text}");
         }
         let after: Vec<Point> = on(RampStage::After, 4.0).chain([point(None, 0.03, 4.0)]).collect();
-        assert!(drag(&after).is_none());
+        assert!(drag(&after, &Look::default()).is_none());
     }
 
     #[test]
     fn a_ramp_of_the_amplitude_alone_is_drawn_over_the_amplitude() {
         let ramped = |step: u32| Point { amplitude: 1e-8 * f64::from(step), ..point(Some(RampStage::Up), 0.03, 4.0) };
-        let svg = drag(&(0..100).map(ramped).collect::<Vec<_>>()).unwrap().svg();
+        let svg = drag(&(0..100).map(ramped).collect::<Vec<_>>(), &Look::default()).unwrap().svg();
         assert!(svg.contains("Amplitude Δ at the onset"));
     }
 }

@@ -1,8 +1,9 @@
-//! All figures that fit the reduced data of a sweep, written together.
+//! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
-use super::{FigureError, Picture};
+use super::{FigureError, Format, Look, OwnFigure, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, regimes, staircase};
-use crate::reduce::{WRITER, read_reduced, read_sets};
+use super::{own, sets};
+use crate::reduce::{SetRow, WRITER, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
 use std::path::PathBuf;
@@ -10,23 +11,22 @@ use std::path::PathBuf;
 /// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
 
-/// Draws the figures of a results directory into `figures/`, each as SVG and PNG: those whose data are there.
+/// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
 ///
 /// Returns the files, in the order in which they were written.
 ///
 /// # Errors
-/// When the reduced data are not there, are damaged, or a figure cannot be written.
-pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
+/// When the reduced data are not there, are damaged, or a figure does not fit its size or cannot be written.
+pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>, FigureError> {
     let _alone = alone(layout, WRITER)?;
-    if !layout.storage.exists(&layout.reduced())? {
-        return Err(FigureError::NotReduced { directory: layout.root().to_owned() });
-    }
+    check_reduced(layout)?;
     let points = read_reduced(layout)?;
-    let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(backbone::backbone(&points, &read_reduced(layout)?));
-    pictures.extend(intervals::intervals(&points));
-    pictures.extend(drag::drag(&points));
     let sets = read_sets(layout, MAX_SETS)?;
+    let look = &look.with_note(&sets::common(sets.iter().map(|set| &set.parameters)));
+    let mut pictures: Vec<Picture> = Vec::new();
+    pictures.extend(backbone::backbone(&points, &read_reduced(layout)?, &sets, look));
+    pictures.extend(intervals::intervals(&points, look));
+    pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
         for figure in [
@@ -37,24 +37,76 @@ pub fn draw_all(layout: &Layout<'_>) -> Result<Vec<PathBuf>, FigureError> {
             regimes::regimes,
             regimes::regime_map,
         ] {
-            pictures.extend(figure(&sets));
+            pictures.extend(figure(&sets, look));
         }
     }
     if sets.len() <= histograms::MAX_SETS {
-        pictures.extend(histograms::histograms(&sets, &read_reduced(layout)?));
+        pictures.extend(histograms::histograms(&sets, &read_reduced(layout)?, look));
     }
-    write(layout, &pictures)
+    write(layout, &pictures, look, formats)
 }
 
-fn write(layout: &Layout<'_>, pictures: &[Picture]) -> Result<Vec<PathBuf>, FigureError> {
+/// Draws a figure of one's own from the sets of a results directory; writes nothing.
+///
+/// # Errors
+/// When the reduced data are not there or are damaged, or the figure does not fit them or its size.
+pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
+    check_reduced(layout)?;
+    let rows: Vec<SetRow> = read_reduced(layout)?;
+    let look = &look.with_note(&sets::common(rows.iter().map(|row| &row.parameters.parameters)));
+    let picture = own::own(&rows, figure, look)?;
+    check_size(&picture, look)?;
+    Ok(picture)
+}
+
+/// Puts a figure into `figures/`, in these formats.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_own(
+    layout: &Layout<'_>,
+    picture: Picture,
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>, FigureError> {
+    let _alone = alone(layout, WRITER)?;
+    write(layout, &[picture], look, formats)
+}
+
+fn check_reduced(layout: &Layout<'_>) -> Result<(), FigureError> {
+    if layout.storage.exists(&layout.reduced())? {
+        return Ok(());
+    }
+    Err(FigureError::NotReduced { directory: layout.root().to_owned() })
+}
+
+/// A picture is larger than it is asked to be if its frames would be too small to read.
+fn check_size(picture: &Picture, look: &Look) -> Result<(), FigureError> {
+    const SLACK: f64 = 1.001;
+    let size = picture.size();
+    match look.size {
+        Some(asked) if size.width > SLACK * asked.width || size.height > SLACK * asked.height => {
+            Err(FigureError::TooSmall { figure: picture.name().to_owned(), size })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn write(
+    layout: &Layout<'_>,
+    pictures: &[Picture],
+    look: &Look,
+    formats: &[Format],
+) -> Result<Vec<PathBuf>, FigureError> {
+    pictures.iter().try_for_each(|picture| check_size(picture, look))?;
     let folder = layout.figures();
     layout.ensure_folder(&folder)?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut files = Vec::new();
     for picture in pictures {
-        for (extension, bytes) in [("svg", picture.svg().into_bytes()), ("png", picture.png()?)] {
-            let file = folder.join(format!("{}.{extension}", picture.name()));
-            commit.stage_bytes(&file, &bytes)?;
+        for &format in formats {
+            let file = folder.join(format!("{}.{}", picture.name(), format.extension()));
+            commit.stage_bytes(&file, &picture.encoded(format)?)?;
             files.push(file);
         }
     }
@@ -64,6 +116,7 @@ fn write(layout: &Layout<'_>, pictures: &[Picture]) -> Result<Vec<PathBuf>, Figu
 
 #[cfg(test)]
 mod tests {
+    use super::super::style::{Size, Style};
     use super::*;
     use crate::reduce::{BackboneBin, HistogramBin, Point, SetRow};
     use crate::table::columns::Table;
@@ -110,12 +163,12 @@ mod tests {
     #[test]
     fn figures_are_byte_identical_when_drawn_again() {
         let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
-        let files = draw_all(&layout).unwrap();
+        let files = draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_string_lossy().into_owned()).collect();
         assert_eq!(names, ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"]);
         let bytes = || files.iter().map(|file| fs::read(file).unwrap()).collect::<Vec<_>>();
         let before = bytes();
-        assert_eq!(draw_all(&layout).unwrap(), files);
+        assert_eq!(draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap(), files);
         assert!(bytes() == before);
         let (svg, png) = (String::from_utf8(before[0].clone()).unwrap(), &before[1]);
         assert!(svg.contains("φ (rad)") && svg.ends_with("</svg>"));
@@ -123,9 +176,35 @@ mod tests {
     }
 
     #[test]
+    fn a_pdf_is_whole_and_byte_identical_when_drawn_again_and_has_the_size_of_its_style() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let look = Look { style: Style::Print, ..Look::default() };
+        let drawn = || {
+            let files = draw_all(&layout, &look, &[Format::Pdf]).unwrap();
+            fs::read(&files[0]).unwrap()
+        };
+        let pdf = drawn();
+        assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF"));
+        assert!(drawn() == pdf);
+        let svg = fs::read_to_string(&draw_all(&layout, &look, &[Format::Svg]).unwrap()[0]).unwrap();
+        assert!(svg.contains(r#"width="86.00mm""#), "{}", &svg[..200]);
+    }
+
+    #[test]
+    fn a_size_that_a_figure_does_not_fit_is_refused_with_the_least_one() {
+        let (_root, layout) = reduced(&(0..200).map(modulated).collect::<Vec<_>>());
+        let drawn = |width, height| {
+            draw_all(&layout, &Look { size: Some(Size { width, height }), ..Look::default() }, &[Format::Svg])
+        };
+        let error = drawn(5.0, 5.0).unwrap_err().to_string();
+        assert!(error.starts_with("--size: figure phi-eta needs at least "), "{error}");
+        assert!(drawn(150.0, 100.0).is_ok());
+    }
+
+    #[test]
     fn without_modulation_no_phase_is_drawn() {
         let still = Point { period: None, periods: None, phase: None, ..modulated(1) };
         let (_root, layout) = reduced(&[still]);
-        assert!(draw_all(&layout).unwrap().is_empty());
+        assert!(draw_all(&layout, &Look::default(), &Format::DEFAULT).unwrap().is_empty());
     }
 }

@@ -1,41 +1,39 @@
-//! Frames: rectangles with two axes, the data in them, and a legend. A layout places them on a sheet.
+//! Frames: rectangles with two axes and the data in them. A layout places them on a sheet, with the legend above and the
+//! small print under them.
 
 use super::axis::Axis;
-use super::picture::{Anchor, BLACK, Dot, Fill, Sheet, Stroke, snapped};
+use super::font;
+use super::legend::{Entry, draw_legend, legend_rows};
+use super::picture::{Anchor, Dot, Fill, Sheet, Stroke, snapped};
+use super::style::{AXIS, BAR_WIDTH, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, TICK_TEXT, WHITE};
 use crate::reduce::Statistic;
+use kuva::render::color::Color;
 
-/// Size of numbers at ticks. All sizes stay readable when a figure is printed at half its size.
-pub(super) const TICK_TEXT: u32 = 16;
-/// Size of the axes' labels.
-const LABEL_TEXT: u32 = 19;
-/// Size of legends.
-pub(super) const LEGEND_TEXT: u32 = 15;
-/// Mean width of a letter over the size of the text.
-const LETTER: f64 = 0.6;
-/// Distance of the rows of a legend.
-const LEGEND_ROW: f64 = 22.0;
-/// Between a legend's border and its entries.
-const PADDING: f64 = 8.0;
-/// Between a frame and a legend in it.
-const INSET: f64 = 14.0;
-const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
 const TICK_LENGTH: f64 = 7.0;
 const MINOR_TICK_LENGTH: f64 = 4.0;
-/// Where labels of y axes begin, in the space left of a frame.
-const LABEL_LEFT: f64 = 14.0;
+/// Where labels of y axes, legends and small print begin.
+const MARGIN: f64 = 14.0;
+/// Between the number of a tick and the axis.
+const TICK_GAP: f64 = 8.0;
 
 /// Space left of a frame for numbers.
 pub(super) const LEFT: f64 = 76.0;
 /// Space right of a frame.
 pub(super) const RIGHT: f64 = 26.0;
-/// Space right of a frame for a legend beside it.
-pub(super) const LEGEND: f64 = 222.0;
 /// Space above a frame for the label of its y axis.
 pub(super) const ABOVE: f64 = 38.0;
 /// Space under a frame for numbers and label.
-const UNDER: f64 = 64.0;
+const UNDER: f64 = 58.0;
 /// Between two rows of frames, for a label and some air.
 pub(super) const ROW_GAP: f64 = 52.0;
+/// Space above a frame for a heading.
+const HEADING: f64 = 26.0;
+/// Distance of the rows of a legend.
+const LEGEND_ROW: f64 = 24.0;
+/// Distance of the lines of small print.
+const NOTE_ROW: f64 = 16.0;
+/// Shortest side of a frame; a sheet that is asked to be smaller becomes larger.
+const SHORTEST: f64 = 60.0;
 
 /// Frames of a figure, in rows and columns; numbers and label of the x axes stand under the lowest row only.
 #[derive(Clone, Copy)]
@@ -49,37 +47,109 @@ pub(super) struct Layout<'a> {
     pub(super) row_gap: f64,
     /// Space right of the last column.
     pub(super) right: f64,
+    /// Whether each frame has a heading.
+    pub(super) has_headings: bool,
 }
 
 impl<'a> Layout<'a> {
     /// A column of frames with this space between them.
     pub(super) const fn column(width: f64, heights: &'a [f64], row_gap: f64, right: f64) -> Self {
-        Self { columns: 1, width, column_gap: 0.0, heights, row_gap, right }
+        Self { columns: 1, width, column_gap: 0.0, heights, row_gap, right, has_headings: false }
     }
 
-    /// A sheet for all frames.
-    pub(super) fn sheet(&self, name: &'static str) -> Sheet {
+    /// The frames on a sheet of the size that is asked for, under this legend.
+    pub(super) fn page(&self, name: &str, look: &Look, legend: &[Entry]) -> (Page, Sheet) {
         let columns = self.columns as f64;
-        let width = LEFT + columns * self.width + (columns - 1.0) * self.column_gap + self.right;
-        Sheet::new(name, (width, ABOVE + self.rows_height(self.heights) - self.row_gap + UNDER))
-    }
+        let between = (columns - 1.0) * self.column_gap;
+        let beside = LEFT + between + self.right;
+        let natural = beside + columns * self.width;
+        let asked = look.size.map(|size| size.units(look.style));
+        let total = asked.map_or_else(|| look.style.width(natural), |(width, _)| width);
+        let width = ((total - beside) / columns).max(SHORTEST);
+        let total = beside + columns * width;
 
-    /// The frame in a row and a column, both from 0.
+        let right = total - MARGIN;
+        let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
+        let notes = wrapped(&look.note, right - MARGIN);
+        let rows = self.heights.len() as f64;
+        let heading = if self.has_headings { HEADING } else { 0.0 };
+        let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
+        let around = above_notes + notes.len() as f64 * NOTE_ROW + if notes.is_empty() { 0.0 } else { 0.5 * NOTE_ROW };
+        let natural: f64 = self.heights.iter().sum();
+        let scale = match asked {
+            Some((_, height)) => (height - around) / natural,
+            None => (width / self.width).min(1.0),
+        };
+        let heights: Vec<f64> = self.heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
+        let frames: f64 = heights.iter().sum();
+
+        let mut sheet = Sheet::new(name, look.style, (total, frames + around));
+        draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
+        for (row, line) in (1..).map(f64::from).zip(&notes) {
+            let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
+            sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(Color::from(DARK_GREY)));
+        }
+        let page = Page {
+            columns: self.columns,
+            width,
+            column_gap: self.column_gap,
+            heights,
+            row_gap: self.row_gap,
+            top,
+            heading,
+        };
+        (page, sheet)
+    }
+}
+
+/// A text in lines that fit a width, broken at spaces that may be broken at.
+fn wrapped(text: &str, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        match lines.last_mut() {
+            Some(line) if font::width(&format!("{line} {word}"), NOTE_TEXT) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
+}
+
+/// Where frames lie on a sheet.
+pub(super) struct Page {
+    columns: usize,
+    width: f64,
+    column_gap: f64,
+    heights: Vec<f64>,
+    row_gap: f64,
+    top: f64,
+    heading: f64,
+}
+
+impl Page {
+    /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
+        let above: f64 = self.heights[..row].iter().map(|height| height + self.row_gap + self.heading).sum();
+        let is_alone = self.columns * self.heights.len() == 1;
+        let letter = u8::try_from(row * self.columns + column).ok().and_then(|index| b'a'.checked_add(index));
         Frame {
             left: LEFT + column as f64 * (self.width + self.column_gap),
-            top: ABOVE + self.rows_height(&self.heights[..row]),
+            top: self.top + above + self.heading,
             width: self.width,
             height: self.heights[row],
             x,
             y,
+            heading: self.heading,
+            letter: letter.filter(|_| !is_alone).map(char::from),
             is_lowest: row + 1 == self.heights.len(),
         }
     }
 
-    /// Height of some rows, the gap under each included.
-    fn rows_height(&self, heights: &[f64]) -> f64 {
-        heights.iter().map(|height| height + self.row_gap).sum()
+    /// Height of the frames of a row.
+    pub(super) fn frame_height(&self, row: usize) -> f64 {
+        self.heights[row]
     }
 }
 
@@ -91,27 +161,10 @@ pub(super) struct Frame {
     pub(super) height: f64,
     pub(super) x: Axis,
     pub(super) y: Axis,
-    is_lowest: bool,
-}
-
-/// What a legend shows beside a text.
-#[derive(Clone, Copy)]
-pub(super) enum Mark {
-    Dot(Dot),
-    Line(Stroke),
-    Patch(Fill),
-}
-
-/// A row of a legend.
-pub(super) type Entry = (Mark, String);
-
-/// Where a legend goes: over a corner of the frame that is known to be free, beside it, or, with one entry, above it.
-#[derive(Clone, Copy)]
-pub(super) enum LegendPlace {
-    UpperRight,
-    LowerRight,
-    Beside,
-    Above,
+    heading: f64,
+    letter: Option<char>,
+    /// Whether it has the numbers and the label of the x axis.
+    pub(super) is_lowest: bool,
 }
 
 impl Frame {
@@ -131,7 +184,7 @@ impl Frame {
         self.top + (1.0 - self.y.place(value)) * self.height
     }
 
-    fn place(&self, (x, y): (f64, f64)) -> (f64, f64) {
+    pub(super) fn place(&self, (x, y): (f64, f64)) -> (f64, f64) {
         (self.x_of(x), self.y_of(y))
     }
 
@@ -157,24 +210,36 @@ impl Frame {
         self.curve(sheet, [(self.x.low, y), (self.x.high, y)], stroke);
     }
 
+    /// A vertical line from edge to edge.
+    pub(super) fn upright(&self, sheet: &mut Sheet, x: f64, stroke: Stroke) {
+        self.curve(sheet, [(x, self.y.low), (x, self.y.high)], stroke);
+    }
+
     /// The data points that lie inside.
     pub(super) fn points(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
         let inside = points.into_iter().filter(|&(x, y)| self.x.contains(x) && self.y.contains(y));
         sheet.discs(inside.map(|point| self.place(point)), dot);
     }
 
-    /// A line through statistics, with a bar for each confidence interval that is known.
+    /// Statistics, with a bar for each confidence interval that is known, joined by a line.
     pub(super) fn statistics(&self, sheet: &mut Sheet, points: &[(f64, Statistic)], stroke: Stroke, radius: f64) {
         let values = || points.iter().map(|&(x, statistic)| (x, statistic.value));
         self.clipped(sheet, |sheet| {
             self.curve(sheet, values(), stroke);
             for &(x, statistic) in points {
-                if let Some((low, high)) = statistic.interval {
-                    self.curve(sheet, [(x, low), (x, high)], Stroke::solid(stroke.ink, 1.6));
+                if let Some(ends) = statistic.interval {
+                    self.error_bar(sheet, x, ends, Stroke::solid(stroke.ink, BAR_WIDTH));
                 }
             }
         });
         self.points(sheet, values(), Dot::solid(stroke.ink, radius));
+    }
+
+    /// An upright bar between two values; what lies under a logarithmic axis runs out of the frame.
+    pub(super) fn error_bar(&self, sheet: &mut Sheet, x: f64, (low, high): (f64, f64), stroke: Stroke) {
+        let bottom =
+            if self.y.place(low).is_finite() { self.y_of(low).min(2.0 * self.bottom()) } else { self.bottom() };
+        sheet.line(vec![(self.x_of(x), bottom), (self.x_of(x), self.y_of(high))], stroke);
     }
 
     /// A vertical stripe between two values of x.
@@ -185,7 +250,7 @@ impl Frame {
         }
     }
 
-    /// Border, ticks and their numbers, over the data.
+    /// Border, ticks, their numbers, and the labels of both axes, over the data.
     pub(super) fn axes(&self, sheet: &mut Sheet) {
         let (right, bottom) = (self.right(), self.bottom());
         for (value, length) in ticks(&self.x) {
@@ -202,72 +267,99 @@ impl Frame {
         for corner in 0..4 {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
+        let height = f64::from(TICK_TEXT);
+        // Where a frame is small, numbers that would meet their neighbours are left out.
+        let mut free = f64::INFINITY;
         for (value, number) in &self.y.ticks {
-            sheet.centred_text((self.left - 8.0, self.y_of(*value)), number, TICK_TEXT, Anchor::End);
+            let y = self.y_of(*value);
+            if y <= free {
+                sheet.centred_text((self.left - TICK_GAP, y), number, TICK_TEXT, Anchor::End);
+                free = y - 1.1 * height;
+            }
         }
+        let mut free = f64::NEG_INFINITY;
         for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
-            let y = bottom + 1.3 * f64::from(TICK_TEXT);
-            sheet.text((self.x_of(*value), y), number, TICK_TEXT, Anchor::Middle);
+            let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
+            if x - half >= free {
+                sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
+                free = x + half + 0.3 * height;
+            }
         }
-    }
-
-    /// Label of the x axis, under its numbers.
-    pub(super) fn x_label(&self, sheet: &mut Sheet) {
+        self.y_label(sheet);
         if self.is_lowest {
-            let place = (self.left + 0.5 * self.width, self.bottom() + UNDER - 15.0);
+            let place = (self.left + 0.5 * self.width, bottom + UNDER - 12.0);
             sheet.text(place, &self.x.label, LABEL_TEXT, Anchor::Middle);
         }
     }
 
-    /// Label of the y axis, above its numbers.
-    pub(super) fn y_label(&self, sheet: &mut Sheet) {
-        if !self.y.label.is_empty() {
-            sheet.text((self.left - LEFT + LABEL_LEFT, self.top - 13.0), &self.y.label, LABEL_TEXT, Anchor::Start);
+    /// Letter and label of the y axis, above its numbers; the letter of a frame with a heading goes there.
+    fn y_label(&self, sheet: &mut Sheet) {
+        let letter = self.letter.filter(|_| self.heading == 0.0).map(|letter| format!("({letter})"));
+        let parts = [letter.as_deref(), Some(self.y.label.as_str()).filter(|label| !label.is_empty())];
+        let label = parts.into_iter().flatten().collect::<Vec<_>>().join(" ");
+        if !label.is_empty() {
+            let place = (self.left - LEFT + MARGIN, self.top - self.heading - 13.0);
+            sheet.text(place, &label, LABEL_TEXT, Anchor::Start);
         }
     }
 
-    /// A legend.
-    pub(super) fn legend(&self, sheet: &mut Sheet, place: LegendPlace, entries: &[Entry]) {
-        const MARK: f64 = 34.0;
-        let letters = entries.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0) as f64;
-        let width = MARK + letters * LETTER * f64::from(LEGEND_TEXT) + 2.0 * PADDING;
-        let height = entries.len() as f64 * LEGEND_ROW + PADDING;
-        let (left, top) = match place {
-            LegendPlace::UpperRight => (self.right() - INSET - width, self.top + INSET),
-            LegendPlace::LowerRight => (self.right() - INSET - width, self.bottom() - INSET - height),
-            LegendPlace::Beside => (self.right() + PADDING, self.top),
-            LegendPlace::Above => (self.left + 0.5 * (self.width - width), self.top - height - AXIS.width),
+    /// What the frame shows, above it, after its letter; at the right end, how much of it.
+    pub(super) fn heading(&self, sheet: &mut Sheet, text: &str, amount: &str) {
+        let y = self.top - 9.0;
+        if let Some(letter) = self.letter {
+            sheet.text((self.left - LEFT + MARGIN, y), &format!("({letter})"), LABEL_TEXT, Anchor::Start);
+        }
+        sheet.text((self.left, y), text, LEGEND_TEXT, Anchor::Start);
+        sheet.text((self.right(), y), amount, LEGEND_TEXT, Anchor::End);
+    }
+
+    /// A short text in the frame, on the ground that it needs to be read.
+    pub(super) fn tag(&self, sheet: &mut Sheet, (x, y): (f64, f64), text: &str, anchor: Anchor) {
+        let (size, width) = (f64::from(LEGEND_TEXT), font::width(text, LEGEND_TEXT));
+        let left = match anchor {
+            Anchor::Start => x,
+            Anchor::Middle => x - 0.5 * width,
+            Anchor::End => x - width,
         };
-        sheet.rectangle([left, top, width, height], Fill { ink: "#ffffff", opacity: 0.85 });
-        for (index, (mark, text)) in entries.iter().enumerate() {
-            let middle = top + 0.5 * PADDING + (index as f64 + 0.5) * LEGEND_ROW;
-            let (start, end) = (left + PADDING, left + MARK);
-            match *mark {
-                Mark::Dot(dot) => {
-                    // A single faint dot could not be seen.
-                    let dot = Dot { radius: dot.radius.max(3.0), opacity: dot.opacity.max(0.7), ..dot };
-                    sheet.discs([(0.5 * (start + end), middle)], dot);
-                }
-                Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
-                Mark::Patch(fill) => sheet.rectangle([start, middle - 6.0, end - start, 12.0], fill),
-            }
-            sheet.centred_text((left + MARK + PADDING, middle), text, LEGEND_TEXT, Anchor::Start);
-        }
+        let ground = [left - 2.0, y - 0.6 * size, width + 4.0, 1.2 * size];
+        sheet.rectangle(ground, Fill { ink: WHITE, opacity: 0.8 });
+        sheet.centred_text((x, y), text, LEGEND_TEXT, anchor);
     }
-}
-
-/// A row of a legend with a mark and a text.
-pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
-    (mark, text.into())
-}
-
-/// Space that a legend takes at the top or bottom of a frame.
-pub(super) fn legend_space(entries: usize) -> f64 {
-    INSET + entries as f64 * LEGEND_ROW + PADDING
 }
 
 /// Values at the ticks of an axis, and their lengths.
 fn ticks(axis: &Axis) -> impl Iterator<Item = (f64, f64)> {
     let minor = axis.minor.iter().map(|&value| (value, MINOR_TICK_LENGTH));
     minor.chain(axis.ticks.iter().map(|&(value, _)| (value, TICK_LENGTH)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::style::{Size, Style};
+    use super::*;
+
+    #[test]
+    fn a_sheet_has_the_size_that_is_asked_for_and_never_frames_too_small_to_read() {
+        let layout = Layout::column(500.0, &[300.0, 200.0], ROW_GAP, RIGHT);
+        let drawn = |style, size| {
+            let look = Look { style, size, note: "small print ".repeat(40) };
+            layout.page("", &look, &[]).1.finish().size()
+        };
+        for style in [Style::Screen, Style::Print] {
+            let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 110.0 } };
+            let found = drawn(style, Some(size));
+            assert!((found.width - size.width).abs() < 1e-9 && (found.height - size.height).abs() < 1e-9, "{found:?}");
+            let found = drawn(style, Some(Size { width: 5.0, height: 5.0 }));
+            assert!(found.width > 15.0 && found.height > 15.0);
+        }
+        assert!((drawn(Style::Print, None).width - 86.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn small_print_is_wrapped_at_spaces_and_complete() {
+        let lines = wrapped("alpha beta  gamma\u{a0}delta epsilon", font::width("alpha beta g", NOTE_TEXT));
+        assert_eq!(lines, ["alpha beta", "gamma delta", "epsilon"]);
+        assert_eq!(wrapped("longerthanaline", 10.0), ["longerthanaline"]);
+        assert!(wrapped("", 10.0).is_empty());
+    }
 }

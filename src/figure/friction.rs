@@ -1,24 +1,22 @@
 //! Mean friction over the amplitude of the modulated force: small perturbations do not change it, large ones lower it.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Entry, LEGEND, Layout, LegendPlace, Mark, entry};
-use super::picture::{BLACK, Dot, Fill, GREY, INKS, LIGHT_GREY, Picture, Stroke};
+use super::frame::{Layout, RIGHT};
+use super::legend::{Entry, Mark, entry};
+use super::picture::Picture;
 use super::sets::{Modulations, frequency};
+use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, STRIPE, curve, dot};
 use crate::reduce::{SetSummary, Statistic};
 
-const LAYOUT: Layout = Layout::column(542.0, &[358.0], 0.0, LEGEND);
+const LAYOUT: Layout = Layout::column(558.0, &[340.0], 0.0, RIGHT);
 /// Least amplitudes, zero included, and most periods of the figure.
 const MIN_AMPLITUDES: usize = 5;
 const MAX_PERIODS: usize = 3;
 /// Where the paper finds a significant reduction to begin, as a share of the peak force.
 const REDUCTION: (f64, f64) = (0.2, 0.3);
-const THRESHOLD: Fill = Fill { ink: LIGHT_GREY, opacity: 0.4 };
-const FREE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
-const RADIUS: f64 = 4.5;
-
 /// Draws sets that differ in the modulation alone, with 5 amplitudes or more and at most
 /// 3 periods; `None` for others. Forces are in units of those at Δ = 0, or in N if there is no such set.
-pub(super) fn friction(sets: &[SetSummary]) -> Option<Picture> {
+pub(super) fn friction(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let Modulations { free, amplitudes, periods, .. } = Modulations::of(sets.iter())?;
     let amplitudes = amplitudes.len() + usize::from(free.is_some());
     if amplitudes < MIN_AMPLITUDES || !(1..=MAX_PERIODS).contains(&periods.len()) {
@@ -34,34 +32,30 @@ pub(super) fn friction(sets: &[SetSummary]) -> Option<Picture> {
     let (_, widest) = bounds(points().map(|point| point.0))?;
     let (least, most) = bounds(points().flat_map(|point| point.1.ends()))?;
     let (x_label, y_label) = if units.is_some() {
-        ("Force amplitude ΔFₛ / peak force Fₘ at Δ = 0", "Mean friction over that at Δ = 0")
+        ("Amplitude ΔFₛ = Kd Δ of the force / peak force Fₘ at Δ = 0", "Mean friction ⟨Fₛ⟩ / mean friction at Δ = 0")
     } else {
-        ("Force amplitude ΔFₛ (N)", "Mean friction (N)")
+        ("Amplitude ΔFₛ = Kd Δ of the force (N)", "Mean friction ⟨Fₛ⟩ (N)")
     };
     let x = Axis::linear(x_label, -0.02 * widest, 1.04 * widest);
-    let frame = LAYOUT.frame(0, 0, x, Axis::rounded(y_label, least, most));
-
-    let mut sheet = LAYOUT.sheet("friction");
-    let mut entries: Vec<Entry> = Vec::new();
+    let modulated = periods.iter().zip(INKS).map(|(&period, ink)| (Some(period), ink, frequency(period)));
+    let lines: Vec<_> = modulated.chain(units.map(|_| (None, BLACK, "Δ = 0".to_owned()))).collect();
+    let mut entries: Vec<Entry> = lines.iter().map(|(_, ink, name)| entry(Mark::Bar(dot(ink)), name)).collect();
+    entries.extend(units.map(|_| entry(Mark::Patch(STRIPE), "0.2 to 0.3: reduction begins, according to the paper")));
+    let (page, mut sheet) = LAYOUT.page("friction", look, &entries);
+    let frame = page.frame(0, 0, x, Axis::rounded(y_label, least.min(0.0), most));
     if units.is_some() {
         frame.clipped(&mut sheet, |sheet| {
-            frame.stripe(sheet, REDUCTION.0, REDUCTION.1, THRESHOLD);
-            frame.level(sheet, 1.0, FREE);
+            frame.stripe(sheet, REDUCTION.0, REDUCTION.1, STRIPE);
+            frame.level(sheet, 1.0, REFERENCE);
         });
     }
-    let modulated = periods.iter().zip(INKS).map(|(&period, ink)| (Some(period), ink, frequency(period)));
-    for (period, ink, name) in modulated.chain(units.map(|_| (None, BLACK, "Δ = 0".to_owned()))) {
+    for (period, ink, _) in lines {
         let of_period = sets.iter().filter(|set| set.parameters.modulation_period == period);
         let mut points: Vec<(f64, Statistic)> = of_period.filter_map(point).collect();
         points.sort_by(|left, right| left.0.total_cmp(&right.0));
-        frame.statistics(&mut sheet, &points, Stroke::solid(ink, 1.4), RADIUS);
-        entries.push(entry(Mark::Dot(Dot::solid(ink, RADIUS)), name));
+        frame.statistics(&mut sheet, &points, curve(ink), RADIUS);
     }
-    entries.extend(units.map(|_| entry(Mark::Patch(THRESHOLD), "paper's threshold")));
     frame.axes(&mut sheet);
-    frame.x_label(&mut sheet);
-    frame.y_label(&mut sheet);
-    frame.legend(&mut sheet, LegendPlace::Beside, &entries);
     Some(sheet.finish())
 }
 
@@ -73,12 +67,12 @@ mod tests {
     #[test]
     fn forces_are_in_units_of_those_without_modulation_if_these_are_known() {
         let mut sets: Vec<SetSummary> = (1..=5).map(|step| set(1e-6 * f64::from(step), 0.02, 4.0)).collect();
-        assert!(friction(&sets).unwrap().svg().contains(">Mean friction (N)<"));
+        assert!(friction(&sets, &Look::default()).unwrap().svg().contains(">Mean friction ⟨Fₛ⟩ (N)<"));
         sets.push(set(0.0, 1.0, 1.0));
-        let svg = friction(&sets).unwrap().svg();
-        assert!(svg.contains(">Mean friction over that at Δ = 0<") && svg.contains(">1/T = 50 Hz<"));
-        assert!(friction(&sets[2..]).is_none(), "four amplitudes");
+        let svg = friction(&sets, &Look::default()).unwrap().svg();
+        assert!(svg.contains(">Mean friction ⟨Fₛ⟩ / mean friction at Δ = 0<") && svg.contains(">1/T = 50 Hz<"));
+        assert!(friction(&sets[2..], &Look::default()).is_none(), "four amplitudes");
         sets.extend([0.03, 0.04, 0.05].map(|period| set(1e-6, period, 4.0)));
-        assert!(friction(&sets).is_none(), "four periods");
+        assert!(friction(&sets, &Look::default()).is_none(), "four periods");
     }
 }

@@ -1,9 +1,13 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Entry, Frame, Layout, LegendPlace, Mark, RIGHT, entry, legend_space};
-use super::picture::{BLACK, Fill, GREY, Picture, RED, Sheet, Stroke};
-use super::sets::{modulation, setting, swept};
+use super::colour_bar::OVERLAP;
+use super::font;
+use super::frame::{Frame, Layout, RIGHT};
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
+use super::sets::{modulation, setting, swept, thousands};
+use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::Parameters;
 use crate::reduce::{HistogramBin, SetSummary};
 
@@ -11,13 +15,15 @@ use crate::reduce::{HistogramBin, SetSummary};
 const MAX_PANELS: usize = 4;
 /// Sets that may fit: each panel can hold a second one, of identical contacts.
 pub(super) const MAX_SETS: usize = 2 * MAX_PANELS;
-const HEIGHTS: [f64; MAX_PANELS] = [160.0; MAX_PANELS];
+const WIDTH: f64 = 558.0;
+const HEIGHTS: [f64; MAX_PANELS] = [150.0; MAX_PANELS];
 /// Multiples of T that are marked; more would be a grey area.
 const MAX_MULTIPLES: f64 = 40.0;
+/// Space in a panel for the numbers of the multiples.
+const NUMBERS: f64 = 24.0;
 const BAR: Fill = Fill { ink: "#9db4d6", opacity: 1.0 };
 const OUTLINE: Stroke = Stroke::solid(BLACK, 1.3);
 const OVERLAY: Stroke = Stroke::dashed(RED, 2.0, (6.0, 3.5));
-const MULTIPLE: Stroke = Stroke::dashed(GREY, 1.1, (3.0, 3.0));
 
 /// A panel: a set and, if there is one, the set of identical contacts that it otherwise equals.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,30 +42,34 @@ impl<'a> Panel<'a> {
     fn all_bars(&self) -> impl Iterator<Item = &'a HistogramBin> {
         self.bars.iter().chain(self.overlay.iter().flatten()).copied()
     }
+
+    /// The size of the sample.
+    fn amount(&self) -> String {
+        let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
+        let overlay = self.overlay.as_ref().map_or(String::new(), |bars| format!(" and {}", thousands(count(bars))));
+        format!("{}{overlay} intervals", thousands(count(&self.bars)))
+    }
 }
 
 /// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more
 /// sets or none.
-pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin]) -> Option<Picture> {
+pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
     let panels = panels(sets, bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
-    let layout = Layout::column(558.0, HEIGHTS.get(..panels.len())?, 12.0, RIGHT);
-    let mut sheet = layout.sheet("tau-histograms");
+    let layout = Layout { has_headings: true, ..Layout::column(WIDTH, HEIGHTS.get(..panels.len())?, 10.0, RIGHT) };
+    let (page, mut sheet) = layout.page("tau-histograms", look, &legend(&panels));
     let margin = 0.04 * (high - low);
     for (row, panel) in panels.iter().enumerate() {
         let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
         let multiples = multiples(panel.period, &x);
-        let entries = legend(panel, !multiples.is_empty());
         let y_label = if row == 0 { "Probability density (1/s)" } else { "" };
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
-        // The legend covers no bar.
-        let top = highest * HEIGHTS[row] / (HEIGHTS[row] - legend_space(entries.len()));
-        let frame = layout.frame(row, 0, x, Axis::sparse(y_label, 0.0, top));
+        // The numbers cover no bar.
+        let free = page.frame_height(row) - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
+        let frame = page.frame(row, 0, x, Axis::sparse(y_label, 0.0, highest * page.frame_height(row) / free));
         draw(&mut sheet, &frame, panel, &multiples);
-        frame.legend(&mut sheet, LegendPlace::UpperRight, &entries);
         frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        frame.x_label(&mut sheet);
+        frame.heading(&mut sheet, &panel.title, &panel.amount());
     }
     Some(sheet.finish())
 }
@@ -103,20 +113,33 @@ fn multiples(period: Option<f64>, axis: &Axis) -> Vec<f64> {
     multiples.take_while(|&multiple| multiple <= axis.high).collect()
 }
 
-fn legend(panel: &Panel<'_>, has_multiples: bool) -> Vec<Entry> {
-    let overlay = panel.overlay.as_ref().map(|_| entry(Mark::Line(OVERLAY), "identical contacts"));
-    let multiples = has_multiples.then(|| entry(Mark::Line(MULTIPLE), "τ = nT"));
-    [entry(Mark::Patch(BAR), panel.title.as_str())].into_iter().chain(overlay).chain(multiples).collect()
+fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
+    let has_overlay = panels.iter().any(|panel| panel.overlay.is_some());
+    let overlay = has_overlay.then(|| entry(Mark::Line(OVERLAY), "identical contacts, Δfₛ = 0"));
+    let multiples = panels.iter().any(|panel| panel.period.is_some());
+    let multiples = multiples.then(|| entry(Mark::Line(REFERENCE), "τ = nT"));
+    [entry(Mark::Patch(BAR), "slips of all seeds")].into_iter().chain(overlay).chain(multiples).collect()
 }
 
 fn draw(sheet: &mut Sheet, frame: &Frame, panel: &Panel<'_>, multiples: &[f64]) {
-    frame.clipped(sheet, |sheet| {
-        for &multiple in multiples {
-            frame.curve(sheet, [(multiple, 0.0), (multiple, frame.y.high)], MULTIPLE);
+    let period = panel.period.unwrap_or(1.0);
+    let mut free = f64::NEG_INFINITY;
+    for &multiple in multiples {
+        let (x, n) = (frame.x_of(multiple), (multiple / period).round());
+        let text = if free == f64::NEG_INFINITY { format!("n = {n}") } else { format!("{n}") };
+        let half = 0.5 * font::width(&text, LEGEND_TEXT);
+        let mut top = frame.top;
+        if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {
+            top += NUMBERS - 2.0;
+            sheet.centred_text((x, frame.top + 0.5 * NUMBERS + 1.0), &text, LEGEND_TEXT, Anchor::Middle);
+            free = x + half + 4.0;
         }
+        sheet.line(vec![(x, frame.bottom()), (x, top)], REFERENCE);
+    }
+    frame.clipped(sheet, |sheet| {
         for bar in &panel.bars {
             let (left, top) = (frame.x_of(bar.low), frame.y_of(bar.density));
-            sheet.rectangle([left, top, frame.x_of(bar.high) - left, frame.y_of(0.0) - top], BAR);
+            sheet.rectangle([left, top, frame.x_of(bar.high) - left + OVERLAP, frame.y_of(0.0) - top], BAR);
         }
         for line in outline(&panel.bars) {
             frame.curve(sheet, line, OUTLINE);
@@ -175,10 +198,16 @@ mod tests {
         assert_eq!(panels[0].overlay, Some(vec![&bins[0]]));
         assert_eq!(panels[1].title, "Δ = 1 µm, 1/T = 29 Hz");
         assert_eq!((panels[2].period, panels[2].overlay.as_ref()), (Some(1.0 / 58.0), None));
-        assert!(histograms(&sets, &bins).is_some());
-        assert!(histograms(&sets, &[]).is_none() && histograms(&[], &[]).is_none());
+        let svg = histograms(&sets, &bins, &Look::default()).unwrap().svg();
+        for text in ["(a)", "(c)", "1 and 1 intervals", "1 intervals", "Δ = 1 µm, 1/T = 58 Hz", "τ = nT"] {
+            assert!(svg.contains(&format!(">{text}<")), "{text}");
+        }
+        assert!(histograms(&sets, &[], &Look::default()).is_none() && histograms(&[], &[], &Look::default()).is_none());
         let five = [1.0, 2.0, 3.0, 4.0, 5.0].map(|frequency| set("58", 6.9e-3, Some(frequency)));
-        assert!(histograms(&five[..4], &bins).is_some() && histograms(&five, &bins).is_none());
+        assert!(
+            histograms(&five[..4], &bins, &Look::default()).is_some()
+                && histograms(&five, &bins, &Look::default()).is_none()
+        );
     }
 
     #[test]

@@ -1,75 +1,71 @@
-//! τ against T (Fig. 3c): slips, and the lines τ = nT on which locked intervals fall.
+//! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which locked intervals fall.
 
-use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::frame::{LEGEND, Layout, LegendPlace, Mark, entry};
-use super::picture::{Dot, INKS, Ink, Picture, Stroke};
-use super::scatter::Scatter;
+use super::axis::{Axis, logarithmic_bounds};
+use super::frame::{Frame, Layout, ROW_GAP};
+use super::hues::Hues;
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Dot, Picture, Sheet};
+use super::sets::three_digits;
+use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::Point;
-use std::collections::BTreeMap;
 
-const LAYOUT: Layout = Layout::column(542.0, &[398.0], 0.0, LEGEND);
+const WIDTH: f64 = 560.0;
+const HEIGHTS: [f64; 2] = [180.0, 340.0];
 const RADIUS: f64 = 1.8;
-/// Least ratio of n between two lines: closer ones would merge.
-const MIN_RATIO: f64 = 1.4;
+const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
+/// Whole numbers whose lines can be distinguished.
+const LINES: u32 = 12;
 
-/// Draws interval against period, both logarithmic, with the lines τ = nT of the most frequent n; `None` without any
-/// interval under modulation. Locked slips of these n have the colour of their line.
-pub(super) fn intervals(points: &[Point]) -> Option<Picture> {
-    let place = |point: &Point| Some((point.period?, point.interval?));
-    let slips = Scatter::new(points, RADIUS, 0.4, place);
-    let (low, high) = logarithmic_bounds(slips.xs())?;
+/// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
+/// τ = nT; `None` without any interval under modulation. Slips of locked sets have the colour of their drive velocity.
+pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
+    let place = |point: &Point| {
+        let (period, interval) = (point.period?, point.interval?);
+        Some((period, interval / period))
+    };
+    let slips: Vec<Slip> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
     let x = Axis::logarithmic("Modulation period T (s)", low, high);
-    let (low, high) = logarithmic_bounds(slips.ys())?;
-    let frame = LAYOUT.frame(0, 0, x, Axis::logarithmic("Slip interval τ (s)", low, high));
-    let mut sheet = LAYOUT.sheet("tau-T");
-    let lines: Vec<(u64, Ink)> = frequent_periods(points).into_iter().zip(INKS).collect();
-    let stroke = |ink| Stroke::solid(ink, 1.6);
+    let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
+    let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
+    let few = Axis::counts("τ / T: up to 12 periods", LINES);
 
-    frame.clipped(&mut sheet, |sheet| {
-        let of = |n| points.iter().filter(move |point| point.periods == Some(n));
-        for &(n, ink) in &lines {
-            // Only where there are slips with this n, and a little further.
-            if let Some((first, last)) = bounds(of(n).filter_map(|point| point.period)) {
-                let ends = [first / 1.25, last * 1.25];
-                frame.curve(sheet, ends.map(|period| (period, n as f64 * period)), stroke(ink));
-            }
+    let locked = slips.iter().filter(|slip| slip.0.is_locked);
+    let velocity = |value: f64| format!("V₀ = {} m/s", three_digits(value));
+    let hues = Hues::of("V₀ (m/s)", locked.map(|slip| slip.0.drive_velocity), velocity);
+    let mut entries: Vec<Entry> = hues.entries(3.0);
+    if hues.bar().is_some() {
+        entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of locked sets"));
+    }
+    if slips.iter().any(|slip| !slip.0.is_locked) {
+        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
+    }
+    entries.push(entry(Mark::Line(GRID), "τ = nT"));
+    let (page, mut sheet) = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, hues.right()).page("tau-T", look, &entries);
+    for (row, y) in [all, few].into_iter().enumerate() {
+        let frame = page.frame(row, 0, x.clone(), y);
+        let lines = if row == 0 { 1 } else { LINES };
+        draw(&mut sheet, &frame, &slips, &hues, lines);
+        frame.axes(&mut sheet);
+        if let Some(bar) = hues.bar() {
+            bar.draw(&mut sheet, &frame);
         }
-        slips.draw(sheet, &frame);
-        for &(n, ink) in &lines {
-            frame.points(sheet, of(n).filter(|point| point.is_locked).filter_map(place), Dot::solid(ink, RADIUS));
-        }
-    });
-    frame.axes(&mut sheet);
-    frame.x_label(&mut sheet);
-    frame.y_label(&mut sheet);
-    let mut entries = slips.legend().to_vec();
-    entries.extend(lines.iter().map(|&(n, ink)| {
-        entry(Mark::Line(stroke(ink)), if n == 1 { "τ = T".to_owned() } else { format!("τ = {n} T") })
-    }));
-    frame.legend(&mut sheet, LegendPlace::Beside, &entries);
+    }
     Some(sheet.finish())
 }
 
-/// The n of the most slips, locked ones if there are any, not too close to each other; ascending, at most one per ink.
-fn frequent_periods(points: &[Point]) -> Vec<u64> {
-    let has_locked = points.iter().any(|point| point.is_locked && point.periods.is_some_and(|n| n > 0));
-    let mut counts: BTreeMap<u64, u64> = BTreeMap::new();
-    for point in points.iter().filter(|point| point.is_locked || !has_locked) {
-        if let Some(n) = point.periods.filter(|&n| n > 0) {
-            *counts.entry(n).or_default() += 1;
+/// A slip and its place.
+type Slip<'a> = (&'a Point, (f64, f64));
+
+fn draw(sheet: &mut Sheet, frame: &Frame, slips: &[Slip<'_>], hues: &Hues, lines: u32) {
+    frame.clipped(sheet, |sheet| {
+        (1..=lines).for_each(|n| frame.level(sheet, f64::from(n), GRID));
+        let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
+        frame.points(sheet, others, OTHER);
+        for &(point, place) in slips.iter().filter(|slip| slip.0.is_locked) {
+            frame.points(sheet, [place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 });
         }
-    }
-    let mut by_count: Vec<(u64, u64)> = counts.into_iter().collect();
-    by_count.sort_by_key(|&(n, count)| (std::cmp::Reverse(count), n));
-    let mut chosen: Vec<u64> = Vec::new();
-    for (n, _) in by_count {
-        let is_apart = |other: &u64| (n.max(*other) as f64) >= MIN_RATIO * n.min(*other) as f64;
-        if chosen.len() < INKS.len() && chosen.iter().all(is_apart) {
-            chosen.push(n);
-        }
-    }
-    chosen.sort_unstable();
-    chosen
+    });
 }
 
 #[cfg(test)]
@@ -92,19 +88,20 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_those_of_the_most_locked_slips_and_do_not_merge() {
-        let mut points = vec![point(4, true); 10];
-        points.extend(vec![point(5, true); 8]);
-        points.extend(vec![point(8, true); 6]);
-        points.extend(vec![point(1, true); 2]);
-        points.extend(vec![point(30, false); 50]);
-        assert_eq!(frequent_periods(&points), [1, 4, 8]);
-        assert_eq!(frequent_periods(&points[26..]), [30]);
+    fn every_colour_is_explained() {
+        let mut points = vec![point(1, true), point(4, true), point(7, false)];
+        let texts = |points: &[Point], texts: &[&str]| {
+            let svg = intervals(points, &Look::default()).unwrap().svg();
+            texts.iter().all(|text| svg.contains(&format!(">{text}<")))
+        };
+        assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "4", "12"]));
+        points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..points[0] }));
+        assert!(texts(&points, &["V₀ (m/s)", "slips of locked sets", "other slips"]));
     }
 
     #[test]
     fn without_modulation_there_is_nothing_to_draw() {
         let still = Point { period: None, periods: None, ..point(1, false) };
-        assert!(intervals(&[still]).is_none());
+        assert!(intervals(&[still], &Look::default()).is_none());
     }
 }

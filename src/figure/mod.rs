@@ -1,11 +1,12 @@
-//! Figures: reduced data -> pictures in the paper's layout, as SVG and PNG bytes; [`draw_all`] alone writes.
+//! Figures: reduced data -> pictures, as SVG, PNG and PDF bytes; [`draw_all`] alone writes.
 //!
 //! ```text
-//! draw.rs -> a file for each figure: its data, its panels; `None` where the data do not fit
+//! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
+//! own.rs  -> any column of the sets against any other
 //!            scatter.rs, sets.rs     slips as dots; in what sets differ, and the grid on which they lie
-//!            frame.rs, axis.rs       panels on a sheet, axes, legends
-//!            colour_bar.rs           the colours of maps
-//!            picture.rs              lines, discs, text -> SVG, PNG
+//!            frame.rs, axis.rs       panels on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
+//!            style.rs                sizes, strokes and colours of all figures
+//!            picture.rs, pdf.rs      lines, discs, text -> SVG, PNG, PDF
 //! ```
 
 mod axis;
@@ -14,24 +15,34 @@ mod colour_bar;
 mod dependence;
 mod drag;
 mod draw;
+mod font;
 mod frame;
 mod friction;
 mod histograms;
+mod hues;
 mod intervals;
+mod legend;
 mod locking_map;
+mod own;
+mod pdf;
 mod picture;
 mod regimes;
+mod regions;
 mod scaling;
 mod scatter;
 mod sets;
 mod simulation;
 mod staircase;
+mod style;
+mod values;
 mod work_precision;
 
-pub use draw::draw_all;
-pub use picture::Picture;
+pub use draw::{draw_all, draw_own, write_own};
+pub use own::{OwnFigure, columns};
+pub use picture::{Format, Picture};
 pub use scaling::{Growth, Line, scaling};
-pub use simulation::{AttachedMap, simulation};
+pub use simulation::{AttachedMap, Simulation, simulation};
+pub use style::{Look, Size, Style};
 pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 
 use crate::table::file::DatasetError;
@@ -50,13 +61,33 @@ pub enum FigureError {
         /// What is missing.
         what: &'static str,
     },
-    /// The PNG cannot be made.
-    #[error("figure {figure}: cannot be turned into a PNG: {reason}")]
-    Raster {
+    /// A file of a picture cannot be made.
+    #[error("figure {figure}: cannot be turned into {}: {reason}", format.extension().to_uppercase())]
+    Encoding {
         /// Name of the figure.
-        figure: &'static str,
+        figure: String,
+        /// The format.
+        format: Format,
         /// The reason.
         reason: String,
+    },
+    /// A figure does not fit the size that is asked for.
+    #[error("--size: figure {figure} needs at least {:.0}mmx{:.0}mm with its legend and small print", size.width.ceil(), size.height.ceil())]
+    TooSmall {
+        /// Name of the figure.
+        figure: String,
+        /// Its least size.
+        size: Size,
+    },
+    /// An option of a figure of one's own does not fit the data.
+    #[error("--{option} {value}: {problem}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// Its value, as given.
+        value: String,
+        /// What is wrong, and what to do.
+        problem: String,
     },
     /// There are no reduced data.
     #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", shown(directory))]

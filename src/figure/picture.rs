@@ -1,34 +1,107 @@
-//! Pictures: what is drawn, as SVG and as PNG. The same data give the same bytes.
+//! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
 use super::FigureError;
+use super::pdf::pdf;
+use super::style::{BLACK, HALF_DIGIT, Size, Style};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 pub(super) use kuva::render::render::TextAnchor as Anchor;
 use kuva::render::render::{Primitive, Scene};
 
-/// Pixels of the PNG per unit of the SVG: 1300 pixels for a figure of a column's width.
-const PIXELS_PER_UNIT: f32 = 2.0;
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
 /// A finished figure.
 pub struct Picture {
-    name: &'static str,
+    name: String,
+    style: Style,
     scene: Scene,
+}
+
+/// A format of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Vectors, for the browser and for changes by hand.
+    Svg,
+    /// Pixels.
+    Png,
+    /// Vectors, for papers.
+    Pdf,
+}
+
+impl Format {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Svg, Self::Png, Self::Pdf];
+    /// Those that figures get if none is asked for.
+    pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
+
+    /// What its files end in.
+    #[must_use]
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+            Self::Pdf => "pdf",
+        }
+    }
 }
 
 impl Picture {
     /// Its name; its files have the same.
     #[must_use]
-    pub const fn name(&self) -> &'static str {
-        self.name
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Width and height in mm.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        let [width, height] = [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
+        Size { width, height }
+    }
+
+    /// The figure in a format.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
+    pub fn encoded(&self, format: Format) -> Result<Vec<u8>, FigureError> {
+        match format {
+            Format::Svg => Ok(self.svg().into_bytes()),
+            Format::Png => self.png(),
+            Format::Pdf => self.pdf(),
+        }
     }
 
     /// The figure as SVG.
     #[must_use]
     pub fn svg(&self) -> String {
-        SvgBackend::new().render_scene(&self.scene)
+        let svg = SvgBackend::new().render_scene(&self.scene);
+        if self.style == Style::Screen {
+            return svg;
+        }
+        // The library gives sizes in pixels only.
+        let Size { width, height } = self.size();
+        let sides = format!(
+            r#"width="{width:.2}mm" height="{height:.2}mm" viewBox="0 0 {:.2} {:.2}""#,
+            self.scene.width, self.scene.height
+        );
+        match (svg.find("width="), svg.find(" font-family=")) {
+            (Some(start), Some(end)) if start < end => format!("{}{sides}{}", &svg[..start], &svg[end..]),
+            _ => svg,
+        }
+    }
+
+    /// The figure as a PDF file of one page.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
+    pub fn pdf(&self) -> Result<Vec<u8>, FigureError> {
+        pdf(&self.scene, self.style.points()).map_err(|reason| FigureError::Encoding {
+            figure: self.name.clone(),
+            format: Format::Pdf,
+            reason,
+        })
     }
 
     /// The figure as a PNG file.
@@ -37,41 +110,27 @@ impl Picture {
     /// When it cannot be encoded.
     pub fn png(&self) -> Result<Vec<u8>, FigureError> {
         RasterBackend::new()
-            .with_scale(PIXELS_PER_UNIT)
+            .with_scale(self.style.pixels())
             .render_scene(&self.scene)
-            .map_err(|reason| FigureError::Raster { figure: self.name, reason })
+            .map_err(|reason| FigureError::Encoding { figure: self.name.clone(), format: Format::Png, reason })
     }
 }
 
 /// A sheet to draw on. Lengths are units of the SVG, from the upper left corner.
 pub(super) struct Sheet {
-    name: &'static str,
+    name: String,
+    style: Style,
     scene: Scene,
     clips: usize,
 }
 
-/// The nearest whole pixel of the PNG: edges of cells that lie there show no seams.
+/// The nearest half of a unit, on a whole pixel of the PNG for screens: edges of cells that lie there show no seams.
 pub(super) fn snapped(place: f64) -> f64 {
-    let scale = f64::from(PIXELS_PER_UNIT);
-    (scale * place).round() / scale
+    (2.0 * place).round() / 2.0
 }
 
 /// An opaque colour, `#rrggbb`.
 pub(super) type Ink = &'static str;
-
-/// Black for axes and text.
-pub(super) const BLACK: Ink = "#000000";
-/// For grid lines.
-pub(super) const LIGHT_GREY: Ink = "#b8b8b8";
-/// For data in the background.
-pub(super) const GREY: Ink = "#8c8c8c";
-/// The paper's theory.
-pub(super) const RED: Ink = "#d62020";
-/// The paper's averages.
-pub(super) const BLUE: Ink = "#1f55c4";
-
-/// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
-pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// A line's look.
 #[derive(Clone, Copy, Debug)]
@@ -114,15 +173,15 @@ pub(super) struct Fill {
 }
 
 impl Sheet {
-    pub(super) fn new(name: &'static str, (width, height): (f64, f64)) -> Self {
+    pub(super) fn new(name: &str, style: Style, (width, height): (f64, f64)) -> Self {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
         scene.text_color = Some(BLACK.to_owned());
-        Self { name, scene, clips: 0 }
+        Self { name: name.to_owned(), style, scene, clips: 0 }
     }
 
     pub(super) fn finish(self) -> Picture {
-        Picture { name: self.name, scene: self.scene }
+        Picture { name: self.name, style: self.style, scene: self.scene }
     }
 
     pub(super) fn line(&mut self, points: Vec<(f64, f64)>, stroke: Stroke) {
@@ -168,6 +227,18 @@ impl Sheet {
         self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
 
+    pub(super) fn dot(&mut self, (cx, cy): (f64, f64), radius: f64, fill: Color) {
+        self.scene.add(Primitive::Circle {
+            cx,
+            cy,
+            r: radius,
+            fill,
+            fill_opacity: None,
+            stroke: None,
+            stroke_width: None,
+        });
+    }
+
     pub(super) fn discs(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
         let (cx, cy) = centres.into_iter().unzip();
         self.scene.add(Primitive::CircleBatch {
@@ -182,14 +253,25 @@ impl Sheet {
     }
 
     /// A text on its base line, always upright: the raster makes turned text bold.
-    pub(super) fn text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: Anchor) {
+    pub(super) fn text(&mut self, place: (f64, f64), text: &str, size: u32, anchor: Anchor) {
+        self.coloured_text(place, text, size, anchor, None);
+    }
+
+    pub(super) fn coloured_text(
+        &mut self,
+        (x, y): (f64, f64),
+        text: &str,
+        size: u32,
+        anchor: Anchor,
+        color: Option<Color>,
+    ) {
         let content = text.to_owned();
-        self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None });
+        self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
     }
 
     /// A text with the middle of its digits at this height.
     pub(super) fn centred_text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: Anchor) {
-        self.text((x, y + 0.36 * f64::from(size)), text, size, anchor);
+        self.text((x, y + HALF_DIGIT * f64::from(size)), text, size, anchor);
     }
 
     /// Shows what `draw` draws inside the rectangle only.

@@ -1,25 +1,27 @@
 //! Regimes: share of time within slips, mean friction and mean interval, along one parameter or over two.
 
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
 use super::dependence::{label, lines, number};
-use super::frame::{Frame, LEGEND, Layout, LegendPlace, Mark, ROW_GAP, entry};
-use super::picture::{BLACK, Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
+use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::legend::{Mark, entry};
+use super::picture::{Anchor, Dot, Picture, Sheet, Stroke};
+use super::regions::middles;
 use super::sets::{Grid, distinct, modulation, swept};
+use super::style::{BLACK, HALF_DIGIT, INKS, LEGEND_TEXT, Look, RADIUS, REFERENCE, WHITE, curve, dot, ink_on, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetSummary, Statistic};
 
-const LINES: Layout = Layout::column(470.0, &[220.0; 3], ROW_GAP, LEGEND);
-const MAP: Layout = Layout::column(470.0, &[250.0; 3], ROW_GAP, COLOUR_BAR);
+const LINES: Layout = Layout::column(558.0, &[190.0; 3], ROW_GAP, RIGHT);
+const MAP: Layout = Layout::column(490.0, &[220.0; 3], ROW_GAP, COLOUR_BAR);
 /// Least values of the parameter along which lines are drawn, and of each parameter of a map.
 const MIN_VALUES: usize = 4;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
-const RADIUS: f64 = 4.5;
-const WHITE: Ink = "#ffffff";
-const BOUND: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
+/// The regimes as numbers of a map.
+const REGIMES: [Regime; 3] = [Regime::StickSlip, Regime::Mixed, Regime::Sliding];
 
 type Getter = fn(&SetSummary) -> Option<Statistic>;
 
@@ -30,7 +32,7 @@ const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| set.tau_mean);
 
 /// Draws sets in which, besides the modulation, only V0 or the reattachment delay differs, or any one parameter if not
 /// all sets are stick-slip; `None` for others.
-pub(super) fn regimes(sets: &[SetSummary]) -> Option<Picture> {
+pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let all: Vec<&SetSummary> = sets.iter().collect();
     let [symbol] = swept(&all)[..] else { return None };
     let is_plain = sets.iter().all(|set| set.regime == Some(Regime::StickSlip));
@@ -40,37 +42,35 @@ pub(super) fn regimes(sets: &[SetSummary]) -> Option<Picture> {
     }
     let lines = lines(all.iter().copied())?;
     let x = Grid::of(values).wider_axis(&label(symbol));
-    let mut sheet = LINES.sheet("regimes");
+    let names = lines.iter().map(|line| modulation(&line[0].parameters));
+    let mut entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
+    if sets.iter().any(|set| set.regime == Some(Regime::Sliding)) {
+        entries.push(entry(Mark::Ring(BLACK, RADIUS), "sliding"));
+    }
+    let [mixed, sliding] = Regime::MIN_SHARES;
+    entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));
+    let (page, mut sheet) = LINES.page("regimes", look, &entries);
     for (row, (y_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
         let y = match row {
             0 => Axis::linear(y_label, -0.03, 1.03),
             _ => scale(y_label, sets.iter().filter_map(statistic).flat_map(Statistic::ends))?,
         };
-        let frame = LINES.frame(row, 0, x.clone(), y);
+        let frame = page.frame(row, 0, x.clone(), y);
         if row == 0 {
             for share in Regime::MIN_SHARES {
-                frame.level(&mut sheet, share, BOUND);
+                frame.level(&mut sheet, share, REFERENCE);
             }
         }
         for (line, ink) in lines.iter().zip(INKS) {
             let known = |set: &&&SetSummary| statistic(set).is_some();
             let point = |set: &&SetSummary| Some((number(&set.parameters, symbol)?, statistic(set)?));
             let points: Vec<(f64, Statistic)> = line.iter().filter_map(point).collect();
-            frame.statistics(&mut sheet, &points, Stroke::solid(ink, 1.6), RADIUS);
+            frame.statistics(&mut sheet, &points, curve(ink), RADIUS);
             let sliding = line.iter().filter(known).filter(|set| set.regime == Some(Regime::Sliding));
             let centres: Vec<(f64, f64)> = sliding.filter_map(point_value(symbol, statistic)).collect();
             frame.points(&mut sheet, centres, Dot::solid(WHITE, RADIUS - 1.6));
         }
         frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        frame.x_label(&mut sheet);
-        if row == 0 {
-            let names = lines.iter().map(|line| modulation(&line[0].parameters));
-            let mut entries: Vec<_> =
-                names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(Dot::solid(ink, RADIUS)), name)).collect();
-            entries.push(entry(Mark::Line(BOUND), "mixed, sliding above"));
-            frame.legend(&mut sheet, LegendPlace::Beside, &entries);
-        }
     }
     Some(sheet.finish())
 }
@@ -82,7 +82,7 @@ fn point_value(symbol: Symbol, statistic: Getter) -> impl Fn(&&SetSummary) -> Op
 
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
 /// 4 values or more; `None` for others.
-pub(super) fn regime_map(sets: &[SetSummary]) -> Option<Picture> {
+pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let all: Vec<&SetSummary> = sets.iter().collect();
     let swept = swept(&all);
     // The drive velocity is the x axis wherever it is one.
@@ -103,31 +103,47 @@ pub(super) fn regime_map(sets: &[SetSummary]) -> Option<Picture> {
         let place = |symbol, grid: &Grid| Some(grid.cell_of(number(&set.parameters, symbol)?));
         Some((place(horizontal, &columns)?, place(vertical, &rows)?))
     };
-    let mut sheet = MAP.sheet("regime-map");
+    let (page, mut sheet) = MAP.page(
+        "regime-map",
+        look,
+        &[entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")],
+    );
     for (row, (bar_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
         let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
         let shades = if row == 0 { Axis::linear(bar_label, 0.0, 1.0) } else { scale(bar_label, values)? };
-        let frame = MAP.frame(row, 0, columns.axis(&label(horizontal)), rows.axis(&label(vertical)));
+        let frame = page.frame(row, 0, columns.axis(&label(horizontal)), rows.axis(&label(vertical)));
         frame.clipped(&mut sheet, |sheet| {
             sheet.rectangles(sets.iter().filter_map(|set| {
                 let (x, y) = cell(set)?;
                 let [left, top, width, height] = frame.box_of(x, y);
-                let colour = shade(1.0 - shades.place(statistic(set)?.value));
+                let colour = shade(shades.place(statistic(set)?.value));
                 Some(([left, top, width + OVERLAP, height + OVERLAP], colour))
             }));
             borders(sheet, &frame, sets, cell);
         });
-        frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        frame.x_label(&mut sheet);
-        let ticks = shades.ticks.iter().map(|(value, number)| (shades.place(*value), number.clone())).collect();
-        ColourBar::of_reversed_shades(bar_label, ticks).draw(&mut sheet, &frame);
-        if row == 2 {
-            // Where sets slide there are no intervals.
-            frame.legend(&mut sheet, LegendPlace::UpperRight, &[entry(Mark::Line(BORDER), "between regimes")]);
+        if row == 0 {
+            names(&mut sheet, &frame, sets, [&columns, &rows], [horizontal, vertical]);
         }
+        frame.axes(&mut sheet);
+        ColourBar::of_axis(bar_label, &shades).draw(&mut sheet, &frame);
     }
     Some(sheet.finish())
+}
+
+/// Prints the name of each regime into its region.
+fn names(sheet: &mut Sheet, frame: &Frame, sets: &[SetSummary], [columns, rows]: [&Grid; 2], symbols: [Symbol; 2]) {
+    let index = |set: &SetSummary, symbol, grid: &Grid| Some(grid.index_of(number(&set.parameters, symbol)?));
+    let regime = |set: &SetSummary| {
+        let cell = (index(set, symbols[0], columns)?, index(set, symbols[1], rows)?);
+        Some((cell, REGIMES.iter().position(|regime| set.regime == Some(*regime))?))
+    };
+    for ((column, row), index) in middles(&sets.iter().filter_map(regime).collect()) {
+        let (x, y) = (columns.cell(column), rows.cell(row));
+        let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
+        let ink = ink_on(if REGIMES[index] == Regime::StickSlip { 0.0 } else { 1.0 });
+        let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
+        sheet.coloured_text(place, REGIMES[index].word(), LEGEND_TEXT, Anchor::Middle, Some(ink));
+    }
 }
 
 /// A cell as its ends along x and along y.
@@ -187,7 +203,7 @@ mod tests {
             .zip(1..)
             .map(|(&share, step)| at(1e-5 * f64::from(1 << step), 0.005, share))
             .collect();
-        let svg = regimes(&sets).unwrap().svg();
+        let svg = regimes(&sets, &Look::default()).unwrap().svg();
         for text in
             ["Drive velocity V₀ (m/s)", "Share of time within slips", "Mean friction (N)", "Mean interval τ (s)"]
         {
@@ -195,16 +211,16 @@ mod tests {
         }
         assert_eq!(
             svg.matches(&format!("fill=\"{WHITE}\"")).count(),
-            regimes(&sets[..4]).unwrap().svg().matches(&format!("fill=\"{WHITE}\"")).count() + 2
+            regimes(&sets[..4], &Look::default()).unwrap().svg().matches(&format!("fill=\"{WHITE}\"")).count() + 3
         );
-        assert!(regimes(&sets[..3]).is_none(), "three values");
+        assert!(regimes(&sets[..3], &Look::default()).is_none(), "three values");
         let sizes: Vec<SetSummary> = (1..=5)
             .map(|blocks| {
                 let plain = set(0.0, 1.0, 1.0);
                 SetSummary { parameters: Parameters { blocks, ..plain.parameters.clone() }, ..plain }
             })
             .collect();
-        assert!(regimes(&sizes).is_none(), "nothing but stick-slip, and the drive is one");
+        assert!(regimes(&sizes, &Look::default()).is_none(), "nothing but stick-slip, and the drive is one");
     }
 
     #[test]
@@ -218,9 +234,11 @@ mod tests {
                 })
                 .collect()
         };
-        let map = |sets: &[SetSummary]| regime_map(sets).unwrap().svg().matches("stroke-width=\"1.6\"").count();
+        let map = |sets: &[SetSummary]| {
+            regime_map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count()
+        };
         let without = map(&grid(|_, _| 0.05));
         assert_eq!(map(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
-        assert!(regime_map(&grid(|_, _| 0.05)[..9]).is_none(), "two rows");
+        assert!(regime_map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(), "two rows");
     }
 }

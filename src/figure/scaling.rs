@@ -2,8 +2,10 @@
 
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{ABOVE, Entry, Frame, LEFT, LEGEND, Layout, LegendPlace, Mark, entry};
-use super::picture::{Dot, GREY, INKS, Ink, Picture, Sheet, Stroke};
+use super::frame::{ABOVE, Frame, LEFT, Layout, RIGHT};
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Picture, Sheet, Stroke};
+use super::style::{GREY, INKS, Look, curve, dot};
 
 const NAME: &str = "scaling";
 /// Powers of the size that are drawn as guides, and their dashes.
@@ -32,11 +34,11 @@ type LinesOf = fn(&Growth) -> &[Line];
 ///
 /// # Errors
 /// When there is nothing to draw.
-pub fn scaling(growths: &[Growth]) -> Result<Picture, FigureError> {
+pub fn scaling(growths: &[Growth], look: &Look) -> Result<Picture, FigureError> {
     let columns = growths.len();
     let heights = &[280.0; 2];
-    let layout = Layout { columns, width: 300.0, column_gap: LEFT, heights, row_gap: ABOVE, right: LEGEND };
-    let mut sheet = layout.sheet(NAME);
+    let layout = Layout { columns, column_gap: LEFT, ..Layout::column(360.0, heights, ABOVE, RIGHT) };
+    let (page, mut sheet) = layout.page(NAME, look, &growths.last().map_or(Vec::new(), legend));
     let rows: [(&str, LinesOf); 2] =
         [("CPU time per slip (s)", |growth| &growth.costs), ("Steps and breaks per slip", |growth| &growth.counts)];
     for (row, (y_label, lines_of)) in rows.into_iter().enumerate() {
@@ -47,14 +49,9 @@ pub fn scaling(growths: &[Growth]) -> Result<Picture, FigureError> {
             let Some((first, last)) = logarithmic_bounds(points(lines).map(|point| point.0)) else { continue };
             let x = Axis::logarithmic(&growth.label, first, last);
             let y = Axis::logarithmic(if column == 0 { y_label } else { "" }, GUIDES_UNDER * low, high);
-            let frame = layout.frame(row, column, x, y);
+            let frame = page.frame(row, column, x, y);
             draw(&mut sheet, &frame, lines);
             frame.axes(&mut sheet);
-            frame.x_label(&mut sheet);
-            frame.y_label(&mut sheet);
-            if column + 1 == columns {
-                frame.legend(&mut sheet, LegendPlace::Beside, &legend(lines, row == 0));
-            }
         }
     }
     Ok(sheet.finish())
@@ -64,14 +61,13 @@ fn points(lines: &[Line]) -> impl Iterator<Item = (f64, f64)> {
     lines.iter().flat_map(|(_, points)| points).copied()
 }
 
-fn legend(lines: &[Line], with_guides: bool) -> Vec<Entry> {
-    let lines = lines.iter().zip(INKS).map(|((name, _), ink)| entry(Mark::Line(curve(ink)), name.as_str()));
-    let guides = GUIDES.iter().filter(|_| with_guides);
-    lines.chain(guides.map(|&(power, stroke)| entry(Mark::Line(stroke), format!("slope {power}")))).collect()
-}
-
-const fn curve(ink: Ink) -> Stroke {
-    Stroke::solid(ink, 1.8)
+/// Lines of both panels, whose inks are the same, and the guides.
+fn legend(growth: &Growth) -> Vec<Entry> {
+    let lines = [("costs", &growth.costs), ("counts", &growth.counts)].map(|(of, lines)| (of, lines, INKS));
+    let named = lines.into_iter().flat_map(|(of, lines, inks)| {
+        lines.iter().zip(inks).map(move |((name, _), ink)| entry(Mark::Line(curve(ink)), format!("{of}: {name}")))
+    });
+    named.chain(GUIDES.map(|(power, stroke)| entry(Mark::Line(stroke), format!("slope {power}")))).collect()
 }
 
 /// The guides from under the first point of the lowest line, and the lines over them.
@@ -84,7 +80,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Line]) {
         }
         for ((_, points), ink) in lines.iter().zip(INKS) {
             frame.curve(sheet, points.iter().copied(), curve(ink));
-            frame.points(sheet, points.iter().copied(), Dot::solid(ink, 4.0));
+            frame.points(sheet, points.iter().copied(), dot(ink));
         }
     });
 }
@@ -97,14 +93,20 @@ mod tests {
     fn two_panels_a_size_and_each_label_once() {
         let line = |name: &str| (name.to_owned(), vec![(70.0, 0.01), (140.0, 0.03)]);
         let growth = |label: &str| Growth { label: label.to_owned(), costs: vec![line("a")], counts: vec![line("b")] };
-        let picture = scaling(&[growth("Blocks N"), growth("Contacts")]).unwrap();
+        let picture = scaling(&[growth("Blocks N"), growth("Contacts")], &Look::default()).unwrap();
         let svg = picture.svg();
         assert_eq!(svg.matches("<clipPath").count(), 4);
-        for text in ["Blocks N", "Contacts", "CPU time per slip (s)", "Steps and breaks per slip", "slope 1", "slope 2"]
-        {
+        for text in [
+            "Blocks N",
+            "Contacts",
+            "(a) CPU time per slip (s)",
+            "(c) Steps and breaks per slip",
+            "slope 1",
+            "costs: a",
+        ] {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), 1, "{text}");
         }
         assert!(picture.png().unwrap().starts_with(b"\x89PNG"));
-        assert!(scaling(&[]).is_err());
+        assert!(scaling(&[], &Look::default()).is_err());
     }
 }

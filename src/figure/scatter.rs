@@ -1,7 +1,9 @@
 //! Slips as small dots, those of locked sets over the others (Fig. 3c, e).
 
-use super::frame::{Entry, Frame, Mark, entry};
-use super::picture::{BLACK, Dot, GREY, Sheet};
+use super::frame::Frame;
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Dot, Sheet};
+use super::style::{BLACK, GREY};
 use crate::reduce::Point;
 
 /// Slips at their places in a frame.
@@ -22,6 +24,12 @@ impl Scatter {
     ) -> Self {
         let slips = points.iter().filter_map(|point| place(point).map(|(x, y)| (x, y, point.is_locked))).collect();
         Self { slips, any: Dot { ink: GREY, radius, opacity }, locked: Dot { ink: BLACK, radius, opacity } }
+    }
+
+    #[cfg(test)]
+    pub(super) fn of(slips: impl Iterator<Item = (f64, f64)>) -> Self {
+        let dot = Dot::solid(BLACK, 1.0);
+        Self { slips: slips.map(|(x, y)| (x, y, true)).collect(), any: dot, locked: dot }
     }
 
     pub(super) fn xs(&self) -> impl Iterator<Item = f64> {

@@ -81,16 +81,54 @@ pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
         Value::Real(real) => three_digits(real),
         value => value.to_string(),
     };
-    format!("{} = {value} {}", description.key, description.unit).trim_end().to_owned()
+    format!("{} = {value} {}", symbol_of(symbol), description.unit).trim_end().to_owned()
 }
 
-fn three_digits(value: f64) -> String {
+/// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
+pub(super) fn symbol_of(symbol: Symbol) -> String {
+    let description = symbol.description();
+    let name = if description.symbol.is_empty() { description.key } else { description.symbol };
+    match name.split_once('_') {
+        Some((letter, "s")) => format!("{letter}ₛ"),
+        Some((letter, "r")) => format!("{letter}ᵣ"),
+        // There is no letter for other subscripts.
+        Some(_) => description.key.to_owned(),
+        None => name.replace("V0", "V₀"),
+    }
+}
+
+pub(super) fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
     // Through the decimal form, so that 29.000000000000004 is 29.
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+/// What some parameters have in common, in symbols.
+pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
+    let all: Vec<&Parameters> = all.collect();
+    let Some(first) = all.first() else { return String::new() };
+    // What is off, or enters nothing that figures show, is left out.
+    let is_shown = |symbol: &Symbol| {
+        let value = first.get(*symbol);
+        !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
+            && value != Value::Absent
+            && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
+            && all.iter().all(|parameters| parameters.get(*symbol) == value)
+    };
+    let settings = Symbol::ALL.into_iter().filter(is_shown).map(|symbol| setting(first, symbol));
+    // Lines are not broken within one.
+    settings.map(|setting| setting.replace(' ', "\u{a0}")).collect::<Vec<_>>().join(", ")
+}
+
+/// A count with commas between thousands.
+pub(super) fn thousands(count: u64) -> String {
+    let digits = count.to_string();
+    let groups: Vec<&str> =
+        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
+    groups.join(",")
 }
 
 /// Values of a swept quantity and how they are spaced.
@@ -105,6 +143,16 @@ impl Grid {
     pub(super) fn of(values: Vec<f64>) -> Self {
         let is_linear = has_even_steps(&values) || values.first().is_none_or(|&least| least <= 0.0);
         Self { values, is_linear }
+    }
+
+    /// Spaced logarithmically. `values` > 0 ascend.
+    pub(super) const fn logarithmic(values: Vec<f64>) -> Self {
+        Self { values, is_linear: false }
+    }
+
+    /// Cells around all values.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (f64, f64)> {
+        (0..self.values.len()).map(|index| self.cell(index))
     }
 
     /// An axis for cells: it ends half a step beyond the values.
@@ -127,7 +175,8 @@ impl Grid {
     pub(super) fn cell(&self, index: usize) -> (f64, f64) {
         let at = |index: usize| if self.is_linear { self.values[index] } else { libm::log(self.values[index]) };
         let last = self.values.len() - 1;
-        let below = if index > 0 { at(index) - at(index - 1) } else { at(1.min(last)) - at(0) };
+        let alone = if last == 0 { 1.0 } else { 0.0 };
+        let below = if index > 0 { at(index) - at(index - 1) } else { at(1.min(last)) - at(0) + alone };
         let above = if index < last { at(index + 1) - at(index) } else { below };
         let (low, high) = (at(index) - 0.5 * below, at(index) + 0.5 * above);
         if self.is_linear { (low, high) } else { (libm::exp(low), libm::exp(high)) }
@@ -135,7 +184,12 @@ impl Grid {
 
     /// The cell around a value of the grid.
     pub(super) fn cell_of(&self, value: f64) -> (f64, f64) {
-        self.cell(self.values.partition_point(|&other| other < value).min(self.values.len() - 1))
+        self.cell(self.index_of(value))
+    }
+
+    /// The index of a value of the grid.
+    pub(super) fn index_of(&self, value: f64) -> usize {
+        self.values.partition_point(|&other| other < value).min(self.values.len() - 1)
     }
 }
 
@@ -215,6 +269,19 @@ pub(super) mod tests {
     fn numbers_in_titles_are_short() {
         let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
         assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
+    }
+
+    #[test]
+    fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
+        let mut other = set(1e-6, 0.02, 4.0).parameters;
+        other.blocks = 9;
+        let all = [set(1e-6, 0.02, 4.0).parameters, other];
+        let found = common(all.iter()).replace('\u{a0}', " ");
+        assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 1e8 N/m, Kd = 4e7 N/m"), "{found}");
+        assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1e-6 m, T = 0.02 s"), "{found}");
+        assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
+        let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
+        assert_eq!(symbols, ["ramp_time", "seed", "τᵣ", "V₀"]);
     }
 
     #[test]

@@ -1,22 +1,34 @@
-//! One simulation: the shear force over time (Fig. 1d), and under it the space-time map of attached contacts (Fig. 4b,
-//! d).
+//! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of detached
+//! contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::FigureError;
 use super::axis::{Axis, bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP, shade};
+use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
-use super::picture::{BLACK, Picture, Stroke, snapped};
+use super::legend::{Mark, entry};
+use super::picture::{Picture, Sheet, Stroke, snapped};
+use super::sets::{MICROMETRES, common};
+use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
+use crate::model::Parameters;
 use kuva::render::color::Color;
+use std::f64::consts::TAU;
 
 const NAME: &str = "simulation";
 /// Of the panels and all that stands right of them.
 const WIDTH: f64 = 684.0;
+const MODULATION_HEIGHT: f64 = 64.0;
 const TRACE_HEIGHT: f64 = 230.0;
 const MAP_HEIGHT: f64 = 260.0;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
+const MODULATION: Stroke = Stroke::solid(BLUE, 1.6);
+const ONSET: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 /// Colours that an eye can distinguish.
 const LEVELS: f64 = 100.0;
+/// Periods whose peaks are marked, and that are drawn at all; more would be a grey area.
+const MAX_PEAKS: f64 = 25.0;
+const MAX_PERIODS: f64 = 200.0;
+const POINTS_PER_PERIOD: f64 = 40.0;
 
 /// Fractions of attached contacts over time and blocks.
 #[derive(Clone, Copy, Debug)]
@@ -31,11 +43,26 @@ pub struct AttachedMap<'a> {
     pub length: f64,
 }
 
-/// Draws shear force in N against time in s, the map, or the map under the force.
+/// What is shown of a simulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Simulation<'a> {
+    /// Its parameters.
+    pub parameters: &'a Parameters,
+    /// Shear force in N against time in s, if it is shown.
+    pub trace: Option<&'a [(f64, f64)]>,
+    /// The map, if it is shown.
+    pub map: Option<AttachedMap<'a>>,
+    /// Onsets of slips, in s.
+    pub onsets: &'a [f64],
+}
+
+/// Draws what is given: the shear force against time, the map, or the map under the force; above them the modulation.
 ///
 /// # Errors
 /// When what is given has fewer than two instants, or the map does not have one fraction per instant and block.
-pub fn simulation(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>) -> Result<Picture, FigureError> {
+pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture, FigureError> {
+    let Simulation { parameters, trace, map, onsets } = *shown;
+    let look = &look.with_note(&format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed));
     let empty = |what| FigureError::Empty { figure: NAME, what };
     if map.is_some_and(|map| map.times.len() < 2 || map.fractions.len() != map.times.len() * map.blocks) {
         return Err(empty("fractions for every instant and block"));
@@ -45,31 +72,77 @@ pub fn simulation(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>) ->
     let (first, last) =
         bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
     let x = || Axis::linear("Time t (s)", first, last);
+    let period = period(parameters, last - first);
+    let onsets: Vec<f64> = onsets.iter().copied().filter(|onset| (first..=last).contains(onset)).collect();
 
-    let heights: Vec<f64> = trace.map(|_| TRACE_HEIGHT).into_iter().chain(map.map(|_| MAP_HEIGHT)).collect();
+    let rows = [period.map(|_| MODULATION_HEIGHT), trace.map(|_| TRACE_HEIGHT), map.map(|_| MAP_HEIGHT)];
+    let heights: Vec<f64> = rows.into_iter().flatten().collect();
     let right = if map.is_some() { COLOUR_BAR } else { RIGHT };
-    let layout = Layout::column(WIDTH - right, &heights, ROW_GAP, right);
-    let mut sheet = layout.sheet(NAME);
+    let peaks = peaks(period, first, last);
+    let legend = [
+        map.filter(|_| !onsets.is_empty()).map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
+        (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
+    ];
+    let legend: Vec<_> = legend.into_iter().flatten().collect();
+    let (page, mut sheet) = Layout::column(WIDTH - right, &heights, ROW_GAP, right).page(NAME, look, &legend);
+    let mut row = 0..;
+    let mut next_row = || row.next().unwrap_or(0);
+    if let Some(period) = period {
+        let amplitude = MICROMETRES * parameters.modulation_amplitude;
+        let y = Axis::few("Modulation Δ cos(2πt/T) (µm)", -1.2 * amplitude, 1.2 * amplitude);
+        let frame = page.frame(next_row(), 0, x(), y);
+        frame.clipped(&mut sheet, |sheet| {
+            frame.level(sheet, 0.0, GRID);
+            marks(sheet, &frame, &peaks, REFERENCE);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand points")]
+            let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
+            let curve = frame.x.evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / period)));
+            frame.curve(sheet, curve, MODULATION);
+        });
+        frame.axes(&mut sheet);
+    }
     if let Some(trace) = trace {
         let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
-        let frame = layout.frame(0, 0, x(), Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most));
-        frame.clipped(&mut sheet, |sheet| frame.curve(sheet, thinned(trace, frame.width), TRACE));
+        let frame = page.frame(next_row(), 0, x(), Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most));
+        frame.clipped(&mut sheet, |sheet| {
+            marks(sheet, &frame, &peaks, REFERENCE);
+            frame.curve(sheet, thinned(trace, frame.width), TRACE);
+        });
         frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        frame.x_label(&mut sheet);
     }
     if let Some(map) = map {
-        let y = Axis::linear("Position x (mm)", 0.0, map.length * MILLIMETRES);
-        let frame = layout.frame(heights.len() - 1, 0, x(), y);
-        frame.clipped(&mut sheet, |sheet| sheet.rectangles(cells(&frame, &map)));
+        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, map.length * MILLIMETRES);
+        let frame = page.frame(next_row(), 0, x(), y);
+        frame.clipped(&mut sheet, |sheet| {
+            sheet.rectangles(cells(&frame, &map));
+            marks(sheet, &frame, &peaks, REFERENCE);
+            marks(sheet, &frame, &onsets, ONSET);
+        });
         frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        // As in Fig. 4: bright where all are attached.
-        let ticks = [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (1.0 - percent / 100.0, percent));
-        ColourBar::of_shades("detached contacts (%)", ticks).draw(&mut sheet, &frame);
-        frame.x_label(&mut sheet);
+        let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0));
+        percent.ticks =
+            [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
+        percent.draw(&mut sheet, &frame);
     }
     Ok(sheet.finish())
+}
+
+/// The period in s of a modulation that can be drawn over a time in s: one that is not ramped, nor too fast.
+fn period(parameters: &Parameters, time: f64) -> Option<f64> {
+    parameters.modulation_period.filter(|period| parameters.ramp_time == 0.0 && time / period <= MAX_PERIODS)
+}
+
+/// The instants at which the modulation pulls most, if they are few.
+fn peaks(period: Option<f64>, first: f64, last: f64) -> Vec<f64> {
+    let Some(period) = period.filter(|period| (last - first) / period <= MAX_PEAKS) else { return Vec::new() };
+    let start = (first / period).ceil();
+    (0..).map(|step| (start + f64::from(step)) * period).take_while(|&peak| peak <= last).collect()
+}
+
+fn marks(sheet: &mut Sheet, frame: &Frame, instants: &[f64], stroke: Stroke) {
+    for &instant in instants {
+        frame.upright(sheet, instant, stroke);
+    }
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
@@ -114,7 +187,7 @@ fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
         let mut column = 0;
         for run in levels.chunk_by(|left, right| left == right) {
             let (left, right) = (left_of(column), left_of(column + run.len()));
-            cells.push(([left, top, right - left + OVERLAP, bottom - top + OVERLAP], shade(run[0] / LEVELS)));
+            cells.push(([left, top, right - left + OVERLAP, bottom - top + OVERLAP], shade(1.0 - run[0] / LEVELS)));
             column += run.len();
         }
     }
@@ -136,29 +209,46 @@ mod tests {
         assert!(thin.windows(2).all(|pair| pair[0].0 <= pair[1].0));
     }
 
+    const MAP: AttachedMap = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
+    const FORCE: &[(f64, f64)] = &[(0.0, 1.0), (1.0, 2.0)];
+
+    fn drawn(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>, period: Option<f64>) -> Option<String> {
+        let amplitude = if period.is_some() { 1e-6 } else { 0.0 };
+        let parameters =
+            Parameters { modulation_amplitude: amplitude, modulation_period: period, ..Parameters::default() };
+        let shown = Simulation { parameters: &parameters, trace, map, onsets: &[0.5, 2.0] };
+        Some(simulation(&shown, &Look::default()).ok()?.svg())
+    }
+
     #[test]
     fn a_map_of_the_wrong_size_is_refused() {
-        let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 5], length: 0.15 };
-        let trace = [(0.0, 1.0), (1.0, 2.0)];
-        assert!(simulation(Some(&trace), Some(map)).is_err());
-        assert!(simulation(Some(&trace), Some(AttachedMap { fractions: &[1.0; 6], ..map })).is_ok());
-        assert!(simulation(Some(&trace[..1]), None).is_err());
-        assert!(simulation(None, None).is_err());
+        assert!(drawn(Some(FORCE), Some(AttachedMap { fractions: &[1.0; 5], ..MAP }), None).is_none());
+        assert!(drawn(Some(FORCE), Some(MAP), None).is_some());
+        assert!(drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none());
     }
 
     #[test]
     fn the_requested_panels_are_drawn_and_labelled_once() {
-        let trace = [(0.0, 1.0), (1.0, 2.0)];
-        let map = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
-        let (force, position, bar) = (">Shear force Fₛ (N)<", ">Position x (mm)<", ">detached contacts (%)<");
+        let (force, position, bar) = ("Shear force Fₛ (N)<", "Position x (mm), trailing edge at 0<", ">detached (%)<");
         let panels =
             [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
         for (has_trace, has_map, labels) in panels {
-            let svg = simulation(has_trace.then_some(&trace[..]), has_map.then_some(map)).unwrap().svg();
+            let svg = drawn(has_trace.then_some(FORCE), has_map.then_some(MAP), None).unwrap();
             for label in [force, position, bar] {
                 assert_eq!(svg.matches(label).count(), usize::from(labels.contains(&label)), "{label}");
             }
             assert_eq!(svg.matches(">Time t (s)<").count(), 1);
         }
+    }
+
+    #[test]
+    fn the_modulation_and_the_onsets_that_are_shown_are_drawn() {
+        let modulated = drawn(None, Some(MAP), Some(0.25)).unwrap();
+        assert!(modulated.contains("Modulation Δ cos(2πt/T) (µm)") && modulated.contains("peaks of the modulation"));
+        let still = drawn(None, Some(MAP), None).unwrap();
+        assert!(!still.contains("Modulation") && still.contains("onset of a slip"));
+        assert!(!drawn(Some(FORCE), None, None).unwrap().contains("onset of a slip"), "onsets go with the map");
+        assert!(!drawn(None, Some(MAP), Some(1e-3)).unwrap().contains("Modulation"), "a thousand periods");
+        assert_eq!(peaks(Some(0.25), 0.3, 1.0), [0.5, 0.75, 1.0]);
     }
 }

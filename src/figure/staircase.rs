@@ -2,12 +2,14 @@
 //! the locking index under it.
 
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::frame::{Entry, Frame, LEGEND, Layout, LegendPlace, Mark, ROW_GAP, entry};
-use super::picture::{Dot, Fill, GREY, INKS, Ink, LIGHT_GREY, Picture, Sheet, Stroke};
+use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Dot, Fill, Ink, Picture, Sheet, Stroke};
 use super::sets::{Modulations, Periods, amplitude};
+use super::style::{GREY, GRID, INKS, Look, REFERENCE};
 use crate::reduce::SetSummary;
 
-const LAYOUT: Layout = Layout::column(542.0, &[330.0, 170.0], ROW_GAP, LEGEND);
+const LAYOUT: Layout = Layout::column(558.0, &[310.0, 160.0], ROW_GAP, RIGHT);
 /// Least values of the period that make a staircase.
 const MIN_PERIODS: usize = 24;
 /// Amplitudes that are easily distinguished.
@@ -16,14 +18,12 @@ const MAX_AMPLITUDES: usize = 3;
 const WIDE: f64 = 6.0;
 /// Whole numbers whose lines do not merge.
 const MAX_LINES: f64 = 10.0;
-const WHOLE: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
-const FREE: Stroke = Stroke::dashed(GREY, 1.6, (6.0, 4.0));
 /// Opacity of the boxes from quartile to quartile.
 const BOX: f64 = 0.3;
 
 /// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most
 /// 3 amplitudes; `None` for others. Periods are in units of τ₀ if there is a set without modulation.
-pub(super) fn staircase(sets: &[SetSummary]) -> Option<Picture> {
+pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let sets = Modulations::of(sets.iter())?;
     if sets.periods.len() < MIN_PERIODS || sets.amplitudes.len() > MAX_AMPLITUDES {
         return None;
@@ -32,34 +32,31 @@ pub(super) fn staircase(sets: &[SetSummary]) -> Option<Picture> {
     let periods = Periods::of(&sets.periods, free);
     let x = periods.grid.axis(periods.label);
     let y = intervals_axis(sets.modulated.iter().filter_map(|set| quartiles(set)).flatten())?;
-    let frames = [LAYOUT.frame(0, 0, x.clone(), y), LAYOUT.frame(1, 0, x, Axis::sparse("Locking index", 0.0, 1.0))];
+    let mut entries: Vec<Entry> =
+        sets.amplitudes.iter().zip(INKS).map(|(&height, ink)| entry(Mark::Dot(dot(ink)), amplitude(height))).collect();
+    entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
+    entries.push(entry(Mark::Line(GRID), "τ = nT"));
+    entries.extend(free.map(|_| entry(Mark::Line(REFERENCE), "τ₀ / T, Δ = 0")));
+    let (page, mut sheet) = LAYOUT.page("staircase", look, &entries);
+    let frames = [page.frame(0, 0, x.clone(), y), page.frame(1, 0, x, Axis::sparse("Locking index", 0.0, 1.0))];
 
-    let mut sheet = LAYOUT.sheet("staircase");
     frames[0].clipped(&mut sheet, |sheet| {
         let Frame { x, y, .. } = &frames[0];
         let whole = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MAX_LINES));
-        whole.for_each(|n| frames[0].level(sheet, n, WHOLE));
+        whole.for_each(|n| frames[0].level(sheet, n, GRID));
         if let Some(free) = free {
-            frames[0].curve(sheet, x.evenly_placed(200).map(|place| (place, free / periods.period(place))), FREE);
+            frames[0].curve(sheet, x.evenly_placed(200).map(|place| (place, free / periods.period(place))), REFERENCE);
         }
     });
-    let mut entries: Vec<Entry> = Vec::new();
     for (&height, ink) in sets.amplitudes.iter().zip(INKS) {
         let of_height = sets.modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
         let places: Vec<(f64, &SetSummary)> =
             of_height.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
         draw(&mut sheet, &frames, &periods, &places, ink);
-        entries.push(entry(Mark::Dot(dot(ink)), amplitude(height)));
     }
-    entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
-    entries.push(entry(Mark::Line(WHOLE), "τ = nT"));
-    entries.extend(free.map(|_| entry(Mark::Line(FREE), "τ₀ / T, Δ = 0")));
     for frame in &frames {
         frame.axes(&mut sheet);
-        frame.y_label(&mut sheet);
-        frame.x_label(&mut sheet);
     }
-    frames[0].legend(&mut sheet, LegendPlace::Beside, &entries);
     Some(sheet.finish())
 }
 
@@ -114,13 +111,13 @@ mod tests {
             (1..=count).map(|step| set(amplitude, 0.01 * f64::from(step), (12.0 / f64::from(step)).ceil())).collect()
         };
         let mut sets = steps(1e-6, 24);
-        let svg = staircase(&sets).unwrap().svg();
+        let svg = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains(">Modulation period T (s)<") && svg.contains(">Δ = 1 µm<"));
         sets.push(set(0.0, 0.11, 1.0));
-        let svg = staircase(&sets).unwrap().svg();
+        let svg = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains(">Modulation period T / τ₀<") && svg.contains(">τ₀ / T, Δ = 0<"));
-        assert!(staircase(&steps(1e-6, 23)).is_none());
+        assert!(staircase(&steps(1e-6, 23), &Look::default()).is_none());
         let amplitudes = (1..=4).flat_map(|amplitude| steps(1e-7 * f64::from(amplitude), 24));
-        assert!(staircase(&amplitudes.collect::<Vec<_>>()).is_none());
+        assert!(staircase(&amplitudes.collect::<Vec<_>>(), &Look::default()).is_none());
     }
 }

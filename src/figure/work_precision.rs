@@ -1,16 +1,30 @@
 //! Work against precision: what an error costs with each method, a panel for each kind of error; all logarithmic. A
-//! method has an ink, a drive a pattern of the line.
+//! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
 use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Frame, LEFT, LEGEND, Layout, LegendPlace, Mark, entry};
-use super::picture::{Dot, Fill, GREY, INKS, Picture, Sheet, Stroke};
+use super::frame::{Frame, Layout, RIGHT};
+use super::legend::{Mark, entry};
+use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
+use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
 
 const NAME: &str = "work-precision";
-/// The stripe of errors that chance alone gives.
-const CHANCE: Fill = Fill { ink: GREY, opacity: 0.3 };
-/// Patterns of the lines, drive by drive.
-const PATTERNS: [Option<(f64, f64)>; 2] = [None, Some((5.0, 3.0))];
+const WIDTH: f64 = 250.0;
+const COLUMN_GAP: f64 = 70.0;
+const HEIGHTS: [f64; 1] = [340.0];
+/// Width of the bars of uncertainty.
+const UNCERTAINTY: f64 = 1.0;
+
+/// The look of a drive: its line, and whether its dots have a hole.
+#[derive(Clone, Copy)]
+struct Pattern {
+    dashes: Option<(f64, f64)>,
+    has_holes: bool,
+}
+
+/// Patterns, drive by drive.
+const PATTERNS: [Pattern; 2] =
+    [Pattern { dashes: None, has_holes: false }, Pattern { dashes: Some((5.0, 3.0)), has_holes: true }];
 
 /// Error and cost of a method at one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,46 +76,42 @@ impl ErrorPanel {
 ///
 /// # Errors
 /// When a panel, or the figure, has nothing left.
-pub fn work_precision(work_label: &str, panels: &[ErrorPanel]) -> Result<Picture, FigureError> {
+pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture, FigureError> {
     let empty = || FigureError::Empty { figure: NAME, what: "errors and costs" };
     let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
     let columns = panels.len();
-    let layout = Layout { columns, width: 270.0, column_gap: LEFT, heights: &[360.0], row_gap: 0.0, right: LEGEND };
-    let mut sheet = layout.sheet(NAME);
     let all = || panels.iter().flat_map(|panel| &panel.lines);
     let (methods, drives) = (distinct(all().map(|line| &*line.method)), distinct(all().map(|line| &*line.drive)));
     let place = |name: &str, names: &[&str]| names.iter().position(|known| *known == name).unwrap_or(0);
-    let look = |method: &str, drive: &str| {
-        let (ink, dashes) =
-            (INKS[place(method, &methods) % INKS.len()], PATTERNS[place(drive, &drives) % PATTERNS.len()]);
-        Stroke { ink, width: 1.8, dashes }
+    let look_of = |method: &str, drive: &str| {
+        (INKS[place(method, &methods) % INKS.len()], PATTERNS[place(drive, &drives) % PATTERNS.len()])
     };
+    let each = methods.iter().flat_map(|method| drives.iter().map(move |drive| (*method, *drive)));
+    let known = each.filter(|(method, drive)| all().any(|line| (&*line.method, &*line.drive) == (method, drive)));
+    let lines = known.map(|(method, drive)| {
+        let (ink, pattern) = look_of(method, drive);
+        let mark = if pattern.has_holes { Mark::Ring(ink, RADIUS) } else { Mark::Dot(Dot::solid(ink, RADIUS)) };
+        entry(mark, format!("{method}, {drive}"))
+    });
+    let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
+    let chance = has_chance.then(|| entry(Mark::Patch(STRIPE), "what chance alone gives in 95 of 100 cases"));
+    let legend: Vec<_> = lines.chain(chance).collect();
+    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, &HEIGHTS, 0.0, RIGHT) };
+    let (page, mut sheet) = layout.page(NAME, look, &legend);
     for (column, panel) in panels.iter().enumerate() {
         // Lower ends may be 0: they run out of the panel.
         let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance)).ok_or_else(empty)?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
-        let frame = layout.frame(0, column, Axis::logarithmic(&panel.label, low, high), y);
+        let frame = page.frame(0, column, Axis::logarithmic(&panel.label, low, high), y);
         if let Some(by_chance) = panel.by_chance {
-            frame.stripe(&mut sheet, low, by_chance, CHANCE);
+            frame.stripe(&mut sheet, low, by_chance, STRIPE);
         }
         for MethodLine { method, drive, points } in &panel.lines {
-            draw(&mut sheet, &frame, points, look(method, drive));
+            draw(&mut sheet, &frame, points, look_of(method, drive), panel.by_chance.is_none());
         }
         frame.axes(&mut sheet);
-        frame.x_label(&mut sheet);
-        frame.y_label(&mut sheet);
-        if column + 1 == columns {
-            let each = methods.iter().flat_map(|method| drives.iter().map(move |drive| (*method, *drive)));
-            let known =
-                each.filter(|(method, drive)| all().any(|line| (&*line.method, &*line.drive) == (method, drive)));
-            let lines =
-                known.map(|(method, drive)| entry(Mark::Line(look(method, drive)), format!("{method}, {drive}")));
-            let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
-            let chance = has_chance.then(|| entry(Mark::Patch(CHANCE), "by chance, 95 %"));
-            frame.legend(&mut sheet, LegendPlace::Beside, &lines.chain(chance).collect::<Vec<_>>());
-        }
     }
     Ok(sheet.finish())
 }
@@ -117,18 +127,23 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// A method's settings, with the uncertainty of their errors.
-fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], look: Stroke) {
+fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], (ink, pattern): (Ink, Pattern), is_joined: bool) {
     let points: Vec<&WorkPrecision> = points.iter().filter(|point| point.is_usable()).collect();
     let places = || points.iter().map(|point| (point.error, point.work));
     frame.clipped(sheet, |sheet| {
-        frame.curve(sheet, places(), look);
+        if is_joined {
+            frame.curve(sheet, places(), Stroke { ink, width: 1.8, dashes: pattern.dashes });
+        }
         for point in &points {
             if let Some((low, high)) = point.uncertainty {
                 let ends = [low.max(frame.x.low), high].map(|end| (end, point.work));
-                frame.curve(sheet, ends, Stroke::solid(look.ink, 1.2));
+                frame.curve(sheet, ends, Stroke::solid(ink, UNCERTAINTY));
             }
         }
-        frame.points(sheet, places(), Dot::solid(look.ink, 4.0));
+        frame.points(sheet, places(), Dot::solid(ink, RADIUS));
+        if pattern.has_holes {
+            frame.points(sheet, places(), Dot::solid(WHITE, RADIUS - 1.6));
+        }
     });
 }
 
@@ -151,15 +166,15 @@ mod tests {
         };
         let panels =
             [panel(None, &[("a", "quiet"), ("b", "quiet")]), panel(Some(1e-5), &[("b", "quiet"), ("b", "loud")])];
-        let svg = work_precision("cost", &panels).unwrap().svg();
-        let texts = [("error", 2), ("cost", 1), ("a, quiet", 1), ("a, loud", 0), ("b, quiet", 1), ("b, loud", 1)];
-        for (text, times) in texts.into_iter().chain([("by chance, 95 %", 1)]) {
+        let svg = work_precision("cost", &panels, &Look::default()).unwrap().svg();
+        let texts = [("error", 2), ("(a) cost", 1), ("a, quiet", 1), ("a, loud", 0), ("b, quiet", 1), ("b, loud", 1)];
+        for (text, times) in texts.into_iter().chain([("what chance alone gives in 95 of 100 cases", 1)]) {
             assert_eq!(svg.matches(&format!(">{text}<")).count(), times, "{text}");
         }
-        // Of each solid line in a panel the line itself, two whiskers and two dots, and the mark in the legend; a dashed
-        // one is drawn dash by dash.
+        // Of each solid line in a panel the line itself, two bars and two dots, and the mark in the legend.
         assert_eq!(svg.matches(INKS[0]).count(), 5 + 1);
-        assert!(svg.matches(INKS[1]).count() > 3 * 5 + 2);
-        assert!(work_precision("cost", &[]).is_err());
+        // Where errors are chance there is no line: of the two methods in either panel two, one, two bars, and two dots.
+        assert_eq!(svg.matches(INKS[1]).count(), 5 + 2 * 4 + 2);
+        assert!(work_precision("cost", &[], &Look::default()).is_err());
     }
 }

@@ -14,7 +14,7 @@ pub const BINS_PER_DECADE: i32 = 4;
 
 columns! {
     /// A bin of η that holds at least one slip. `None` where there is nothing to average.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
     pub struct BackboneBin {
         eta_low: f64 = "", "lower edge of the bin, included";
         eta_high: f64 = "", "upper edge, excluded";

@@ -78,7 +78,7 @@ impl Selection for AllButSeed {
 
 columns! {
     /// A row of the reduced sets. Quantities are SI; `None` where there is nothing to average.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, Default, PartialEq)]
     pub struct SetRow {
         set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<AllButSeed>;

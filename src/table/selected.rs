@@ -28,6 +28,12 @@ impl<S> Selected<S> {
     }
 }
 
+impl<S> Default for Selected<S> {
+    fn default() -> Self {
+        Self::new(Parameters::default())
+    }
+}
+
 impl<S> Deref for Selected<S> {
     type Target = Parameters;
 

@@ -1,6 +1,8 @@
-//! Which figures a sweep gets: those whose data it has, and no others.
+//! Figures: a sweep gets those whose data it has, and one's own show what their options say.
 
 use crate::program::Folder;
+use std::collections::BTreeSet;
+use std::fs;
 
 /// Always there under modulation.
 const MODULATED: [&str; 2] = ["phi-eta", "tau-T"];
@@ -34,5 +36,125 @@ fn each_sweep_gets_the_figures_that_fit_it() {
             drawn.sort();
             assert_eq!(drawn, names, "{extension}: {axes}");
         }
+    }
+}
+
+/// A sweep with something on each axis: velocities, two amplitudes, words.
+const OWN: &str = "\
+name = \"own\"
+[model]
+N = 3
+Ns = 4
+[axes]
+V0 = { log = [1e-5, 1e-3], points = 8 }
+Delta = [0, 1e-6]
+frequency = [90]
+seed = { count = 2 }
+[record]
+slips = 4
+";
+
+fn own() -> Folder {
+    let folder = Folder::new();
+    folder.write("own.toml", OWN);
+    folder.ends(0, "run own.toml --out r --threads 2");
+    folder
+}
+
+#[test]
+fn each_option_of_a_figure_changes_what_it_says() {
+    let folder = own();
+    let svg = |options: &str| {
+        folder.ends(0, &format!("plot r --x V0 --y tau_mean -o own.svg {options}"));
+        fs::read_to_string(folder.path("own.svg")).unwrap()
+    };
+    let plain = svg("");
+    for text in ["Drive velocity V₀ (m/s)", "Mean interval, tau_mean (s)", "Sweep own"] {
+        assert!(plain.contains(text), "{text}");
+    }
+    for (options, text) in [
+        ("--log xy", ">10⁻⁴<"),
+        ("--log y --ylim 1e-4:10", ">10⁻³<"),
+        ("--colour Delta", ">Δ = 1e-6 m<"),
+        ("--colour V0", ">V0 (m/s)<"),
+        ("--panels Delta", ">(b)<"),
+        ("--xlim 1e-5:1e-4", "sets, without a value or outside the axes"),
+        ("--xlabel speed", ">speed<"),
+        ("--ylabel τ", ">τ<"),
+        ("--style print", r#"width="86.00mm""#),
+        ("--size 100mmx90mm --style print", r#"width="100.00mm" height="90.00mm""#),
+    ] {
+        assert!(svg(options).contains(text) && !plain.contains(text), "{options}: {text}");
+    }
+    // Joined sets, bars and dots have the same numbers in print.
+    let dots = |svg: &str| svg.matches("<circle").count() + svg.matches("<use").count();
+    assert_eq!(dots(&svg("--style print")), dots(&plain));
+}
+
+#[test]
+fn figures_come_in_the_formats_that_are_asked_for_and_are_the_same_each_time() {
+    let folder = own();
+    folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
+    let contents = folder.contents("r/figures");
+    for (format, start) in [("svg", &b"<svg"[..]), ("png", b"\x89PNG"), ("pdf", b"%PDF-1.")] {
+        let bytes = contents[std::path::Path::new(&format!("tau_mean-V0.{format}"))].as_ref().unwrap();
+        assert!(bytes.starts_with(start), "{format}");
+    }
+    let standing = folder.ends(0, "plot r --format pdf --style print").stdout;
+    assert!(standing.lines().count() > 1 && standing.lines().all(|line| line.ends_with(".pdf")), "{standing}");
+    let before = folder.contents("r/figures");
+    folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
+    folder.ends(0, "plot r --format pdf --style print");
+    assert!(folder.contents("r/figures") == before);
+    folder.ends(0, "plot r --x V0 --y tau_mean -o own.pdf");
+    let pdf = fs::read(folder.path("own.pdf")).unwrap();
+    let text = String::from_utf8_lossy(&pdf);
+    assert!(text.trim_end().ends_with("%%EOF") && text.contains("/MediaBox"), "one whole page");
+}
+
+#[test]
+fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
+    let folder = own();
+    let before = folder.contents("");
+    let table: &[(&str, &[&str])] = &[
+        ("--x V0", &["--y <COLUMN>"]),
+        ("--colour V0", &["--x <COLUMN>"]),
+        ("--x v0 --y tau_mean", &["--x v0: no such column; did you mean V0?", "--list"]),
+        ("--x V0 --y nothing_like_it", &["--y nothing_like_it: no such column; there are set_id, N, Ns"]),
+        ("--x regime --y tau_mean --log x", &["--log x: regime holds words"]),
+        ("--x V0 --y T_to", &["--y T_to: no set has a value of both V0 and T_to"]),
+        ("--x V0 --y tau_mean --xlim 1:2", &["none of 16 sets lies within --xlim and --ylim"]),
+        ("--x V0 --y tau_mean --xlim 2:1", &["--xlim 2:1", "less than the upper"]),
+        ("--x V0 --y tau_mean --xlim 1", &["must be LOW:HIGH", "1e-6:1e-3"]),
+        ("--x V0 --y tau_mean --log x --xlim -1:1", &["--xlim -1:1: must be > 0 on a logarithmic axis"]),
+        ("--x V0 --y tau_mean --panels tau_mean", &["--panels tau_mean: has 16 values, and 9 panels fit"]),
+        ("--x set_id --y tau_mean", &["--x set_id: has 16 words, and 12 fit an axis"]),
+        ("--x V0 --y tau_mean --colour set_id", &["--colour set_id: has 16 words, and there are 6 colours"]),
+        ("--x V0 --y tau_mean --size 5mmx5mm", &["--size: figure tau_mean-V0 needs at least "]),
+        ("--x V0 --y tau_mean --size 5", &["must be WIDTHxHEIGHT", "86mmx60mm"]),
+        ("--size 5mmx5mm", &["--size: figure phi-eta needs at least "]),
+        ("--format eps", &["svg, png, pdf"]),
+        ("--style poster", &["screen, print"]),
+        ("--x V0 --y tau_mean -o own.eps", &["own.eps: must end in .svg, .png or .pdf"]),
+    ];
+    for (options, words) in table {
+        let ended = folder.ends(2, &format!("plot r {options}"));
+        for word in *words {
+            assert!(ended.stderr.contains(word), "{options}: {word:?} is missing in\n{}", ended.stderr);
+        }
+    }
+    assert!(folder.contents("") == before);
+}
+
+#[test]
+fn the_list_of_columns_is_that_of_the_table_and_all_of_its_numbers_can_be_drawn() {
+    let folder = own();
+    let list = folder.ends(0, "plot --list").stdout;
+    assert!(list.lines().any(|line| line.starts_with("V0 ") && line.ends_with("drive velocity")), "{list}");
+    let names: BTreeSet<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.contains("tau_mean_low") && names.len() > 60);
+    // A number of the table, a flag and a word.
+    for name in ["eta", "jobs", "locked", "regime", "phase_mean", "mean_friction"] {
+        folder.ends(0, &format!("plot r --x V0 --y {name} -o {name}.svg"));
     }
 }

@@ -196,7 +196,7 @@ fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
     }
     folder.ends(0, "simulate --set N=9 --slips 4 --panel map --plot map.svg");
     let map = std::fs::read_to_string(folder.path("map.svg")).unwrap();
-    assert!(map.contains("Position x") && map.contains("detached contacts (%)") && !map.contains("Shear force"));
+    assert!(map.contains("Position x") && map.contains("detached (%)") && !map.contains("Shear force"));
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! The files of `stickslip simulate`: tables and pictures, checked before anything runs.
 
 use super::super::exit::UsageError;
+use super::super::output::replace;
+use super::super::plot::format_of;
 use super::{Arguments, Panel};
-use anyhow::{Context, Result, anyhow};
-use std::path::{Path, PathBuf};
-use stickslip::figure::{self, Picture};
+use anyhow::{Result, anyhow};
+use std::path::Path;
+use stickslip::figure::{self, Look, Picture, Simulation};
 use stickslip::model::theory::typical_interval;
 use stickslip::model::{ContactEvent, Parameters};
-use stickslip::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
+use stickslip::observe::{ContactRow, MapRow, ProfileRow, Slip, TraceRow};
 use stickslip::sweep::Sweep;
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
@@ -46,9 +48,8 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
             format!("--sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one");
         return Err(UsageError(problem).into());
     }
-    let is_picture = |path: &&PathBuf| matches!(extension(path), Some("svg" | "png"));
-    if let Some(path) = arguments.plot.iter().find(|path| !is_picture(path)) {
-        return Err(UsageError(format!("--plot {}: must end in .svg or .png", shown(path))).into());
+    for path in &arguments.plot {
+        format_of(path).map_err(|error| UsageError(format!("--plot {error}")))?;
     }
     let tables = [
         ("--trace", &arguments.trace),
@@ -119,6 +120,7 @@ pub(super) fn write_pictures(
     parameters: &Parameters,
     trace: &[TraceRow],
     map: &[MapRow],
+    slips: &[Slip],
 ) -> Result<()> {
     if arguments.plot.is_empty() {
         return Ok(());
@@ -130,32 +132,21 @@ pub(super) fn write_pictures(
             format!("--from {from}: the simulation ended at {last} s; take an earlier instant, or a longer --time");
         return Err(UsageError(problem).into());
     }
-    let picture = draw(arguments, parameters, trace, map)?;
+    let picture = draw(arguments, parameters, trace, map, slips)?;
     for path in &arguments.plot {
-        let bytes = if extension(path) == Some("svg") { picture.svg().into_bytes() } else { picture.png()? };
+        let bytes = picture.encoded(format_of(path)?)?;
         replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))?;
     }
     Ok(())
 }
 
-fn extension(path: &Path) -> Option<&str> {
-    path.extension().and_then(|extension| extension.to_str())
-}
-
-fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut draft = path.as_os_str().to_owned();
-    draft.push(".draft");
-    let draft = PathBuf::from(draft);
-    write(&draft)
-        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
-        .inspect_err(|_| {
-            // What remains of a draft is of no use; the first error is the one to report.
-            let _ = std::fs::remove_file(&draft);
-        })
-        .with_context(|| format!("cannot write {}", shown(path)))
-}
-
-fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map: &[MapRow]) -> Result<Picture> {
+fn draw(
+    arguments: &Arguments,
+    parameters: &Parameters,
+    trace: &[TraceRow],
+    map: &[MapRow],
+    slips: &[Slip],
+) -> Result<Picture> {
     // The sample at an end is shown, however its time is rounded.
     let slack = 1e-6 * arguments.sample;
     let shown = arguments.from - slack..=arguments.until.unwrap_or(f64::INFINITY) + slack;
@@ -170,7 +161,13 @@ fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map:
         fractions: &fractions,
         length: parameters.slider_length,
     };
-    let trace = arguments.draws(Panel::Force).then_some(samples.as_slice());
-    figure::simulation(trace, arguments.draws(Panel::Map).then_some(map))
+    let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
+    let simulation = Simulation {
+        parameters,
+        trace: arguments.draws(Panel::Force).then_some(samples.as_slice()),
+        map: arguments.draws(Panel::Map).then_some(map),
+        onsets: &onsets,
+    };
+    figure::simulation(&simulation, &Look::default())
         .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.from))))
 }

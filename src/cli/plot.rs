@@ -1,0 +1,205 @@
+//! `stickslip plot`: reduced data to figures, the standing ones or one's own.
+
+use super::exit::{Exit, UsageError};
+use super::output;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use stickslip::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
+use stickslip::results::Results;
+use stickslip::results::layout::Layout;
+use stickslip::table::shown::shown;
+use stickslip::table::storage::Disk;
+
+/// Draw the figures of a results directory from its reduced data, or one of your own
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR", required_unless_present = "list")]
+    directory: Option<PathBuf>,
+    /// List the columns that can be drawn, with units and meanings
+    #[arg(long)]
+    list: bool,
+    /// Column on the x axis of a figure of your own
+    #[arg(long, value_name = "COLUMN", requires = "y", help_heading = OWN)]
+    x: Option<String>,
+    /// Column on the y axis, with error bars if it has an interval
+    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
+    y: Option<String>,
+    /// Column that colours show: up to six values in the legend, more on a scale
+    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
+    colour: Option<String>,
+    /// Column of which each value gets a panel, up to nine
+    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
+    panels: Option<String>,
+    /// Logarithmic axes
+    #[arg(long, value_name = "AXES", requires = "x", help_heading = OWN)]
+    log: Option<Logarithmic>,
+    /// Ends of the x axis; either may be left out
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true, help_heading = OWN)]
+    xlim: Option<Limits>,
+    /// Ends of the y axis
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true, help_heading = OWN)]
+    ylim: Option<Limits>,
+    /// Label of the x axis [default: meaning, name and unit of the column]
+    #[arg(long, value_name = "TEXT", requires = "x", help_heading = OWN)]
+    xlabel: Option<String>,
+    /// Label of the y axis
+    #[arg(long, value_name = "TEXT", requires = "x", help_heading = OWN)]
+    ylabel: Option<String>,
+    /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
+    #[arg(short, long, value_name = "FILE", requires = "x", conflicts_with = "format", help_heading = OWN)]
+    output: Option<PathBuf>,
+    /// Formats, separated by commas [default: svg,png]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    format: Vec<FileFormat>,
+    /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: as the data need; in print one or two columns wide]
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    size: Option<Size>,
+    /// What the figures are for: a screen, or print with text of 8 pt, 86 or 178 mm wide, 600 dpi
+    #[arg(long, value_enum, default_value_t = Medium::Screen)]
+    style: Medium,
+}
+
+const OWN: &str = "A figure of your own";
+const EXAMPLES: &str = "\
+Examples:
+  stickslip plot results/fig3                                          the standing figures, as SVG and PNG
+  stickslip plot results/fig3 --format pdf --style print               for a paper
+  stickslip plot --list                                                the columns that can be drawn
+  stickslip plot results/velocity --x V0 --y tau_mean --log xy
+  stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
+  stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
+    --size 86mmx60mm --style print --format pdf";
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Logarithmic {
+    X,
+    Y,
+    Xy,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FileFormat {
+    Svg,
+    Png,
+    Pdf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Medium {
+    Screen,
+    Print,
+}
+
+/// The ends of an axis.
+#[derive(Clone, Copy, Debug, Default)]
+struct Limits(Option<f64>, Option<f64>);
+
+fn limits(text: &str) -> Result<Limits, &'static str> {
+    const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
+    let end = |text: &str| match text.trim() {
+        "" => Ok(None),
+        number => number.parse().ok().filter(|end: &f64| end.is_finite()).map(Some).ok_or(WANTED),
+    };
+    match text.split_once(':') {
+        Some((low, high)) if text.trim() != ":" => Ok(Limits(end(low)?, end(high)?)),
+        _ => Err(WANTED),
+    }
+}
+
+impl Arguments {
+    fn own(&self) -> Option<OwnFigure> {
+        let [x_limits, y_limits] = [self.xlim, self.ylim].map(Option::unwrap_or_default);
+        Some(OwnFigure {
+            x: self.x.clone()?,
+            y: self.y.clone()?,
+            colour: self.colour.clone(),
+            panels: self.panels.clone(),
+            is_log_x: matches!(self.log, Some(Logarithmic::X | Logarithmic::Xy)),
+            is_log_y: matches!(self.log, Some(Logarithmic::Y | Logarithmic::Xy)),
+            x_limits: (x_limits.0, x_limits.1),
+            y_limits: (y_limits.0, y_limits.1),
+            x_label: self.xlabel.clone(),
+            y_label: self.ylabel.clone(),
+        })
+    }
+
+    fn look(&self, results: &Results<'_>) -> Look {
+        let style = match self.style {
+            Medium::Screen => Style::Screen,
+            Medium::Print => Style::Print,
+        };
+        Look { style, size: self.size, ..look(results) }
+    }
+
+    fn formats(&self) -> Vec<Format> {
+        let format = |format: &FileFormat| match format {
+            FileFormat::Svg => Format::Svg,
+            FileFormat::Png => Format::Png,
+            FileFormat::Pdf => Format::Pdf,
+        };
+        if self.format.is_empty() { Format::DEFAULT.to_vec() } else { self.format.iter().map(format).collect() }
+    }
+}
+
+/// The look of the figures of a sweep as every run draws them.
+pub fn look(results: &Results<'_>) -> Look {
+    Look { note: format!("Sweep {}", results.sweep().name()), ..Look::default() }
+}
+
+pub fn plot(arguments: &Arguments) -> Result<Exit> {
+    if arguments.list {
+        list()?;
+    }
+    let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
+    let results = Results::read(&Layout::new(&Disk, directory))?;
+    let (layout, look) = (results.layout(), arguments.look(&results));
+    let files = match (arguments.own(), &arguments.output) {
+        (None, _) => draw_all(layout, &look, &arguments.formats())?,
+        (Some(figure), None) => write_own(layout, draw_own(layout, &figure, &look)?, &look, &arguments.formats())?,
+        (Some(figure), Some(file)) => {
+            let format = format_of(file)?;
+            let picture = draw_own(layout, &figure, &look)?;
+            output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
+            vec![file.clone()]
+        }
+    };
+    for path in files {
+        output::print(&format!("{}\n", shown(&path)))?;
+    }
+    Ok(Exit::Done)
+}
+
+/// The format that a file's name ends in.
+pub fn format_of(file: &Path) -> Result<Format> {
+    let extension = file.extension().and_then(|extension| extension.to_str());
+    let format = Format::ALL.into_iter().find(|format| extension == Some(format.extension()));
+    format.ok_or_else(|| UsageError(format!("{}: must end in .svg, .png or .pdf", shown(file))).into())
+}
+
+/// Prints the columns of the table of sets.
+fn list() -> Result<()> {
+    let columns = columns();
+    let name = columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
+    let unit = columns.iter().map(|column| column.unit.len()).max().unwrap_or(0);
+    columns.iter().try_for_each(|column| {
+        output::print(&format!("{:name$}  {:unit$}  {}\n", column.name, column.unit, column.meaning))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn either_end_of_an_axis_may_be_left_out() {
+        let ends = |text: &str| limits(text).map(|limits| (limits.0, limits.1));
+        assert_eq!(ends("1e-6:1e-3"), Ok((Some(1e-6), Some(1e-3))));
+        assert_eq!((ends("-1:"), ends(":5")), (Ok((Some(-1.0), None)), Ok((None, Some(5.0)))));
+        for wrong in ["", ":", "1", "a:b", "1:nan", "1:2:3", "inf:"] {
+            assert!(ends(wrong).is_err(), "{wrong}");
+        }
+    }
+}

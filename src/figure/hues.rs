@@ -1,0 +1,100 @@
+//! Hues: a quantity as colours. Few values have inks of their own and stand in the legend, many a scale beside the frame.
+
+use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::colour_bar::{COLOUR_BAR, ColourBar};
+use super::frame::RIGHT;
+use super::legend::{Entry, Mark, entry};
+use super::picture::{Dot, Ink};
+use super::style::{INKS, SCALE};
+use kuva::render::color::Color;
+
+/// Ratio of the largest to the least value from which a scale is logarithmic.
+const WIDE: f64 = 20.0;
+
+/// How the values of a quantity become colours.
+pub(super) struct Hues {
+    label: String,
+    kind: Kind,
+}
+
+enum Kind {
+    /// Each value and what it is called, in the order of inks.
+    Inks(Vec<(f64, String)>),
+    Scale(Axis),
+}
+
+impl Hues {
+    /// For these values of a quantity with this label, each called as `word` says.
+    pub(super) fn of(label: &str, values: impl Iterator<Item = f64>, word: impl Fn(f64) -> String) -> Self {
+        let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        let kind = if values.len() <= INKS.len() {
+            Kind::Inks(values.into_iter().map(|value| (value, word(value))).collect())
+        } else {
+            Kind::Scale(scale(label, &values))
+        };
+        Self { label: label.to_owned(), kind }
+    }
+
+    /// The ink of a value.
+    pub(super) fn ink(&self, value: f64) -> Ink {
+        match &self.kind {
+            Kind::Inks(values) => {
+                let index = values.iter().position(|(known, _)| *known == value).unwrap_or(0);
+                INKS[index % INKS.len()]
+            }
+            Kind::Scale(axis) => {
+                let steps = SCALE.len() as f64;
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+                let step = (axis.place(value).clamp(0.0, 1.0) * steps).min(steps - 1.0) as usize;
+                SCALE[step]
+            }
+        }
+    }
+
+    /// Entries of the legend, with dots of this radius.
+    pub(super) fn entries(&self, radius: f64) -> Vec<Entry> {
+        let Kind::Inks(values) = &self.kind else { return Vec::new() };
+        values.iter().map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name)).collect()
+    }
+
+    /// The colour bar, if there is a scale.
+    pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
+        let Kind::Scale(axis) = &self.kind else { return None };
+        let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
+        Some(ColourBar { label: &self.label, colours: SCALE.map(Color::from).to_vec(), ticks })
+    }
+
+    /// Space that they need right of the frames.
+    pub(super) fn right(&self) -> f64 {
+        if matches!(self.kind, Kind::Scale(_)) { COLOUR_BAR } else { RIGHT }
+    }
+}
+
+/// An axis from the least to the largest of some ascending values.
+fn scale(label: &str, values: &[f64]) -> Axis {
+    let (low, high) = bounds(values.iter().copied()).unwrap_or((0.0, 1.0));
+    if low > 0.0 && high >= WIDE * low && logarithmic_bounds(values.iter().copied()).is_some() {
+        Axis::logarithmic(label, low, high)
+    } else {
+        Axis::linear(label, low, high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_values_have_inks_and_many_a_scale() {
+        let hues = |count: u32| Hues::of("", (0..count).map(|step| f64::from(1 << step)), |value| value.to_string());
+        let few = hues(3);
+        assert_eq!([1.0, 2.0, 4.0].map(|value| few.ink(value)), [INKS[0], INKS[1], INKS[2]]);
+        assert!(few.entries(1.0).len() == 3 && few.bar().is_none());
+        let many = hues(7);
+        assert!(many.entries(1.0).is_empty() && many.bar().is_some());
+        assert_eq!((many.ink(1.0), many.ink(8.0), many.ink(64.0)), (SCALE[0], SCALE[5], SCALE[9]));
+        assert_eq!(many.ink(f64::NAN), SCALE[0], "no panic");
+    }
+}

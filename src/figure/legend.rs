@@ -1,0 +1,117 @@
+//! Legends: what marks mean, in rows above the frames, where they cover nothing.
+
+use super::font;
+use super::picture::{Anchor, Dot, Fill, Ink, Sheet, Stroke};
+use super::style::{LEGEND_TEXT, WHITE};
+use kuva::render::color::Color;
+
+/// Width of a line or a patch, and of a dot.
+const MARK: f64 = 26.0;
+const DOT: f64 = 10.0;
+/// Between a mark and its text, and between entries.
+const GAP: f64 = 7.0;
+const ENTRY_GAP: f64 = 20.0;
+/// Where the first row begins.
+const TOP: f64 = 8.0;
+
+/// What a legend shows beside a text.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Mark {
+    Dot(Dot),
+    /// A circle with a hole.
+    Ring(Ink, f64),
+    /// A dot with an error bar.
+    Bar(Dot),
+    Line(Stroke),
+    Patch(Fill),
+}
+
+/// An entry of a legend: a mark and a text.
+pub(super) type Entry = (Mark, String);
+
+/// An entry of a legend.
+pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
+    (mark, text.into())
+}
+
+fn width((mark, text): &Entry) -> f64 {
+    mark_width(*mark) + GAP + font::width(text, LEGEND_TEXT)
+}
+
+const fn mark_width(mark: Mark) -> f64 {
+    match mark {
+        Mark::Dot(_) | Mark::Ring(..) | Mark::Bar(_) => DOT,
+        Mark::Line(_) | Mark::Patch(_) => MARK,
+    }
+}
+
+/// Entries in rows that fit a width.
+pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
+    let mut rows: Vec<Vec<&Entry>> = Vec::new();
+    let mut taken = 0.0;
+    for entry in entries {
+        let needed = width(entry) + ENTRY_GAP;
+        match rows.last_mut() {
+            Some(row) if taken + needed - ENTRY_GAP <= room => {
+                row.push(entry);
+                taken += needed;
+            }
+            _ => {
+                rows.push(vec![entry]);
+                taken = needed;
+            }
+        }
+    }
+    rows
+}
+
+/// Draws entries at the top of a sheet, between two edges.
+pub(super) fn draw_legend(sheet: &mut Sheet, entries: &[Entry], left: f64, right: f64, row_height: f64) {
+    for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
+        let middle = TOP + (row as f64 + 0.5) * row_height;
+        let mut start = left;
+        for entry in entries {
+            draw_mark(sheet, entry.0, (start, middle));
+            sheet.centred_text((start + mark_width(entry.0) + GAP, middle), &entry.1, LEGEND_TEXT, Anchor::Start);
+            start += width(entry) + ENTRY_GAP;
+        }
+    }
+}
+
+fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
+    let (end, centre) = (start + MARK, (start + 0.5 * mark_width(mark), middle));
+    match mark {
+        Mark::Dot(dot) => {
+            // A single faint dot could not be seen.
+            let dot = Dot { radius: dot.radius.max(3.0), opacity: dot.opacity.max(0.7), ..dot };
+            sheet.discs([centre], dot);
+        }
+        Mark::Ring(ink, radius) => {
+            sheet.dot(centre, radius, Color::from(ink));
+            sheet.dot(centre, radius - 1.6, Color::from(WHITE));
+        }
+        Mark::Bar(dot) => {
+            sheet.line(vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)], Stroke::solid(dot.ink, 1.6));
+            sheet.discs([centre], dot);
+        }
+        Mark::Line(stroke) => sheet.line(vec![(start, middle), (end, middle)], stroke),
+        Mark::Patch(fill) => sheet.rectangle([start, middle - 6.0, MARK, 12.0], fill),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::style::{BLACK, curve};
+    use super::*;
+
+    #[test]
+    fn a_legend_takes_as_many_rows_as_it_needs() {
+        let entries: Vec<Entry> =
+            ["short", "a longer text", "another"].map(|text| entry(Mark::Line(curve(BLACK)), text)).to_vec();
+        let rows = |room: f64| legend_rows(&entries, room).iter().map(Vec::len).collect::<Vec<_>>();
+        assert_eq!(rows(1000.0), [3]);
+        assert_eq!(rows(width(&entries[0]) + ENTRY_GAP + width(&entries[1])), [2, 1]);
+        assert_eq!(rows(1.0), [1, 1, 1]);
+        assert!(legend_rows(&[], 100.0).is_empty());
+    }
+}

@@ -1,0 +1,241 @@
+//! A scene as a PDF of one page: vectors, and text in the letters of one embedded font, so that it can be searched and
+//! looks the same everywhere. The same scene gives the same bytes on every machine.
+
+use super::font;
+use kuva::render::color::Color;
+use kuva::render::render::{Primitive, Scene, TextAnchor};
+use pdf_writer::types::{CidFontType, FontFlags, LineJoinStyle, SystemInfo, UnicodeCmap};
+use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str};
+use std::collections::BTreeMap;
+use subsetter::GlyphRemapper;
+use ttf_parser::{Face, GlyphId};
+
+const FONT: Name = Name(b"F");
+/// Six letters and a plus mark a font that is not whole.
+const FONT_NAME: Name = Name(b"STICKS+DejaVuSans");
+const SYSTEM: SystemInfo = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
+/// Units of widths and heights per em, in a PDF.
+const EM: f32 = 1000.0;
+/// How far from its corner a quarter of a circle has its handles, over the radius.
+const HANDLE: f32 = 0.552_284_8;
+const COMPRESSION: u8 = 8;
+
+/// The scene, with this many points per unit.
+pub(super) fn pdf(scene: &Scene, points: f64) -> Result<Vec<u8>, String> {
+    let font = font::file();
+    let face = Face::parse(font, 0).map_err(|error| error.to_string())?;
+    let mut page = Page {
+        content: Content::new(),
+        face,
+        glyphs: GlyphRemapper::new(),
+        letters: BTreeMap::new(),
+        opacities: Vec::new(),
+    };
+    // From the upper left corner, downwards.
+    let (scale, height) = (single(points), single(points * scene.height));
+    page.content.transform([scale, 0.0, 0.0, -scale, 0.0, height]);
+    page.content.set_line_join(LineJoinStyle::RoundJoin);
+    for element in &scene.elements {
+        page.draw(element)?;
+    }
+    page.write(font, single(points * scene.width), height)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a PDF has single precision")]
+const fn single(value: f64) -> f32 {
+    value as f32
+}
+
+/// A page that is being drawn.
+struct Page<'a> {
+    content: Content,
+    face: Face<'a>,
+    /// Numbers of the letters in the embedded font.
+    glyphs: GlyphRemapper,
+    /// Letter and width in ems / 1000 of each number.
+    letters: BTreeMap<u16, (char, f32)>,
+    /// Each is a graphics state.
+    opacities: Vec<f64>,
+}
+
+impl Page<'_> {
+    fn draw(&mut self, element: &Primitive) -> Result<(), String> {
+        match element {
+            Primitive::PolyLine { points, stroke, stroke_width, .. } => self.line(points, stroke, *stroke_width),
+            Primitive::Rect { x, y, width, height, fill, opacity, .. } => {
+                self.with_opacity(*opacity, |page| page.rectangle([*x, *y, *width, *height], fill));
+            }
+            Primitive::RectBatch { x, y, w, h, fills } => {
+                for ((((&x, &y), &w), &h), fill) in x.iter().zip(y).zip(w).zip(h).zip(fills) {
+                    self.rectangle([x, y, w, h], fill);
+                }
+            }
+            Primitive::Circle { cx, cy, r, fill, .. } => self.circles(&[*cx], &[*cy], *r, fill),
+            Primitive::CircleBatch { cx, cy, r, fill, fill_opacity, .. } => {
+                self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, fill));
+            }
+            Primitive::Text { x, y, content, size, anchor, color, .. } => {
+                self.text((*x, *y), content, *size, *anchor, color.as_ref());
+            }
+            Primitive::ClipStart { x, y, width, height, .. } => {
+                self.content.save_state();
+                let [x, y, width, height] = [*x, *y, *width, *height].map(single);
+                self.content.rect(x, y, width, height).clip_nonzero().end_path();
+            }
+            Primitive::ClipEnd => {
+                self.content.restore_state();
+            }
+            other => return Err(format!("there is no PDF of {other:?}")),
+        }
+        Ok(())
+    }
+
+    fn line(&mut self, points: &[(f64, f64)], stroke: &Color, width: f64) {
+        let [red, green, blue] = parts(stroke);
+        self.content.set_stroke_rgb(red, green, blue).set_line_width(single(width));
+        for (index, &(x, y)) in points.iter().enumerate() {
+            let (x, y) = (single(x), single(y));
+            let _ = if index == 0 { self.content.move_to(x, y) } else { self.content.line_to(x, y) };
+        }
+        self.content.stroke();
+    }
+
+    fn fill(&mut self, fill: &Color) {
+        let [red, green, blue] = parts(fill);
+        self.content.set_fill_rgb(red, green, blue);
+    }
+
+    fn rectangle(&mut self, sides: [f64; 4], fill: &Color) {
+        self.fill(fill);
+        let [x, y, width, height] = sides.map(single);
+        self.content.rect(x, y, width, height).fill_nonzero();
+    }
+
+    fn circles(&mut self, xs: &[f64], ys: &[f64], radius: f64, fill: &Color) {
+        self.fill(fill);
+        let (r, h) = (single(radius), HANDLE * single(radius));
+        for (&x, &y) in xs.iter().zip(ys) {
+            let (x, y) = (single(x), single(y));
+            self.content.move_to(x + r, y);
+            for [a, b, c, d, e, f] in
+                [[r, h, h, r, 0.0, r], [-h, r, -r, h, -r, 0.0], [-r, -h, -h, -r, 0.0, -r], [h, -r, r, -h, r, 0.0]]
+            {
+                self.content.cubic_to(x + a, y + b, x + c, y + d, x + e, y + f);
+            }
+            // One by one: where dots overlap, faint ones add up.
+            self.content.fill_nonzero();
+        }
+    }
+
+    fn with_opacity(&mut self, opacity: Option<f64>, draw: impl FnOnce(&mut Self)) {
+        let Some(opacity) = opacity else { return draw(self) };
+        let known = self.opacities.iter().position(|known| *known == opacity);
+        let index = known.unwrap_or_else(|| {
+            self.opacities.push(opacity);
+            self.opacities.len() - 1
+        });
+        self.content.save_state();
+        self.content.set_parameters(Name(state_name(index).as_bytes()));
+        draw(self);
+        self.content.restore_state();
+    }
+
+    fn text(&mut self, (x, y): (f64, f64), text: &str, size: u32, anchor: TextAnchor, color: Option<&Color>) {
+        let em = f32::from(self.face.units_per_em());
+        let (mut codes, mut width) = (Vec::new(), 0.0);
+        for letter in text.chars() {
+            let glyph = self.face.glyph_index(letter).unwrap_or(GlyphId(0));
+            let advance = EM * f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / em;
+            let code = self.glyphs.remap(glyph.0);
+            self.letters.entry(code).or_insert((letter, advance));
+            codes.extend(code.to_be_bytes());
+            width += advance;
+        }
+        let size = single(f64::from(size));
+        let shift = match anchor {
+            TextAnchor::Start => 0.0,
+            TextAnchor::Middle => 0.5,
+            TextAnchor::End => 1.0,
+        };
+        self.fill(color.unwrap_or(&Color::Rgb(0, 0, 0)));
+        let left = single(x) - shift * width * size / EM;
+        self.content.begin_text().set_font(FONT, size);
+        self.content.set_text_matrix([1.0, 0.0, 0.0, -1.0, left, single(y)]);
+        self.content.show(Str(&codes)).end_text();
+    }
+
+    /// The file.
+    fn write(self, font: &[u8], width: f32, height: f32) -> Result<Vec<u8>, String> {
+        let mut next = (1..).map(Ref::new);
+        let mut id = || next.next().ok_or("there are too many objects");
+        let (catalog, pages, page, content, font_id) = (id()?, id()?, id()?, id()?, id()?);
+        let states: Vec<Ref> = self.opacities.iter().map(|_| id()).collect::<Result<_, _>>()?;
+        let mut pdf = Pdf::new();
+        pdf.catalog(catalog).pages(pages);
+        pdf.pages(pages).kids([page]).count(1);
+        let mut written = pdf.page(page);
+        written.media_box(Rect::new(0.0, 0.0, width, height)).parent(pages).contents(content);
+        let mut resources = written.resources();
+        resources.fonts().pair(FONT, font_id);
+        let mut named = resources.ext_g_states();
+        for (index, state) in states.iter().enumerate() {
+            named.pair(Name(state_name(index).as_bytes()), *state);
+        }
+        named.finish();
+        resources.finish();
+        written.finish();
+        for (&opacity, &state) in self.opacities.iter().zip(&states) {
+            pdf.ext_graphics(state).non_stroking_alpha(single(opacity)).stroking_alpha(single(opacity));
+        }
+        let drawn = compressed(&self.content.finish());
+        pdf.stream(content, &drawn).filter(Filter::FlateDecode);
+
+        let (descendant, descriptor, file, to_unicode) = (id()?, id()?, id()?, id()?);
+        let mut whole = pdf.type0_font(font_id);
+        whole.base_font(FONT_NAME).encoding_predefined(Name(b"Identity-H"));
+        whole.descendant_font(descendant).to_unicode(to_unicode);
+        whole.finish();
+        let mut cid = pdf.cid_font(descendant);
+        cid.subtype(CidFontType::Type2).base_font(FONT_NAME).system_info(SYSTEM).font_descriptor(descriptor);
+        cid.cid_to_gid_map_predefined(Name(b"Identity")).default_width(0.0);
+        let mut widths = cid.widths();
+        for (&code, &(_, width)) in &self.letters {
+            widths.same(code, code, width);
+        }
+        widths.finish();
+        cid.finish();
+        let em = f32::from(self.face.units_per_em());
+        let ems = |units: i16| EM * f32::from(units) / em;
+        let bounds = self.face.global_bounding_box();
+        let mut described = pdf.font_descriptor(descriptor);
+        described.name(FONT_NAME).flags(FontFlags::SYMBOLIC).italic_angle(0.0).stem_v(80.0).font_file2(file);
+        described.bbox(Rect::new(ems(bounds.x_min), ems(bounds.y_min), ems(bounds.x_max), ems(bounds.y_max)));
+        described.ascent(ems(self.face.ascender())).descent(ems(self.face.descender()));
+        described.cap_height(ems(self.face.capital_height().unwrap_or(self.face.ascender())));
+        described.finish();
+        let mut cmap: UnicodeCmap = UnicodeCmap::new(Name(b"Letters"), SYSTEM);
+        for (&code, &(letter, _)) in &self.letters {
+            cmap.pair(code, letter);
+        }
+        pdf.cmap(to_unicode, &cmap.finish());
+        let letters = subsetter::subset(font, 0, &self.glyphs).map_err(|error| error.to_string())?;
+        pdf.stream(file, &compressed(&letters)).filter(Filter::FlateDecode);
+        Ok(pdf.finish())
+    }
+}
+
+fn state_name(index: usize) -> String {
+    format!("G{index}")
+}
+
+fn compressed(bytes: &[u8]) -> Vec<u8> {
+    miniz_oxide::deflate::compress_to_vec_zlib(bytes, COMPRESSION)
+}
+
+/// Red, green and blue from 0 to 1.
+fn parts(color: &Color) -> [f32; 3] {
+    match color {
+        Color::Rgb(red, green, blue) => [*red, *green, *blue].map(|part| f32::from(part) / 255.0),
+        _ => [0.0; 3],
+    }
+}

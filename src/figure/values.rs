@@ -1,0 +1,175 @@
+//! Columns of the table of sets as numbers for axes, colours and panels: words become places in their order.
+
+use super::FigureError;
+use super::axis::Axis;
+use super::sets::{symbol_of, three_digits};
+use crate::model::Symbol;
+use crate::reduce::SetRow;
+use crate::sweep::nearest;
+use crate::table::columns::{Cell, Column, Kind, Row};
+
+/// Longest meaning that goes into the label of an axis.
+const LONGEST: usize = 40;
+
+/// A column of the table of sets.
+pub(super) struct Values {
+    pub(super) column: Column,
+    /// A number for each set; of a word its place among the words.
+    pub(super) numbers: Vec<Option<f64>>,
+    /// Ends of the confidence intervals, where there are any.
+    pub(super) intervals: Vec<Option<(f64, f64)>>,
+    /// The words that occur, sorted; none of a column of numbers.
+    pub(super) words: Vec<String>,
+}
+
+/// The columns of the table of sets.
+#[must_use]
+pub fn columns() -> Vec<Column> {
+    SetRow::columns()
+}
+
+impl Values {
+    /// The values of the column with a name that an option gives.
+    pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, FigureError> {
+        let columns = columns();
+        let index = |name: &str| columns.iter().position(|column| column.name == name);
+        let column = index(name).ok_or_else(|| unknown(option, name, &columns))?;
+        let ends = index(&format!("{name}_low")).zip(index(&format!("{name}_high")));
+        let (mut cells, mut intervals) = (Vec::new(), Vec::new());
+        for row in rows {
+            let all = number_cells(row);
+            let number =
+                |index: usize| if let Some(Given::Number(number)) = &all[index] { Some(*number) } else { None };
+            intervals.push(ends.and_then(|(low, high)| number(low).zip(number(high))));
+            cells.push(all.into_iter().nth(column).flatten());
+        }
+        let mut words: Vec<String> = cells.iter().flatten().filter_map(Given::word).collect();
+        words.sort();
+        words.dedup();
+        let number = |given: &Given| match given {
+            Given::Number(number) => Some(*number).filter(|number| number.is_finite()),
+            Given::Word(word) => words.binary_search(word).ok().map(|index| index as f64),
+        };
+        let numbers = cells.iter().map(|given| given.as_ref().and_then(number)).collect();
+        Ok(Self { column: columns[column].clone(), numbers, intervals, words })
+    }
+
+    /// Whether it holds words, or yes and no.
+    pub(super) fn is_worded(&self) -> bool {
+        matches!(self.column.kind, Kind::Text | Kind::Flag)
+    }
+
+    /// Its label on an axis, with the unit.
+    pub(super) fn label(&self) -> String {
+        let Column { name, unit, meaning, .. } = &self.column;
+        let label = match Symbol::from_key(name) {
+            Some(symbol) => format!("{} {}", capitalised(meaning), symbol_of(symbol)),
+            None if meaning.len() <= LONGEST => format!("{}, {name}", capitalised(meaning)),
+            None => name.to_string(),
+        };
+        if unit.is_empty() { label } else { format!("{label} ({unit})") }
+    }
+
+    /// Its name and one of its values.
+    pub(super) fn setting(&self, value: f64) -> String {
+        format!("{} = {} {}", self.name(), self.word(value), self.column.unit).trim_end().to_owned()
+    }
+
+    /// Its symbol in the paper, or its name.
+    pub(super) fn name(&self) -> String {
+        let name = &self.column.name;
+        Symbol::from_key(name).map_or_else(|| name.to_string(), symbol_of)
+    }
+
+    fn word(&self, value: f64) -> String {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index, if there are words")]
+        self.words.get(value as usize).cloned().unwrap_or_else(|| three_digits(value))
+    }
+
+    /// An axis of its words.
+    pub(super) fn categories(&self, label: &str) -> Axis {
+        Axis::categories(label, &self.words.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// The values that occur, ascending.
+    pub(super) fn distinct(&self) -> Vec<f64> {
+        let mut values: Vec<f64> = self.numbers.iter().copied().flatten().collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values
+    }
+}
+
+/// A value of a cell.
+enum Given {
+    Number(f64),
+    Word(String),
+}
+
+impl Given {
+    fn word(&self) -> Option<String> {
+        if let Self::Word(word) = self { Some(word.clone()) } else { None }
+    }
+}
+
+fn number_cells(row: &SetRow) -> Vec<Option<Given>> {
+    let mut cells = Vec::new();
+    row.cells(&mut |cell| {
+        cells.push(match cell {
+            Cell::Null => None,
+            Cell::Real(real) => Some(Given::Number(real)),
+            Cell::Count(count) => Some(Given::Number(count as f64)),
+            Cell::Flag(flag) => Some(Given::Word(if flag { "yes" } else { "no" }.to_owned())),
+            Cell::Text(text) => Some(Given::Word(text.to_owned())),
+        });
+    });
+    cells
+}
+
+fn unknown(option: &'static str, name: &str, columns: &[Column]) -> FigureError {
+    let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
+    let problem = match nearest(name, &names) {
+        Some(near) => format!("no such column; did you mean {near}? `stickslip plot --list` shows all"),
+        None => format!("no such column; there are {}", names.join(", ")),
+    };
+    FigureError::Option { option, value: name.to_owned(), problem }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_of_words_becomes_places_and_one_with_an_interval_has_bars() {
+        let mut rows = super::super::own::tests::rows(3);
+        rows[1].is_locked = true;
+        let locked = Values::of(&rows, "x", "locked").unwrap();
+        assert_eq!(
+            (locked.numbers, locked.words),
+            (vec![Some(0.0), Some(1.0), Some(0.0)], vec!["no".into(), "yes".into()])
+        );
+        let tau = Values::of(&rows, "y", "tau_mean").unwrap();
+        assert!(tau.intervals.iter().all(Option::is_some) && !tau.is_worded());
+        assert!(Values::of(&rows, "y", "eta").unwrap().intervals.iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn an_unknown_column_is_named_with_the_nearest() {
+        let error = |name: &str| Values::of(&[], "y", name).err().unwrap().to_string();
+        assert!(error("tau_men").contains("--y tau_men") && error("tau_men").contains("did you mean tau_mean?"));
+        assert!(error("colour").contains("there are set_id, N, Ns"), "{}", error("colour"));
+    }
+
+    #[test]
+    fn labels_have_symbols_and_units() {
+        let label = |name: &str| Values::of(&[], "x", name).unwrap().label();
+        assert_eq!(label("V0"), "Drive velocity V₀ (m/s)");
+        assert_eq!(label("tau_mean"), "Mean interval, tau_mean (s)");
+        assert_eq!(label("startup_p"), "startup_p");
+    }
+}
