@@ -1,6 +1,7 @@
 //! Exit codes, and which error ends with which.
 
 use stickslip::reduce::ReduceError;
+use stickslip::report::ReportError;
 use stickslip::results::{ErrorKind, ResultsError};
 use stickslip::solver::SimulationError;
 use stickslip::sweep::SweepError;
@@ -56,6 +57,14 @@ impl Exit {
                 ReduceError::NoJobs { .. } => Some(Self::Usage),
                 ReduceError::Storage(_) => None,
                 ReduceError::Results(error) => Self::of_cause(error),
+            };
+        }
+        if let Some(error) = cause.downcast_ref::<ReportError>() {
+            return match error {
+                ReportError::Reduce(error) => Self::of_cause(error),
+                ReportError::Dataset(error) => Self::of_cause(error),
+                ReportError::Results(error) => Self::of_cause(error),
+                ReportError::Storage(_) | ReportError::Encoding(_) => None,
             };
         }
         match cause.downcast_ref::<DatasetError>() {

@@ -11,6 +11,7 @@ mod plan;
 mod planning;
 mod progress;
 mod reduce;
+mod report;
 mod run;
 mod signals;
 mod simulate;
@@ -48,6 +49,7 @@ enum Command {
     Status(status::Arguments),
     Reduce(reduce::ReduceArguments),
     Plot(reduce::PlotArguments),
+    Report(report::Arguments),
     Verify(verify::Arguments),
     Compact(compact::Arguments),
     Merge(merge::Arguments),
@@ -65,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => reduce::plot(&arguments),
+        Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Compact(arguments) => compact::compact(&arguments),
         Command::Merge(arguments) => merge::merge(&arguments),

@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
-use stickslip::table::shown::is_plain;
+use std::path::{Path, PathBuf};
+use stickslip::table::shown::{is_plain, shown};
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
 pub fn print(text: &str) -> Result<()> {
@@ -35,6 +35,20 @@ pub fn json(value: &impl Serialize) -> Result<()> {
 pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
     let width = pairs.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
     pairs.iter().try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
+}
+
+/// Writes a file beside its place and moves it there, so that no half of it looks whole.
+pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let mut draft = path.as_os_str().to_owned();
+    draft.push(".draft");
+    let draft = PathBuf::from(draft);
+    write(&draft)
+        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
+        .inspect_err(|_| {
+            // What remains of a draft is of no use; the first error is the one to report.
+            let _ = std::fs::remove_file(&draft);
+        })
+        .with_context(|| format!("cannot write {}", shown(path)))
 }
 
 /// A duration in the unit that suits it.

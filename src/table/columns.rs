@@ -35,6 +35,19 @@ pub enum Kind {
     Text,
 }
 
+impl Kind {
+    /// Its word in documentation.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Count => "count",
+            Self::Flag => "flag",
+            Self::Text => "text",
+        }
+    }
+}
+
 /// The value of a column in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cell<'a> {
@@ -162,12 +175,7 @@ pub(crate) use part;
 #[must_use]
 pub fn markdown<T: Table>() -> String {
     let row = |column: Column| {
-        let kind = match column.kind {
-            Kind::Real => "real",
-            Kind::Count => "count",
-            Kind::Flag => "flag",
-            Kind::Text => "text",
-        };
+        let kind = column.kind.word();
         let nullable = if column.nullable { ", may be null" } else { "" };
         let Column { name, unit, meaning, .. } = column;
         format!("| `{name}` | {kind}{nullable} | {unit} | {} |\n", meaning.replace('|', "\\|").replace('<', "\\<"))

@@ -1,8 +1,9 @@
 //! The files of `stickslip simulate`: tables and pictures, checked before anything runs.
 
 use super::super::exit::UsageError;
+use super::super::output::replace;
 use super::{Arguments, Panel};
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use std::path::{Path, PathBuf};
 use stickslip::figure::{self, Picture};
 use stickslip::model::theory::typical_interval;
@@ -140,19 +141,6 @@ pub(super) fn write_pictures(
 
 fn extension(path: &Path) -> Option<&str> {
     path.extension().and_then(|extension| extension.to_str())
-}
-
-fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut draft = path.as_os_str().to_owned();
-    draft.push(".draft");
-    let draft = PathBuf::from(draft);
-    write(&draft)
-        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
-        .inspect_err(|_| {
-            // What remains of a draft is of no use; the first error is the one to report.
-            let _ = std::fs::remove_file(&draft);
-        })
-        .with_context(|| format!("cannot write {}", shown(path)))
 }
 
 fn draw(arguments: &Arguments, parameters: &Parameters, trace: &[TraceRow], map: &[MapRow]) -> Result<Picture> {
