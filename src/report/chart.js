@@ -3,8 +3,9 @@
 const MARGIN = { left: 62, right: 14, top: 10, bottom: 44 };
 /** How far the pointer may be from a point, in px. */
 const REACH = 14;
-/** Points beyond which they are squares, which draw faster. */
+/** Points beyond which they are squares, which draw faster, and no more than so many of a colour on one pixel. */
 const MANY = 4000;
+const LAYERS = 3;
 const HIDDEN = 255;
 
 const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -13,13 +14,13 @@ const isDark = () => !document.documentElement.classList.contains("printing") &&
 class Axis {
   constructor({ label, log = false, low, high, whole = false }) {
     Object.assign(this, { label, log, low, high, whole });
+    this.start = log ? Math.log(low) : low;
+    this.span = (log ? Math.log(high) : high) - this.start;
   }
 
   /** Where a value lies, from 0 to 1. */
   place(value) {
-    return this.log
-      ? Math.log(value / this.low) / Math.log(this.high / this.low)
-      : (value - this.low) / (this.high - this.low);
+    return ((this.log ? Math.log(value) : value) - this.start) / this.span;
   }
 
   value(place) {
@@ -53,7 +54,7 @@ class Axis {
         const value = Number(`${digit}e${decade}`);
         if (value < this.low || value > this.high) continue;
         const isLabelled = digit === 1 ? decade % every === 0 : decades < 2 && (digit === 2 || digit === 5);
-        ticks.push([value, isLabelled ? (decades < 4 ? number(value) : power(value)) : ""]);
+        ticks.push([value, isLabelled ? power(digit, decade) : ""]);
       }
     }
     return ticks;
@@ -62,10 +63,10 @@ class Axis {
 
 const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
-/** A power of ten. */
-function power(value) {
-  const exponent = Math.round(Math.log10(value));
-  return exponent === 0 ? "1" : exponent === 1 ? "10" : `10${[...String(exponent)].map((c) => RAISED[c]).join("")}`;
+/** A digit times a power of ten. */
+function power(digit, exponent) {
+  if (exponent >= -3 && exponent <= 3) return number(Number(`${digit}e${exponent}`));
+  return `${digit === 1 ? "" : `${digit}·`}10${[...String(exponent)].map((c) => RAISED[c]).join("")}`;
 }
 
 const charts = [];
@@ -117,8 +118,8 @@ class Chart {
     const { [name]: axis, layers } = this.content;
     let [low, high] = [Infinity, -Infinity];
     for (const layer of layers) {
-      const lists = layer.type === "bars" ? (name === "x" ? [layer.low, layer.high] : [layer.y, [0]]) : [layer[name]];
-      if (layer.type === "line") continue;
+      if (layer.type !== "points" && layer.type !== "bars") continue;
+      const lists = layer.type === "points" ? [layer[name]] : name === "x" ? [layer.low, layer.high] : [layer.y, [0]];
       for (const list of lists) {
         for (let k = 0; k < list.length; k++) {
           const value = list[k];
@@ -139,7 +140,15 @@ class Chart {
     return [isBars && low === 0 ? 0 : low - room, high + room];
   }
 
+  /** Draws with the next frame, however often it is asked to before. */
   draw() {
+    if (this.isDue) return;
+    this.isDue = true;
+    requestAnimationFrame(() => this.paint());
+  }
+
+  paint() {
+    this.isDue = false;
     if (!this.content) return;
     const { clientWidth: width, clientHeight: height } = this.plot;
     const scale = Math.max(window.devicePixelRatio || 1, document.documentElement.classList.contains("printing") ? 2 : 1);
@@ -165,6 +174,7 @@ class Chart {
     this.y = new Axis({ ...this.content.y, low: y[0], high: y[1] });
     this.frame = { left: MARGIN.left, top: MARGIN.top, width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
     this.drawAxes(ctx);
+    this.named = null;
     ctx.save();
     ctx.beginPath();
     ctx.rect(this.frame.left, this.frame.top, this.frame.width, this.frame.height);
@@ -233,8 +243,11 @@ class Chart {
     ctx.globalAlpha = alpha;
     colours.forEach((colour, wanted) => {
       ctx.fillStyle = colour;
+      const drawn = isRound ? null : new Uint8Array((this.plot.clientWidth + 1) * (this.plot.clientHeight + 1));
       for (let k = 0; k < x.length; k++) {
         if (Number.isNaN(at[k]) || (group && group[k] !== wanted)) continue;
+        // What cannot be seen need not be drawn.
+        if (drawn && drawn[Math.round(up[k]) * this.plot.clientWidth + Math.round(at[k])]++ >= LAYERS) continue;
         if (isRound) {
           ctx.beginPath();
           ctx.arc(at[k], up[k], size, 0, 7);
@@ -266,11 +279,14 @@ class Chart {
     }
     ctx.stroke();
     ctx.setLineDash([]);
-    if (label) {
+    const up = this.py(y[y.length - 1]);
+    // Where lines are close, only some are named.
+    if (label && (this.named === null || Math.abs(up - this.named) > 15)) {
+      this.named = up;
       ctx.fillStyle = cssColour("muted");
       ctx.textAlign = "right";
       ctx.textBaseline = "bottom";
-      ctx.fillText(label, this.frame.left + this.frame.width - 4, this.py(y[y.length - 1]) - 1);
+      ctx.fillText(label, this.frame.left + this.frame.width - 4, up - 1);
     }
   }
 

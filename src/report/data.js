@@ -41,7 +41,9 @@ const byName = ({ columns, values }) => new Map(columns.map((column, k) => [colu
 
 /** Unpacks the page's data. */
 async function unpack() {
-  const packed = Uint8Array.from(atob(element("data").textContent), (c) => c.charCodeAt(0));
+  const text = atob(element("data").textContent);
+  const packed = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) packed[k] = text.charCodeAt(k);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
   const length = Number(new DataView(buffer).getBigUint64(0, true));

@@ -10,6 +10,7 @@ const GRADIENT = {
   dark: [[120, 110, 220], [70, 140, 190], [50, 175, 165], [110, 205, 100], [240, 225, 60]],
 };
 const PALE = { light: "#aeb8c2", dark: "#5a6672" };
+const REGIMES = ["stick-slip", "mixed", "sliding"];
 const ink = (colours) => colours[isDark() ? "dark" : "light"];
 
 /** A colour of the gradient, at a place from 0 to 1. */
@@ -29,7 +30,7 @@ function colouring(report, name) {
   const distinct = [...new Set(values)].filter((value) => value !== null);
   const none = [ink(PALE), "none"];
   if (!isNumeric(column)) {
-    const words = distinct.sort();
+    const words = name === "regime" ? REGIMES : distinct.sort();
     values.forEach((value, set) => (group[set] = value === null ? words.length : words.indexOf(value)));
     const shade = (value, k) => (value === false ? ink(PALE) : ink(CATEGORIES)[column.kind === "flag" ? 0 : k % DISTINCT]);
     const word = (value) => (column.kind === "flag" ? (value ? name : `not ${name}`) : value);
@@ -71,9 +72,11 @@ class Explorer {
   defaults() {
     const { report } = this;
     const regimes = new Set(report.values("regime"));
-    const [first, second] = report.swept.filter(({ key }) => isNumeric(report.columns.get(key)));
-    const usual = report.isModulated ? "locked" : regimes.size > 1 ? "regime" : (second?.key ?? "");
-    this.usual = { colour: usual, of: "sets", x: first?.key ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
+    // In the order of the sweep file.
+    const keys = report.axes.flatMap(([keys]) => keys.split(", ")).filter((key) => report.swept.some((swept) => swept.key === key));
+    const [first, second] = keys.filter((key) => isNumeric(report.columns.get(key)));
+    const colour = report.isModulated ? "locked" : regimes.size > 1 ? "regime" : (second ?? "");
+    this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
   }
 
   chosen(key) {

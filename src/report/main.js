@@ -5,18 +5,18 @@ const PATIENCE = 8;
 /** Time without a touch of the page after which it may be loaded again, in ms. */
 const QUIET = 4000;
 
-function follow(report, isLoading) {
+function follow(report) {
   const live = element("live");
   const { status } = report;
   if (!report.live) {
     const missing = status.jobs_missing > 0;
     live.hidden = !missing;
-    live.textContent = `${counted(status.jobs_missing, "job")} of ${(status.jobs_done + status.jobs_failed + status.jobs_missing).toLocaleString("en-US")} were missing when this page was written; stickslip run goes on with them.`;
+    live.textContent = `${counted(status.jobs_missing, "job")} of ${(status.jobs_done + status.jobs_failed + status.jobs_missing).toLocaleString("en-US")} were missing when this page was written; stickslip run resumes with them.`;
     return;
   }
   const { refresh, written } = report.live;
   const seen = notes.get("seen");
-  const unchanged = seen?.written === written ? seen.unchanged + (isLoading ? 1 : 0) : 0;
+  const unchanged = seen?.written === written ? seen.unchanged + 1 : 0;
   notes.set("seen", { written, unchanged });
   const total = status.jobs_done + status.jobs_failed + status.jobs_missing;
   const share = Math.floor((100 * (total - status.jobs_missing)) / total);
@@ -24,7 +24,7 @@ function follow(report, isLoading) {
   const when = new Date(1000 * written).toLocaleTimeString();
   const isStale = unchanged >= PATIENCE;
   live.hidden = false;
-  live.textContent = `Running: ${share} % of ${counted(total, "job")}${left}. Written at ${when}. ${isStale ? "It has not been written again for long: load it again by hand." : "It loads itself again."}`;
+  live.textContent = `Running: ${share} % of ${counted(total, "job")}${left}. Written at ${when}. ${isStale ? "It has not changed for some time: reload it by hand." : "The page reloads by itself."}`;
   if (isStale) return;
   let touched = 0;
   for (const kind of ["pointermove", "pointerdown", "keydown", "wheel", "touchstart"]) {
@@ -54,7 +54,7 @@ async function start() {
   const apply = () => {
     const { shown, problems } = filtered(report, state.filter);
     const left = shown.reduce((sum, isShown) => sum + isShown, 0);
-    const hint = "Words such as V0>1e-5, regime=sliding, locked=true, or the beginning of a set; all must hold.";
+    const hint = "Examples: V0>1e-5, regime=sliding, locked=true, or the first characters of a set. All conditions must hold.";
     element("filter-note").textContent = problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${report.setCount.toLocaleString("en-US")} fit.` : hint);
     element("filter-note").classList.toggle("bad", problems.length > 0);
     filter.setAttribute("aria-invalid", String(problems.length > 0));
@@ -87,19 +87,23 @@ async function start() {
     explorer.draw();
   };
   explorer.selected = report.placeOf.get(state.set) ?? -1;
+  writeRegimes(report, filterBy);
+  writeCost(report);
   apply();
-  redraw();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   const print = (isPrinting) => {
     document.documentElement.classList.toggle("printing", isPrinting);
     redraw();
+    charts.forEach((chart) => chart.paint());
   };
   addEventListener("beforeprint", () => print(true));
   addEventListener("afterprint", () => print(false));
   const scroll = notes.get("scroll");
   if (scroll && performance.getEntriesByType("navigation")[0]?.type === "reload") scrollTo(0, scroll);
   addEventListener("pagehide", () => notes.set("scroll", scrollY));
-  follow(report, true);
+  follow(report);
+  // Once the charts are drawn.
+  await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
   document.documentElement.dataset.ready = "yes";
 }
 
@@ -107,8 +111,8 @@ async function start() {
 function writeSamples(report) {
   const { slips, sets_every: sets, census, setCount } = report;
   const samples = [];
-  if (sets > 1) samples.push(`Of ${counted(census.sets, "set")} every ${sets}th is shown, ${setCount.toLocaleString("en-US")} of them.`);
-  if (slips.every > 1) samples.push(`Of their slips every ${slips.every}th is a point, ${slips.rows.toLocaleString("en-US")} of them; histograms and statistics count all.`);
+  if (sets > 1) samples.push(`The page has one in ${sets} of ${counted(census.sets, "set")}, ${setCount.toLocaleString("en-US")} in all.`);
+  if (slips.every > 1) samples.push(`The charts of slips have one in ${slips.every} slips of these sets, ${slips.rows.toLocaleString("en-US")} in all; histograms and statistics count every slip.`);
   element("sample-note").textContent = samples.join(" ");
   element("sample-note").hidden = samples.length === 0;
 }

@@ -19,7 +19,7 @@ function writeSweep(report) {
     const isNumber = typeof distinct[0] === "number";
     const range = isNumber ? [distinct.reduce((a, b) => Math.min(a, b)), distinct.reduce((a, b) => Math.max(a, b))] : null;
     const words = distinct.length <= 6 ? distinct.sort((a, b) => a - b).map((value) => number(value)).join(", ") : `${number(range[0])} to ${number(range[1])}`;
-    return [key, symbol === key ? meaning : `${meaning} ${symbol}`, distinct.length.toLocaleString("en-US"), words, unit];
+    return [symbol && symbol !== key ? `${key} (${symbol})` : key, meaning, distinct.length.toLocaleString("en-US"), words, unit];
   });
   const derived = [...axis].filter(([key]) => !report.swept.some((parameter) => parameter.key === key));
   const others = derived.map(([key, count]) => [key, key === "seed" ? "realisations of the disorder" : "fixes the period T", count.toLocaleString("en-US"), "", ""]);
@@ -36,13 +36,13 @@ function writeSweep(report) {
 function writeRegimes(report, filterBy) {
   const { regimes, sets, locked } = report.census;
   const given = Object.entries(regimes).filter(([, count]) => count > 0);
-  const order = ["stick-slip", "mixed", "sliding", ""];
+  const order = [...REGIMES, ""];
   given.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
   const bar = make("div", { class: "share", "aria-hidden": "true" });
-  const words = given.map(([regime, count], k) => {
+  const words = given.map(([regime, count]) => {
     const part = make("span");
     part.style.flex = `${count} 0 0`;
-    part.style.background = regime ? ink(CATEGORIES)[k] : ink(PALE);
+    part.style.background = regime ? ink(CATEGORIES)[REGIMES.indexOf(regime)] : ink(PALE);
     bar.append(part);
     const swatch = make("span", { class: "swatch" });
     swatch.style.background = part.style.background;

@@ -306,7 +306,9 @@ fn completions_are_there_for_the_usual_shells() {
 fn the_help_of_every_command_holds_an_example() {
     let folder = Folder::new();
     assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
-    for command in ["", "plan", "run", "status", "reduce", "plot", "verify", "compact", "simulate", "completions"] {
+    for command in
+        ["", "plan", "run", "status", "reduce", "plot", "report", "verify", "compact", "simulate", "completions"]
+    {
         let help = folder.ends(0, &format!("{command} --help")).stdout;
         let example = help.split_once("Example").unwrap_or_else(|| panic!("{command}: {help}")).1;
         assert!(example.contains(format!("  stickslip {command}").trim_end()), "{command}: {example}");
