@@ -3,9 +3,8 @@
 const MARGIN = { left: 62, right: 14, top: 10, bottom: 44 };
 /** How far the pointer may be from a point, in px. */
 const REACH = 14;
-/** Points beyond which they are squares, which draw faster, and no more than so many of a colour on one pixel. */
+/** Points beyond which they are squares, which draw faster. */
 const MANY = 4000;
-const LAYERS = 3;
 const HIDDEN = 255;
 
 const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -229,7 +228,6 @@ class Chart {
   points(ctx, layer) {
     const { x, y, group, colours, size = 2, alpha = 1 } = layer;
     const [at, up] = [new Float32Array(x.length).fill(NaN), new Float32Array(x.length)];
-    const isRound = x.length <= MANY;
     const edge = size + 2;
     const { left, top, width, height } = this.frame;
     for (let k = 0; k < x.length; k++) {
@@ -240,25 +238,48 @@ class Chart {
         up[k] = down;
       }
     }
-    ctx.globalAlpha = alpha;
-    colours.forEach((colour, wanted) => {
-      ctx.fillStyle = colour;
-      const drawn = isRound ? null : new Uint8Array((this.plot.clientWidth + 1) * (this.plot.clientHeight + 1));
+    if (x.length > MANY) this.squares(ctx, layer, at, up);
+    else {
+      ctx.globalAlpha = alpha;
       for (let k = 0; k < x.length; k++) {
-        if (Number.isNaN(at[k]) || (group && group[k] !== wanted)) continue;
-        // What cannot be seen need not be drawn.
-        if (drawn && drawn[Math.round(up[k]) * this.plot.clientWidth + Math.round(at[k])]++ >= LAYERS) continue;
-        if (isRound) {
-          ctx.beginPath();
-          ctx.arc(at[k], up[k], size, 0, 7);
-          ctx.fill();
-        } else {
-          ctx.fillRect(at[k] - size / 2, up[k] - size / 2, size, size);
+        if (Number.isNaN(at[k])) continue;
+        ctx.fillStyle = colours[group ? group[k] : 0];
+        ctx.beginPath();
+        ctx.arc(at[k], up[k], size, 0, 7);
+        ctx.fill();
+      }
+      ctx.globalAlpha = 1;
+    }
+    if (layer.tip) this.places.push({ layer, at, up });
+  }
+
+  /** Points as squares, pixel by pixel: the more of a group on a pixel, the darker; higher groups hide lower ones. */
+  squares(ctx, { group, colours, size = 2, alpha = 1 }, at, up) {
+    const { width, height } = this.base;
+    const scale = width / this.plot.clientWidth;
+    const side = Math.max(1, Math.round(size * scale));
+    const [top, count] = [new Uint8Array(width * height), new Uint8Array(width * height)];
+    for (let k = 0; k < at.length; k++) {
+      if (Number.isNaN(at[k])) continue;
+      const own = 1 + (group ? group[k] : 0);
+      const [left, upper] = [Math.round(at[k] * scale - side / 2), Math.round(up[k] * scale - side / 2)];
+      for (let row = Math.max(0, upper); row < Math.min(height, upper + side); row++) {
+        for (let pixel = row * width + Math.max(0, left); pixel < row * width + Math.min(width, left + side); pixel++) {
+          if (top[pixel] < own) [top[pixel], count[pixel]] = [own, 1];
+          else if (top[pixel] === own && count[pixel] < 255) count[pixel]++;
         }
       }
-    });
-    ctx.globalAlpha = 1;
-    if (layer.tip) this.places.push({ layer, at, up });
+    }
+    const image = new ImageData(width, height);
+    const shades = colours.map(components);
+    for (let pixel = 0; pixel < top.length; pixel++) {
+      if (!top[pixel]) continue;
+      image.data.set(shades[top[pixel] - 1], 4 * pixel);
+      image.data[4 * pixel + 3] = 255 * (1 - (1 - alpha) ** count[pixel]);
+    }
+    const sheet = make("canvas", { width, height });
+    sheet.getContext("2d").putImageData(image, 0, 0);
+    ctx.drawImage(sheet, 0, 0, width / scale, height / scale);
   }
 
   /** `{x, y, colour, dash, width, label}` */
@@ -433,6 +454,12 @@ class Chart {
   pick(found) {
     if (found?.layer.pick) found.layer.pick(found.k);
   }
+}
+
+/** Red, green and blue of `#rrggbb` or `rgb(r g b)`. */
+function components(colour) {
+  if (!colour.startsWith("#")) return colour.match(/\d+/g).map(Number);
+  return [1, 3, 5].map((place) => Number.parseInt(colour.slice(place, place + 2), 16));
 }
 
 function stroke(ctx, corners) {

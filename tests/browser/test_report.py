@@ -32,7 +32,10 @@ def column(browser, name):
 def ink(browser, chart):
     """How many pixels of a chart are drawn."""
     script = """const { base } = charts.find(({ name }) => name === arguments[0]);
-    const { data } = base.getContext("2d").getImageData(0, 0, base.width, base.height);
+    const copy = Object.assign(document.createElement("canvas"), { width: base.width, height: base.height });
+    const ctx = copy.getContext("2d", { willReadFrequently: true });
+    ctx.drawImage(base, 0, 0);
+    const { data } = ctx.getImageData(0, 0, base.width, base.height);
     let drawn = 0;
     for (let k = 3; k < data.length; k += 4) drawn += data[k] > 0;
     return drawn;"""

@@ -75,8 +75,8 @@ fn a_report_has_every_slip_with_its_set_and_its_seed() {
     }
     let ids = &content["sets"]["values"][0];
     let jobs = content["slips"]["jobs"].as_array().unwrap();
-    let of_jobs =
-        jobs.iter().map(|job| (ids[job[0].as_u64().unwrap() as usize].as_str().unwrap(), job[1].as_i64().unwrap()));
+    let place = |job: &Value| usize::try_from(job[0].as_u64().unwrap()).unwrap();
+    let of_jobs = jobs.iter().map(|job| (ids[place(job)].as_str().unwrap(), job[1].as_i64().unwrap()));
     let mut expected: Vec<_> = slips.texts("set_id").into_iter().zip(slips.counts("seed")).collect();
     expected.dedup();
     assert_eq!(of_jobs.collect::<Vec<_>>(), expected);
