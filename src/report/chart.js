@@ -89,7 +89,10 @@ class Chart {
     charts.push(this);
   }
 
-  /** Shows layers: `{x: {label, log}, y: {label, log}, layers, key}`; `key` has swatches and their words. */
+  /**
+   * Shows layers: `{x: {label, log}, y: {label, log}, layers, key, isSquare}`; `key` has swatches and their words, and a
+   * square has the same range on both axes.
+   */
   show(content) {
     const axes = JSON.stringify([content.x.label, content.x.log, content.y.label, content.y.log]);
     // A zoom makes sense on the same axes only.
@@ -168,7 +171,7 @@ class Chart {
       this.x = null;
       return;
     }
-    const [x, y] = this.view ? [this.view.x, this.view.y] : ranges;
+    const [x, y] = this.view ? [this.view.x, this.view.y] : this.content.isSquare ? alike(...ranges) : ranges;
     this.x = new Axis({ ...this.content.x, low: x[0], high: x[1] });
     this.y = new Axis({ ...this.content.y, low: y[0], high: y[1] });
     this.frame = { left: MARGIN.left, top: MARGIN.top, width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
@@ -454,6 +457,12 @@ class Chart {
   pick(found) {
     if (found?.layer.pick) found.layer.pick(found.k);
   }
+}
+
+/** Two ranges made the same. */
+function alike([low, high], [lower, higher]) {
+  const both = [Math.min(low, lower), Math.max(high, higher)];
+  return [both, both];
 }
 
 /** Red, green and blue of `#rrggbb` or `rgb(r g b)`. */

@@ -89,6 +89,7 @@ function writeCost(report) {
       { type: "points", x, y, colours: [ink(CATEGORIES)[0]], size: 3.5, alpha: 0.8, tip },
     ],
     key: [[cssColour("muted"), "dashed: as predicted", "stroke"]],
+    isSquare: true,
     empty: "no logs of parts",
   });
 }
