@@ -2,13 +2,14 @@
 //! "Stabilizing stick-slip friction", PRL 107, 024301 (2011).
 //!
 //! ```text
-//! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures
-//!     sweep/             run/   solver/         results/   reduce/         figure/
+//! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures, report
+//!     sweep/             run/   solver/         results/   reduce/         figure/  report/
 //!                               observe/        table/
 //!                               model/
 //! ```
 //!
-//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`.
+//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`;
+//! `run`, `reduce` <- `report`.
 //! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
 //! `sweeps`. `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
 //!
@@ -40,6 +41,8 @@ pub mod model;
 pub mod observe;
 #[cfg(feature = "sweeps")]
 pub mod reduce;
+#[cfg(feature = "sweeps")]
+pub mod report;
 #[cfg(feature = "sweeps")]
 pub mod results;
 #[cfg(feature = "sweeps")]

@@ -2,6 +2,7 @@
 
 use stickslip::figure::FigureError;
 use stickslip::reduce::ReduceError;
+use stickslip::report::ReportError;
 use stickslip::results::{ErrorKind, ResultsError};
 use stickslip::solver::SimulationError;
 use stickslip::sweep::SweepError;
@@ -61,6 +62,14 @@ impl Exit {
         }
         if let Some(FigureError::Option { .. } | FigureError::TooSmall { .. }) = cause.downcast_ref::<FigureError>() {
             return Some(Self::Usage);
+        }
+        if let Some(error) = cause.downcast_ref::<ReportError>() {
+            return match error {
+                ReportError::Reduce(error) => Self::of_cause(error),
+                ReportError::Dataset(error) => Self::of_cause(error),
+                ReportError::Results(error) => Self::of_cause(error),
+                ReportError::Storage(_) | ReportError::Encoding(_) => None,
+            };
         }
         match cause.downcast_ref::<DatasetError>() {
             Some(DatasetError::Damaged { .. } | DatasetError::Stray { .. }) => Some(Self::Damaged),

@@ -14,6 +14,7 @@ mod planning;
 mod plot;
 mod progress;
 mod reduce;
+mod report;
 mod run;
 mod schema;
 mod signals;
@@ -55,6 +56,7 @@ enum Command {
     Status(status::Arguments),
     Reduce(reduce::Arguments),
     Plot(Box<plot::Arguments>),
+    Report(report::Arguments),
     Verify(verify::Arguments),
     Compact(compact::Arguments),
     Merge(merge::Arguments),
@@ -75,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => plot::plot(&arguments),
+        Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
         Command::Compact(arguments) => compact::compact(&arguments),
         Command::Merge(arguments) => merge::merge(&arguments),

@@ -3,6 +3,7 @@
 use super::exit::Exit;
 use super::planning::Planning;
 use super::progress::Progress;
+use super::report::Reporter;
 use super::sweep::{self, Preset};
 use super::threads::{self, Threads};
 use super::{output, plot, reduce, signals, time};
@@ -30,6 +31,7 @@ Examples:
   stickslip run --preset fig3                    a sweep of the paper, without a file
   stickslip run results/fig3                     resume, without the sweep file
   stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; `merge` puts the parts together
+  stickslip run sweeps/fig3.toml --report        with results/fig3/report.html, to watch it in a browser
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
 Started several times, also on several hosts with a common disk, it shares the work.
@@ -68,8 +70,11 @@ pub struct Arguments {
     #[arg(long)]
     retry_failed: bool,
     /// Skip reduction and figures
-    #[arg(long)]
+    #[arg(long, conflicts_with = "report")]
     no_reduce: bool,
+    /// Write report.html, also while the run goes on: a browser that shows it keeps up
+    #[arg(long)]
+    report: bool,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -108,11 +113,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let (recording, solver) = (*sweep.recording(), sweep.solver());
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
+    let mut reporter = arguments.report.then(|| Reporter::new(&layout));
     let report = stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
         drop(planning);
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);
+                if let Some(reporter) = &mut reporter {
+                    reporter.follow(event);
+                }
             })?;
         if arguments.json {
             output::json(&Report { format: FORMAT, report: &report })?;
@@ -126,6 +135,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             } else {
                 output::report("all jobs are done; another worker reduces them");
             }
+        }
+        let written = reporter.as_ref().map(|reporter| reporter.finish(&report)).transpose()?.flatten();
+        if let Some(path) = written.filter(|_| !arguments.json) {
+            output::print(&format!("report  {}\n", shown(&path)))?;
         }
         Ok(report)
     })?;

@@ -3,7 +3,7 @@
 //! ```text
 //! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
 //!                tables/{slips,precursors,jobs}/compact-EEE-FFFFFF-LLLLLL-CHECKSUM.parquet  what was compacted
-//!                reduced/  figures/                                      made from the tables
+//!                reduced/  figures/  report.html                         made from the tables
 //!                run/manifest.json  sweep-EEE.toml                       what the tables belong to
 //!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
 //!                run/staging/replaced/tables/                            what the last compaction replaced, for a while
@@ -159,6 +159,12 @@ impl<'a> Layout<'a> {
     #[must_use]
     pub fn figures(&self) -> PathBuf {
         self.root.join("figures")
+    }
+
+    /// The report.
+    #[must_use]
+    pub fn report(&self) -> PathBuf {
+        self.root.join("report.html")
     }
 
     /// Folder of everything that is no result.

@@ -22,7 +22,7 @@ mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
 pub use shard::{Shard, ShardError};
-pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status};
+pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
 
 use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};

@@ -11,7 +11,7 @@ use std::time::SystemTime;
 
 /// Version of [`Status`] as JSON.
 const FORMAT: u32 = 2;
-/// Failed jobs that are listed one by one, at most.
+/// Failed jobs that [`status`] lists one by one, at most.
 pub const MAX_FAILURES: usize = 10;
 
 /// How far the parts of a share are. Costs are predicted CPU times, in s.
@@ -54,7 +54,7 @@ pub struct Status {
     /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
     /// before the first part.
     pub time_left: Option<f64>,
-    /// The first failed jobs, [`MAX_FAILURES`] at most.
+    /// The first failed jobs.
     pub failures: Vec<Failure>,
 }
 
@@ -130,12 +130,12 @@ fn jobs_kept(share: &Share<'_>) -> u64 {
     jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
 }
 
-fn overview_and_failures(results: &Results<'_>) -> Result<(Overview, Vec<Failure>), ResultsError> {
+fn overview_and_failures(results: &Results<'_>, max_failures: usize) -> Result<(Overview, Vec<Failure>), ResultsError> {
     let mut failures = Vec::new();
     let parts: Vec<Outline> = results.plan().outlines().collect();
     let share = Share::look_up(results, &parts, false)?;
     let mut overview = share.overview(true, |part, position, reason| {
-        if failures.len() < MAX_FAILURES {
+        if failures.len() < max_failures {
             failures.push(Failure {
                 job_id: results.job_id(part, position),
                 reason: reason.to_owned(),
@@ -152,7 +152,15 @@ fn overview_and_failures(results: &Results<'_>) -> Result<(Overview, Vec<Failure
 /// # Errors
 /// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
-    let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results))??;
+    status_with(results, MAX_FAILURES)
+}
+
+/// The same, with another number of failed jobs.
+///
+/// # Errors
+/// As [`status`].
+pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
+    let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results, max_failures))??;
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {

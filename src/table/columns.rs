@@ -35,6 +35,19 @@ pub enum Kind {
     Text,
 }
 
+impl Kind {
+    /// Its word in documentation.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Count => "count",
+            Self::Flag => "flag",
+            Self::Text => "text",
+        }
+    }
+}
+
 /// The value of a column in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cell<'a> {
@@ -179,9 +192,7 @@ pub fn markdown<T: Table>() -> String {
         let unit = match kind {
             Kind::Real if unit.is_empty() => "1",
             Kind::Real => unit,
-            Kind::Count => "count",
-            Kind::Flag => "flag",
-            Kind::Text => "text",
+            kind => kind.word(),
         };
         let nullable = if *nullable { "?" } else { "" };
         let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");

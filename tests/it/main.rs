@@ -24,6 +24,7 @@ mod moved;
 mod program;
 mod ramp;
 mod regimes;
+mod report;
 mod runs;
 mod sharing;
 mod simulate;

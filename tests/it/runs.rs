@@ -315,6 +315,7 @@ fn the_help_of_every_command_holds_an_example() {
         "status",
         "reduce",
         "plot",
+        "report",
         "verify",
         "compact",
         "merge",

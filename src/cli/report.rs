@@ -1,0 +1,103 @@
+//! `stickslip report`, and `--report` of `run`: a results directory as one HTML page.
+
+use super::exit::Exit;
+use super::output;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use stickslip::reduce::ReduceError;
+use stickslip::report::ReportError;
+use stickslip::results::Results;
+use stickslip::results::layout::Layout;
+use stickslip::run::{RunEvent, RunReport};
+use stickslip::table::shown::shown;
+use stickslip::table::storage::Disk;
+
+/// Write one HTML page to explore a results directory in a browser
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  stickslip report results/fig3                    writes results/fig3/report.html
+  stickslip report results/fig3 -o /tmp/fig3.html  writes it elsewhere
+  stickslip run sweeps/fig3.toml --report          writes it again and again while the run goes on
+
+The page needs no network and no other file. It has what was swept, regimes, failed jobs with their commands,
+charts, the table of parameter sets, predicted against measured cost, and versions. Reduced data that are older
+than the tables are made again first.")]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// File to write [default: report.html in DIR]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+pub fn report(arguments: &Arguments) -> Result<Exit> {
+    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let path = match &arguments.output {
+        None => stickslip::report::write(&results, None)?,
+        Some(path) => {
+            let page = stickslip::report::page(&results, None)?;
+            output::replace(path, |draft| Ok(std::fs::write(draft, &page)?))?;
+            path.clone()
+        }
+    };
+    output::print(&format!("{}\n", shown(&path)))?;
+    Ok(Exit::Done)
+}
+
+/// Least time between two reports of a run.
+const MIN_SPACING: Duration = Duration::from_secs(5);
+/// The time between two is so many times as long as one takes, which keeps them below half a percent of the run.
+const SPACING: u32 = 200;
+/// How soon a browser is to look again for what other workers write.
+const OTHERS_SPACING: Duration = Duration::from_secs(30);
+
+/// Writes the report of a run while it goes on.
+pub struct Reporter<'a> {
+    layout: &'a Layout<'a>,
+    /// Whether something was committed since the last one.
+    is_due: bool,
+    last: Option<Instant>,
+    spacing: Duration,
+    has_failed: bool,
+}
+
+impl<'a> Reporter<'a> {
+    pub fn new(layout: &'a Layout<'a>) -> Self {
+        Self { layout, is_due: false, last: None, spacing: MIN_SPACING, has_failed: false }
+    }
+
+    /// Writes a report if there is something new and the last is long enough ago. One that cannot be written does not end
+    /// the run.
+    pub fn follow(&mut self, event: &RunEvent) {
+        self.is_due |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::OthersDone { jobs: 1.., .. });
+        if !self.is_due || self.last.is_some_and(|last| last.elapsed() < self.spacing) {
+            return;
+        }
+        let begin = Instant::now();
+        if let Err(error) = self.write(Some(self.spacing))
+            && !std::mem::replace(&mut self.has_failed, true)
+        {
+            output::report(&format!("warning: no report is written: {error}"));
+        }
+        self.is_due = false;
+        self.last = Some(Instant::now());
+        self.spacing = MIN_SPACING.max(SPACING * begin.elapsed());
+    }
+
+    /// Writes the last report; none if no job is committed.
+    pub fn finish(&self, report: &RunReport) -> Result<Option<PathBuf>> {
+        let others_run = report.jobs_left > 0 && !report.stopped;
+        Ok(self.write(others_run.then_some(OTHERS_SPACING))?)
+    }
+
+    fn write(&self, refresh: Option<Duration>) -> Result<Option<PathBuf>, ReportError> {
+        match stickslip::report::write(&Results::read(self.layout)?, refresh) {
+            Err(ReportError::Reduce(ReduceError::NoJobs { .. })) => Ok(None),
+            written => Ok(Some(written?)),
+        }
+    }
+}

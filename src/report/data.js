@@ -1,0 +1,147 @@
+// The data of the page: unpacked, with columns by name, numbers in words, and the state that outlives a reload.
+
+const element = (id) => document.getElementById(id);
+
+/** An element with attributes and children; texts become text, never HTML. */
+function make(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false && value !== null && value !== undefined) made.setAttribute(name, value);
+  }
+  made.append(...children.filter((child) => child !== null && child !== undefined));
+  return made;
+}
+
+/** Four digits, or as many as asked for. */
+function number(value, digits = 4) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  if (typeof value !== "number") return String(value);
+  const size = Math.abs(value);
+  if (size === 0 || (size >= 1e-3 && size < 1e6)) return String(Number(value.toPrecision(digits)));
+  return Number(value.toPrecision(digits)).toExponential().replace("e+", "e");
+}
+
+const counted = (count, noun) => `${count.toLocaleString("en-US")} ${noun}${count === 1 ? "" : "s"}`;
+
+/** A duration in s, in the unit that suits it. */
+function duration(seconds) {
+  if (seconds < 120) return `${number(seconds, 3)} s`;
+  if (seconds < 7200) return `${number(seconds / 60, 3)} min`;
+  if (seconds < 172800) return `${number(seconds / 3600, 3)} h`;
+  return `${number(seconds / 86400, 3)} days`;
+}
+
+const titled = (column) => (column.unit ? `${column.name} (${column.unit})` : column.name);
+const isNumeric = (column) => column.kind === "real" || column.kind === "count";
+
+/** The columns of a table by name, each with its values. */
+const byName = ({ columns, values }) => new Map(columns.map((column, k) => [column.name, { ...column, values: values[k] }]));
+
+/** Unpacks the page's data. */
+async function unpack() {
+  const text = atob(element("data").textContent);
+  const packed = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) packed[k] = text.charCodeAt(k);
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const length = Number(new DataView(buffer).getBigUint64(0, true));
+  const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
+  return new Report(content, new Uint8Array(buffer, 8 + length));
+}
+
+class Report {
+  constructor(content, bytes) {
+    Object.assign(this, content);
+    this.columns = byName(content.sets);
+    this.setIds = this.columns.get("set_id").values;
+    this.setCount = this.setIds.length;
+    this.placeOf = new Map(this.setIds.map((id, place) => [id, place]));
+    this.readSlips(bytes);
+    const isSwept = ({ key }) => new Set(this.values(key)).size > 1;
+    this.swept = this.parameters.filter(isSwept);
+    this.fixed = this.parameters.filter((parameter) => !isSwept(parameter));
+    this.isModulated = this.slip.get("phase").values.some((phase) => !Number.isNaN(phase));
+  }
+
+  /** The values of a column of the sets. */
+  values(name) {
+    return this.columns.get(name).values;
+  }
+
+  /** Columns of numbers as they were written: of each the four bytes of all rows, highest first. */
+  readSlips(bytes) {
+    const { rows, columns, jobs } = this.slips;
+    const words = (place) => {
+      const column = new Uint32Array(rows);
+      for (let k = 0; k < 4; k++) {
+        const plane = bytes.subarray((4 * place + k) * rows, (4 * place + k + 1) * rows);
+        for (let row = 0; row < rows; row++) column[row] |= plane[row] << (24 - 8 * k);
+      }
+      return column;
+    };
+    this.slipJob = words(0);
+    this.slipSet = Uint32Array.from(this.slipJob, (job) => jobs[job][0]);
+    this.slip = new Map(
+      columns.map((column, k) => [column.name, { ...column, values: new Float32Array(words(k + 1).buffer) }]),
+    );
+    const derive = (name, unit, meaning, of) =>
+      this.slip.set(name, { name, unit, meaning, kind: "real", values: Float32Array.from(this.slipSet, of) });
+    const [velocity, period] = [this.values("V0"), this.slip.get("T_onset").values];
+    const [amplitude, interval] = [this.slip.get("Delta_onset").values, this.slip.get("interval").values];
+    derive("eta", "", "2 pi Delta / (T V0) at the onset; 0 without modulation", (set, slip) =>
+      Number.isNaN(period[slip]) ? 0 : (2 * Math.PI * amplitude[slip]) / (period[slip] * velocity[set]),
+    );
+    derive("tau / T", "", "interval in periods at the onset", (_, slip) => interval[slip] / period[slip]);
+  }
+
+  /** The command that runs one job of a set alone. */
+  command(set, seed) {
+    return `${this.sets.commands[set]} --set seed=${seed} ${this.sets.command_end}`.trim();
+  }
+
+  /** The swept parameters of a set, as a line. */
+  settings(set) {
+    const shown = this.swept.map(({ key, unit }) => [key, this.values(key)[set], unit]);
+    const given = shown.filter(([, value]) => value !== null);
+    return given.map(([key, value, unit]) => `${key} = ${number(value)} ${unit}`.trim()).join(", ");
+  }
+
+  name(set) {
+    return `set ${this.setIds[set].slice(0, 8)}`;
+  }
+}
+
+// What the reader has chosen: in the fragment of the address, so that it survives a reload and can be shared.
+const state = { set: "", filter: "", colour: "", sort: "", page: "0", columns: "", of: "", x: "", y: "", logx: "", logy: "" };
+
+function readState() {
+  for (const [key, value] of new URLSearchParams(location.hash.slice(1))) {
+    if (Object.hasOwn(state, key)) state[key] = value;
+  }
+}
+
+function keep(changes) {
+  Object.assign(state, changes);
+  const given = Object.entries(state).filter(([key, value]) => value !== "" && !(key === "page" && value === "0"));
+  history.replaceState(null, "", `#${new URLSearchParams(given)}`);
+}
+
+/** Notes that are of use after a reload only. A browser may refuse them. */
+const notes = {
+  get(key) {
+    try {
+      return JSON.parse(sessionStorage.getItem(`stickslip ${location.pathname} ${key}`));
+    } catch {
+      return null;
+    }
+  },
+  set(key, value) {
+    try {
+      sessionStorage.setItem(`stickslip ${location.pathname} ${key}`, JSON.stringify(value));
+    } catch {
+      // The page works without.
+    }
+  },
+};

@@ -1,0 +1,84 @@
+//! The page: its files put together, with the content compressed, so that no text of it can be taken for HTML.
+
+use super::content::Content;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use sha2::{Digest, Sha256};
+use std::io::{self, Write};
+
+const PAGE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("style.css");
+/// In the order in which they need each other.
+const SCRIPTS: [&str; 6] = [
+    include_str!("data.js"),
+    include_str!("chart.js"),
+    include_str!("table.js"),
+    include_str!("explore.js"),
+    include_str!("sections.js"),
+    include_str!("main.js"),
+];
+
+/// Content that cannot be put into a page.
+#[derive(Debug, thiserror::Error)]
+pub enum EncodingError {
+    /// It has no form as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// It cannot be compressed.
+    #[error(transparent)]
+    Compression(#[from] io::Error),
+}
+
+/// The page of this content and these bytes of its slips.
+pub(super) fn html(content: &Content, slips: &[u8]) -> Result<String, EncodingError> {
+    let data = data(&serde_json::to_vec(content)?, slips)?;
+    let script = format!("\"use strict\";\n{}", SCRIPTS.concat());
+    // Scripts and styles other than these do not count, and nothing is loaded.
+    let policy = format!(
+        "default-src 'none'; script-src '{}'; style-src '{}'; base-uri 'none'; form-action 'none'",
+        digest(&script),
+        digest(STYLE)
+    );
+    let parts = [("policy", policy.as_str()), ("style", STYLE), ("script", &script), ("data", &data)];
+    Ok(parts.into_iter().fold(PAGE.to_owned(), |page, (name, text)| page.replacen(&format!("{{{{{name}}}}}"), text, 1)))
+}
+
+/// Length of the JSON, the JSON, the slips: compressed, in characters that mean nothing in HTML.
+fn data(json: &[u8], slips: &[u8]) -> Result<String, io::Error> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(&(json.len() as u64).to_le_bytes())?;
+    encoder.write_all(json)?;
+    encoder.write_all(slips)?;
+    Ok(BASE64_STANDARD.encode(encoder.finish()?))
+}
+
+/// A text as a policy names it.
+fn digest(text: &str) -> String {
+    format!("sha256-{}", BASE64_STANDARD.encode(Sha256::digest(text)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_of_the_content_is_html() {
+        let data = data(b"{\"name\":\"</script><script>alert(1)</script>\\u2028<!--\"}", &[0, 255, 60]).unwrap();
+        assert!(data.chars().all(|c| c.is_ascii_alphanumeric() || "+/=".contains(c)), "{data}");
+    }
+
+    #[test]
+    fn the_files_of_the_page_fit_into_it() {
+        for name in ["policy", "style", "script", "data"] {
+            assert_eq!(PAGE.matches(&format!("{{{{{name}}}}}")).count(), 1, "{name}");
+        }
+        let inserted = [STYLE].into_iter().chain(SCRIPTS);
+        for text in inserted {
+            // Either would end its element, or be taken for a place to fill.
+            assert!(!text.contains("</") && !text.contains("{{"), "{text}");
+            assert!(!text.contains("http"), "a page loads nothing");
+        }
+    }
+}

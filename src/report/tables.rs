@@ -1,0 +1,230 @@
+//! Reduced tables, column by column: a reader of the page needs each column as a whole, and columns compress best.
+
+use crate::model::Parameters;
+use crate::observe::Regime;
+use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced};
+use crate::results::layout::Layout;
+use crate::sweep::{Job, Sweep};
+use crate::table::columns::{Cell, Column, Row, Table, columns};
+use crate::table::file::{Dataset, DatasetError};
+use serde::Serialize;
+use serde_json::Value;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+
+/// Sets up to which all are shown; of more, every k-th. Each takes some 300 bytes of the page.
+const MAX_SETS: u64 = 5_000;
+/// Decimals of a mantissa: six digits are more than any interval of confidence leaves.
+const DECIMALS: usize = 5;
+
+/// A column as the page describes it.
+#[derive(Debug, Serialize)]
+pub(super) struct Described {
+    name: Cow<'static, str>,
+    unit: &'static str,
+    meaning: &'static str,
+    kind: &'static str,
+}
+
+impl From<Column> for Described {
+    fn from(Column { name, unit, meaning, kind, .. }: Column) -> Self {
+        Self { name, unit, meaning, kind: kind.word() }
+    }
+}
+
+/// Rows, column by column.
+#[derive(Debug, Serialize)]
+pub(super) struct Columns {
+    columns: Vec<Described>,
+    values: Vec<Vec<Value>>,
+}
+
+impl Columns {
+    fn new<R: Row>() -> Self {
+        let columns: Vec<Described> = R::columns().into_iter().map(Described::from).collect();
+        let values = columns.iter().map(|_| Vec::new()).collect();
+        Self { columns, values }
+    }
+
+    fn push<R: Row>(&mut self, row: &R) {
+        let mut columns = self.values.iter_mut();
+        row.cells(&mut |cell| {
+            if let Some(column) = columns.next() {
+                column.push(json(cell));
+            }
+        });
+    }
+}
+
+fn json(cell: Cell<'_>) -> Value {
+    match cell {
+        Cell::Null => Value::Null,
+        // What is not finite becomes null.
+        Cell::Real(real) => rounded(real).into(),
+        Cell::Count(count) => count.into(),
+        Cell::Flag(flag) => flag.into(),
+        Cell::Text(text) => text.into(),
+    }
+}
+
+fn rounded(real: f64) -> f64 {
+    format!("{real:.DECIMALS$e}").parse().unwrap_or(real)
+}
+
+/// How many sets of which kind there are.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Census {
+    /// All sets.
+    pub sets: u64,
+    locked: u64,
+    /// By regime; those without a finished job under an empty name.
+    regimes: BTreeMap<&'static str, u64>,
+    /// Slips of all sets.
+    pub slips: u64,
+}
+
+columns! {
+    /// What the census counts.
+    struct Counted {
+        regime: Option<Regime>;
+        slips: u64;
+        is_locked as "locked": bool;
+    }
+}
+
+impl Census {
+    pub(super) fn read(layout: &Layout<'_>) -> Result<Self, DatasetError> {
+        let mut census = Self::default();
+        for regime in Regime::ALL {
+            census.regimes.insert(regime.word(), 0);
+        }
+        for batch in sets_file(layout).rows::<Counted>() {
+            for set in batch? {
+                census.sets += 1;
+                census.slips += set.slips;
+                census.locked += u64::from(set.is_locked);
+                *census.regimes.entry(set.regime.map_or("", Regime::word)).or_default() += 1;
+            }
+        }
+        Ok(census)
+    }
+
+    /// Of so many sets one is shown.
+    pub(super) const fn spacing(&self) -> u64 {
+        let spacing = self.sets.div_ceil(MAX_SETS);
+        if spacing == 0 { 1 } else { spacing }
+    }
+}
+
+fn sets_file<'a>(layout: &Layout<'a>) -> Dataset<'a> {
+    Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)])
+}
+
+/// The sets that are shown.
+#[derive(Debug, Serialize)]
+pub(super) struct Sets {
+    #[serde(flatten)]
+    columns: Columns,
+    /// How the `simulate` command of a job of each set begins; then come its seed and [`Sets::command_end`].
+    commands: Vec<String>,
+    command_end: String,
+    /// Histogram of τ of each set: numbers of bins of a width of the mean / 60, each followed by its count.
+    histograms: Vec<Vec<u64>>,
+    /// Places of the sets by their ids.
+    #[serde(skip)]
+    pub places: HashMap<String, usize>,
+}
+
+impl Sets {
+    /// Every k-th of the sets in the reduced data.
+    pub(super) fn read(layout: &Layout<'_>, sweep: &Sweep, spacing: u64) -> Result<Self, DatasetError> {
+        let mut sets = Self {
+            columns: Columns::new::<SetRow>(),
+            commands: Vec::new(),
+            command_end: String::new(),
+            histograms: Vec::new(),
+            places: HashMap::new(),
+        };
+        let mut number = 0_u64;
+        for batch in sets_file(layout).rows::<SetRow>() {
+            for row in batch? {
+                if number.is_multiple_of(spacing) {
+                    sets.push(sweep, row);
+                }
+                number += 1;
+            }
+        }
+        let bins = Dataset::new(layout.storage, vec![layout.reduced_file(HistogramBin::NAME)]);
+        for batch in bins.rows::<HistogramBin>() {
+            for bin in batch? {
+                if let Some(&place) = sets.places.get(&bin.set_id) {
+                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of a bin")]
+                    let number = (bin.low / (bin.high - bin.low)).round() as u64;
+                    sets.histograms[place].extend([number, bin.count]);
+                }
+            }
+        }
+        Ok(sets)
+    }
+
+    fn push(&mut self, sweep: &Sweep, row: SetRow) {
+        let [begin, end] = command(sweep, &row.parameters.parameters);
+        self.commands.push(begin);
+        self.command_end = end;
+        self.histograms.push(Vec::new());
+        self.columns.push(&row);
+        self.places.insert(row.set_id, self.places.len());
+    }
+}
+
+/// The `simulate` command of a job up to its seed and from there on. The end is the same for all jobs of a sweep.
+fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
+    // The seed stands last among the parameters, and in the command if it is not the default.
+    let seeded = Parameters { seed: 1, ..parameters.clone() };
+    let command = sweep.command(&Job { point: 0, parameters: seeded, cost: 0.0 });
+    let (begin, end) = command.rsplit_once("--set seed=1").unwrap_or((&command, ""));
+    [begin.trim_end().to_owned(), end.trim_start().to_owned()]
+}
+
+/// The back-bone of the reduced data.
+pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, DatasetError> {
+    let mut columns = Columns::new::<BackboneBin>();
+    for bin in read_reduced::<BackboneBin>(layout)? {
+        columns.push(&bin);
+    }
+    Ok(columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_number_keeps_six_digits_and_a_value_that_is_none_is_null() {
+        assert_eq!(json(Cell::Real(0.000_123_456_789)), 0.000_123_457);
+        assert_eq!(json(Cell::Real(1e-300)), 1e-300);
+        assert_eq!(json(Cell::Real(f64::INFINITY)), Value::Null);
+        assert_eq!(json(Cell::Real(f64::NAN)), Value::Null);
+    }
+
+    #[test]
+    fn the_two_ends_of_a_command_and_a_seed_are_that_of_the_job() {
+        let text = "name = \"a\"\n[axes]\nV0 = [1e-5, 2e-5]\nseed = { count = 3 }\n[record]\nslips = 7\n";
+        let sweep = Sweep::parse(text, Path::new("a.toml")).unwrap();
+        for job in sweep.jobs() {
+            let [begin, end] = command(&sweep, &job.parameters);
+            let put_together = format!("{begin} --set seed={} {end}", job.parameters.seed);
+            // The default seed need not be said.
+            assert_eq!(put_together.replace(" --set seed=0", ""), sweep.command(&job));
+        }
+    }
+
+    #[test]
+    fn no_more_sets_are_shown_than_a_page_bears() {
+        for sets in [0, 1, MAX_SETS, MAX_SETS + 1, 1_000_003] {
+            let census = Census { sets, ..Census::default() };
+            assert!(sets.div_ceil(census.spacing()) <= MAX_SETS, "{sets}");
+        }
+    }
+}
