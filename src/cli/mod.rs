@@ -15,7 +15,6 @@ mod run;
 mod signals;
 mod simulate;
 mod status;
-mod threads;
 mod time;
 mod verify;
 

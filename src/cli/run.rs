@@ -1,9 +1,8 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
-use super::exit::Exit;
+use super::exit::{Exit, UsageError};
 use super::planning::Planning;
 use super::progress::Progress;
-use super::threads::{self, Threads};
 use super::{output, reduce, signals, time};
 use anyhow::Result;
 use clap::Args;
@@ -16,6 +15,7 @@ use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
+use stickslip::run::threads::{self, Threads};
 use stickslip::run::{Options, RunReport, Shard};
 use stickslip::sweep::Sweep;
 use stickslip::table::shown::shown;
@@ -94,7 +94,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
-    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))
+        .map_err(|error| UsageError(error.to_string()))?;
     let options = Options {
         threads: threads.count,
         stop,

@@ -1,4 +1,4 @@
-"""Writes docs/validation.md from measured results: ``python -m stickslip_analysis.validation [RESULTS] [--to FILE]``.
+"""Writes docs/validation.md from measured results: ``python -m stickslip.validation [RESULTS] [--to FILE]``.
 
 Run it in the project's folder. Every measured number comes from the tables below RESULTS; scripts/reproduce makes them.
 """
@@ -46,7 +46,7 @@ def document(results: Path) -> str:
             "Written by `scripts/reproduce` from measured results; no measured number here is typed by hand.",
             "Brackets hold 95 % intervals: the jackknife over seeds with Student's t, or the bootstrap over parameter"
             " sets or seeds where a statistic is not smooth"
-            " ([`stickslip_analysis.statistics`](../python/stickslip_analysis/statistics.py)).",
+            " ([`stickslip.statistics`](../python/stickslip/statistics.py)).",
             "Slips of one job are correlated, jobs are not; so seeds and sets are what is left out or drawn again.",
             "Differences between parameter sets are taken seed by seed, as equal seeds have the same contacts.",
             "Where the paper gives no number, the criterion is a choice and stands beside the result.",
@@ -64,7 +64,7 @@ def document(results: Path) -> str:
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m stickslip_analysis.validation", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m stickslip.validation", description=__doc__)
     parser.add_argument(
         "results", nargs="?", type=Path, default=Path("results"), help="folder of all results (%(default)s)"
     )
