@@ -9,7 +9,12 @@ use stickslip::run::threads::ThreadsError;
 use stickslip::simulate::{RequestError, mistakes_in};
 use stickslip::table::file::DatasetError;
 
-create_exception!(stickslip, SweepError, PyValueError, "A sweep, or a key of a simulation, that says nothing that can run.");
+create_exception!(
+    stickslip,
+    SweepError,
+    PyValueError,
+    "A sweep, or a key of a simulation, that says nothing that can run."
+);
 create_exception!(stickslip, ResultsError, PyRuntimeError, "A results directory that cannot be used, read or written.");
 create_exception!(stickslip, SimulationError, PyRuntimeError, "A simulation that cannot continue.");
 

@@ -37,6 +37,8 @@ mod _stickslip {
     #[pymodule_export]
     use super::keys::keys;
     #[pymodule_export]
+    use super::minimum_phase;
+    #[pymodule_export]
     use super::results::{read, reduce, sweep_of};
     #[pymodule_export]
     use super::run::run;
@@ -44,8 +46,6 @@ mod _stickslip {
     use super::simulate::{simulate, sweep_text};
     #[pymodule_export]
     use super::table::Table;
-    #[pymodule_export]
-    use super::minimum_phase;
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

@@ -117,7 +117,8 @@ impl Wanted {
         for name in &names {
             let field = own.field_with_name(name).or_else(|_| jobs.field_with_name(name));
             let field = field.map_err(|_| {
-                let known: Vec<&str> = own.fields().iter().map(|field| field.name()).chain(others()).map(String::as_str).collect();
+                let known: Vec<&str> =
+                    own.fields().iter().map(|field| field.name()).chain(others()).map(String::as_str).collect();
                 PyValueError::new_err(match stickslip::sweep::nearest(name, &known) {
                     Some(near) => format!("{table}: there is no column {name}; did you mean {near}?"),
                     None => format!("{table}: there is no column {name}; there are {}", known.join(", ")),

@@ -45,9 +45,10 @@ impl Progress {
                 self.messages.push(format!("job {job_id} failed: {reason}\n  alone: {command}"));
                 self.advance(predicted_cost);
             }
-            RunEvent::JobTakesLong { command, predicted_cost, wall } => self
-                .messages
-                .push(format!("1 job has run {wall:.1} s, {:.0} times its prediction: {command}", wall / predicted_cost)),
+            RunEvent::JobTakesLong { command, predicted_cost, wall } => self.messages.push(format!(
+                "1 job has run {wall:.1} s, {:.0} times its prediction: {command}",
+                wall / predicted_cost
+            )),
             RunEvent::OthersDone { jobs, predicted_cost } => {
                 (self.others_jobs, self.others_predicted) = (jobs, predicted_cost);
             }
@@ -102,7 +103,9 @@ pub fn run(
             let options = Options { threads, stop, retry_failed, shard: Shard::default(), walltime };
             let (recording, solver) = (*sweep.recording(), sweep.solver());
             stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport, Error> {
-                let kernel = |job: &stickslip::sweep::Job, interrupt: &_| measure(&job.parameters, &recording, solver, interrupt);
+                let kernel = |job: &stickslip::sweep::Job, interrupt: &_| {
+                    measure(&job.parameters, &recording, solver, interrupt)
+                };
                 // That nobody listens any more does not end a run.
                 let report = joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
                 if reduce && report.jobs_left == 0 && !report.stopped && joined.takes_reduction()? {
@@ -121,7 +124,10 @@ pub fn run(
     )?;
     let mut warnings = sweep.warnings();
     if report.jobs_failed > 0 {
-        warnings.push(format!("jobs failed: {}; jobs() has the reasons, retry_failed=True runs them again", report.jobs_failed));
+        warnings.push(format!(
+            "jobs failed: {}; jobs() has the reasons, retry_failed=True runs them again",
+            report.jobs_failed
+        ));
     }
     if report.jobs_left > 0 {
         let why = if report.stopped { "the time was over; the same call resumes" } else { "others run them" };

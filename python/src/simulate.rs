@@ -1,7 +1,7 @@
 //! One job.
 
 use crate::errors::{Error, in_text};
-use crate::keys::{MODEL, RECORD, section};
+use crate::keys::{SOLVER, hint, section};
 use crate::table::Table;
 use crate::watched::watched;
 use pyo3::prelude::*;
@@ -16,16 +16,21 @@ use stickslip::table::columns::{Cell, Row};
 
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
-pub fn sweep_text(keys: Vec<(String, String)>) -> String {
-    let (mut model, mut record, mut solver) = (Vec::new(), BTreeMap::new(), Vec::new());
+pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
+    let (mut model, mut record, mut solver, mut unknown) = (Vec::new(), BTreeMap::new(), Vec::new(), Vec::new());
     for (key, value) in keys {
         match (section(&key), RecordingKey::from_key(&key)) {
             (_, Some(key)) => drop(record.insert(key, value)),
-            (MODEL | RECORD, None) => model.push((key, value)),
-            _ => solver.push((key, value)),
+            (Some(SOLVER), None) => solver.push((key, value)),
+            (Some(_), None) => model.push((key, value)),
+            (None, None) => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),
         }
     }
-    single::sweep_text(&model, &record, &solver)
+    if unknown.is_empty() {
+        Ok(single::sweep_text(&model, &record, &solver))
+    } else {
+        Err(Error::Sweep(unknown.join("\n")).into())
+    }
 }
 
 /// Reads a sweep: a file, or a text that was made of something.

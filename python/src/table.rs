@@ -92,7 +92,8 @@ impl Table {
 
     fn __repr__(&self) -> String {
         let fields = self.schema.fields();
-        let width = |text: fn(&Field) -> &str| fields.iter().map(|field| text(field).chars().count()).max().unwrap_or(0);
+        let width =
+            |text: fn(&Field) -> &str| fields.iter().map(|field| text(field).chars().count()).max().unwrap_or(0);
         let (names, units) = (width(|field| field.name()), width(|field| metadata(field, UNIT)));
         let line = |field: &std::sync::Arc<Field>| {
             let (unit, meaning) = (metadata(field, UNIT), metadata(field, DESCRIPTION));

@@ -10,6 +10,22 @@ import pandas
 import polars
 import pyarrow
 
+__all__ = [
+    "ResultsError",
+    "SimulationError",
+    "SweepError",
+    "Table",
+    "VERSION",
+    "keys",
+    "minimum_phase",
+    "read",
+    "reduce",
+    "run",
+    "simulate",
+    "sweep_of",
+    "sweep_text",
+]
+
 VERSION: str
 
 class SweepError(ValueError): ...
@@ -33,7 +49,7 @@ class Table:
     def to_pandas(self) -> pandas.DataFrame: ...
     def to_polars(self) -> polars.DataFrame: ...
 
-def keys() -> dict[str, tuple[str, str, str, str, Any]]: ...
+def keys() -> dict[str, tuple[str, str, Any]]: ...
 def sweep_text(keys: list[tuple[str, str]]) -> str: ...
 def simulate(
     file: str | PathLike[str] | None,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 LOCKED, OTHERS, AVERAGE, THEORY, BARS = "black", "#8c8c8c", "#1f55c4", "#d62020", "#9db4d6"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
-STYLE = {
+STYLE: Any = {
     "axes.labelsize": 12,
     "axes.linewidth": 0.8,
     "figure.constrained_layout.use": True,
@@ -90,8 +90,7 @@ class Plot:
         axes.errorbar(
             bins["eta_centre"], mean, bars, fmt="o", color=AVERAGE, markersize=5, capsize=2, label="mean of locked sets"
         )
-        eta = _from_one(high)
-        axes.plot(eta, [minimum_phase(one) for one in eta], color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
+        axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
         axes.set(
             xscale="log",
             xlim=(low, high),
@@ -162,10 +161,12 @@ def _scatter(axes: "Axes", points: "pandas.DataFrame", x: str, y: str) -> None:
         axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=2.5, alpha=0.5, markeredgewidth=0, label=label)
 
 
-def _from_one(high: float) -> "numpy.ndarray":
+def _least_phases(high: float) -> "tuple[numpy.ndarray, numpy.ndarray]":
+    """eta from 1, and the least phase (rad) at which slips can begin there."""
     import numpy
 
-    return numpy.geomspace(1, max(high, 1.01), 400)
+    eta = numpy.geomspace(1, max(high, 1.01), 400)
+    return eta, numpy.array([minimum_phase(one) for one in eta], dtype=float)
 
 
 def _in_units_of_pi(axes: "Axes") -> None:

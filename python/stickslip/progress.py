@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 #: Seconds between two plain lines.
 SPACING = 10.0
@@ -36,7 +37,7 @@ def display(progress: bool | Callable[[Progress], object]) -> "_Display":
     if not progress:
         return _Display(None)
     try:
-        from tqdm.auto import tqdm
+        from tqdm import tqdm  # type: ignore[import-untyped]
     except ImportError:
         return _Lines()
     return _Bar(tqdm)
@@ -73,11 +74,12 @@ class _Lines(_Display):
 
 
 class _Bar(_Display):
-    """A bar of tqdm, on a terminal or in a notebook; it counts jobs."""
+    """A bar of tqdm; it counts jobs."""
 
-    def __init__(self, tqdm: Callable) -> None:
+    def __init__(self, tqdm: Callable[..., Any]) -> None:
         super().__init__(self.show)
-        self.tqdm, self.bar = tqdm, None
+        self.tqdm = tqdm
+        self.bar: Any = None
 
     def show(self, progress: Progress) -> None:
         if self.bar is None:

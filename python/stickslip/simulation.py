@@ -78,7 +78,7 @@ def simulate(
     """Simulates one realisation, given by keys or by a sweep with one job; the same bits as `stickslip simulate`.
 
     `trace`, `map`, `profile` and `contacts` record more than slips; `sample` is the time between samples, in s.
-    Ctrl-C ends it. Other threads of Python run meanwhile.
+    Without `slips` it records 20, or with `max_time` alone all until then. Ctrl-C ends it. Other threads of Python run meanwhile.
 
     Raises `SweepError` for a key or a value that cannot be, and `SimulationError` if it cannot continue.
 
@@ -106,15 +106,18 @@ def _describe() -> None:
     signature = inspect.signature(simulate)
     fixed = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
     described, lines = [], ["", "Keys", "----"]
-    for key, (section, unit, meaning, allowed, default) in _KEYS.items():
+    for key, (meaning, allowed, default) in _KEYS.items():
         default = _DEFAULTS.get(key, default)
         described.append(inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default))
-        unit = f" ({unit})" if unit else ""
         default = "" if default is None else f" Default: {default}."
-        about = f"{meaning[0].upper()}{meaning[1:]}{unit}: {allowed}.{default}"
+        about = f"{_sentence(meaning)} {_sentence(allowed)}{default}"
         lines += [key, *textwrap.wrap(about, 112, initial_indent="    ", subsequent_indent="    ")]
     simulate.__signature__ = signature.replace(parameters=[*fixed, *described])  # type: ignore[attr-defined]
     simulate.__doc__ = inspect.cleandoc(simulate.__doc__ or "") + "\n" + "\n".join(lines)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 _describe()

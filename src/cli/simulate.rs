@@ -260,7 +260,11 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
     let solver = match (arguments.solver, &arguments.dt) {
         (Method::EventDriven, None) => {
             let resolve = arguments.resolve.as_ref().map(|word| format!("{word:?}"));
-            vec![("method", Some("\"event-driven\"".to_owned())), ("tolerance", arguments.tolerance.clone()), ("resolve", resolve)]
+            vec![
+                ("method", Some("\"event-driven\"".to_owned())),
+                ("tolerance", arguments.tolerance.clone()),
+                ("resolve", resolve),
+            ]
         }
         (Method::EventDriven, Some(_)) => {
             return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()).into());

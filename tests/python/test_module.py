@@ -89,7 +89,8 @@ def test_a_dict_runs_as_the_file_with_its_text_does(stickslip, tmp_path):
     stickslip("run", tmp_path / "sweep.toml", "--out", tmp_path / "command")
     module.run(tmp_path / "sweep.toml", out=tmp_path / "file", threads=1, progress=False)
     expected = files(tmp_path / "command")
-    assert len(expected) == 3 + 5
+    # Three tables of six parts, one for each job, and the reduced data.
+    assert len(expected) == 3 * 6 + 5
     assert files(tmp_path / "dict") == files(tmp_path / "file") == expected
     again = module.run(tmp_path / "dict", progress=False)
     assert again.directory == tmp_path / "dict" and files(tmp_path / "dict") == expected
@@ -163,7 +164,7 @@ def test_mistakes_have_the_words_of_the_command(program, tmp_path):
     assert str(found.value) == command("simulate", "--set", "V0=-1").replace("in the flags", "in the keys")
     with pytest.raises(module.SweepError, match="in the keys: Vo = 1: unknown key; did you mean V0?"):
         module.simulate(Vo=1)
-    with pytest.raises(module.SweepError, match="slipz = 1: unknown key .*did you mean slips?"):
+    with pytest.raises(module.SweepError, match="slipz = 1: unknown key; did you mean slips?"):
         module.simulate(slipz=1)
     with pytest.raises(module.SweepError, match="in the sweep: name is missing"):
         module.run({"model": {"V0": 1e-5}}, tmp_path / "none")
@@ -291,7 +292,7 @@ def test_simulations_run_in_threads_at_once():
 def test_keys_are_described_where_people_look():
     signature = inspect.signature(module.simulate)
     assert signature.parameters["V0"].default == 1e-4 and signature.parameters["slips"].default == 20
-    assert "V0\n    Drive velocity (m/s): a finite number > 0, in m/s. Default: 0.0001." in module.simulate.__doc__
+    assert "V0\n    Drive velocity. A finite number > 0, in m/s. Default: 0.0001." in module.simulate.__doc__
     assert {"eta", "frequency", "max_time", "tolerance", "dt", "method"} <= set(signature.parameters)
 
 
@@ -323,7 +324,9 @@ def test_the_notebook_runs_and_holds_no_output(tmp_path):
 
 
 def test_the_stubs_are_those_of_the_module(tmp_path):
-    command = [sys.executable, "-m", "mypy.stubtest", "stickslip._stickslip", "--ignore-missing-stub"]
+    # The other libraries are many and large, and their types are not what is compared.
+    (tmp_path / "mypy.ini").write_text("[mypy]\nfollow_imports = skip\nignore_missing_imports = True\n")
+    command = [sys.executable, "-m", "mypy.stubtest", "stickslip._stickslip", "--mypy-config-file", tmp_path / "mypy.ini"]
     environment = {**os.environ, "MYPY_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr

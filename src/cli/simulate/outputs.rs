@@ -89,11 +89,7 @@ pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Ite
 }
 
 /// Draws the plot into each file that was asked for.
-pub(super) fn write_pictures(
-    arguments: &Arguments,
-    parameters: &Parameters,
-    recorded: &Records,
-) -> Result<()> {
+pub(super) fn write_pictures(arguments: &Arguments, parameters: &Parameters, recorded: &Records) -> Result<()> {
     if arguments.plot.is_empty() {
         return Ok(());
     }
