@@ -182,6 +182,11 @@ def test_mistakes_have_the_words_of_the_command(program, tmp_path):
     assert issubclass(module.SweepError, ValueError)
 
 
+def test_a_simulation_records_energies_as_a_sweep_does():
+    slips = module.simulate(N=9, slips=2, energies=True).slips().to_pandas()
+    assert (slips["drive_work"] > 0).all() and slips["break_loss"].notna().all()
+
+
 def test_what_was_not_recorded_is_named(tmp_path):
     with pytest.raises(module.SimulationError, match="give trace=True"):
         module.simulate(N=9, slips=1).trace()
