@@ -11,7 +11,8 @@
 //! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`;
 //! `run`, `reduce` <- `report`.
 //! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
-//! `sweeps`. `accuracy` holds the solvers against each other, from the model to figures. Only the binary's `cli` prints.
+//! `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
+//! to figures. Only the binary's `cli` prints; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -47,6 +48,8 @@ pub mod report;
 pub mod results;
 #[cfg(feature = "sweeps")]
 pub mod run;
+#[cfg(feature = "sweeps")]
+pub mod simulate;
 pub mod solver;
 #[cfg(feature = "sweeps")]
 pub mod sweep;

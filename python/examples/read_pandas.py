@@ -7,25 +7,21 @@ and its locking index, read from the reduced data.
 """
 
 import sys
-from pathlib import Path
 
-import pandas as pd
-
-
-def read_slips(results):
-    """All slips of a sweep; units of the columns are in `.attrs["units"]`."""
-    return pd.read_parquet(Path(results) / "tables" / "slips")
+import stickslip
 
 
 def units(results):
     """Units of the slips table, by column; "" for a pure number or a text."""
-    return read_slips(results).attrs["units"]
+    return stickslip.open(results).slips().to_pandas().attrs["units"]
 
 
 def sets(results):
     """Mean interval in s and locking index by set_id; the index is NaN without modulation."""
-    reduced = pd.read_parquet(Path(results) / "reduced" / "sets.parquet").set_index("set_id")
-    return read_slips(results).groupby("set_id").agg(tau_mean=("interval", "mean")).join(reduced["locking_index"])
+    opened = stickslip.open(results)
+    slips = opened.slips(["set_id", "interval"]).to_pandas()
+    reduced = opened.sets(["set_id", "locking_index"]).to_pandas().set_index("set_id")
+    return slips.groupby("set_id").agg(tau_mean=("interval", "mean")).join(reduced)
 
 
 if __name__ == "__main__":

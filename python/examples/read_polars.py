@@ -3,33 +3,29 @@
     .venv/bin/python python/examples/read_polars.py results/fig3
 
 Prints the columns of the slips table with their units, then the mean interval of every set, computed from the slips,
-and its locking index, read from the reduced data.
+and its locking index, read from the reduced data. The folder `tables/slips` can also be scanned as it is, for tables that do
+not fit into memory.
 """
 
-import json
 import sys
-from pathlib import Path
 
 import polars as pl
 
-
-def slips_folder(results):
-    """The folder of the slips table."""
-    return Path(results) / "tables" / "slips"
+import stickslip
 
 
 def units(results):
-    """Units of the slips table, by column; "" for a pure number or a text. All files have the same."""
-    any_file = next(slips_folder(results).glob("*.parquet"))
-    return json.loads(pl.read_parquet_metadata(any_file)["units"])
+    """Units of the slips table, by column; "" for a pure number or a text."""
+    return stickslip.open(results).slips().units
 
 
 def sets(results):
     """Mean interval in s and locking index by set_id; the index is null without modulation."""
-    reduced = pl.scan_parquet(Path(results) / "reduced" / "sets.parquet").select("set_id", "locking_index")
-    slips = pl.scan_parquet(slips_folder(results))
+    opened = stickslip.open(results)
+    slips = pl.DataFrame(opened.slips(["set_id", "interval"]))
+    reduced = pl.DataFrame(opened.sets(["set_id", "locking_index"]))
     means = slips.group_by("set_id").agg(tau_mean=pl.col("interval").mean())
-    return means.join(reduced, on="set_id").sort("set_id").collect()
+    return means.join(reduced, on="set_id").sort("set_id")
 
 
 if __name__ == "__main__":

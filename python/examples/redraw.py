@@ -8,7 +8,6 @@ for each amplitude, from reduced/sets.parquet.
 """
 
 import sys
-from pathlib import Path
 
 import matplotlib
 
@@ -16,18 +15,15 @@ matplotlib.use("Agg")  # draws into files; needs no screen
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 
-
-def reduced(results, table):
-    """A table of reduced data; units of its columns are in `.attrs["units"]`."""
-    return pd.read_parquet(Path(results) / "reduced" / f"{table}.parquet")
+import stickslip
 
 
 def phase_eta(results):
     """Phases of slips, their means over locked sets, and where Eq. 2 lets slips begin."""
-    points = reduced(results, "points").dropna(subset="phase")
-    bins = reduced(results, "backbone")
+    opened = stickslip.open(results)
+    points = opened.points().to_pandas().dropna(subset="phase")
+    bins = opened.backbone().to_pandas()
     figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
     for locked, colour in ((False, "0.6"), (True, "black")):
         slips = points[points["locked"] == locked]
@@ -44,7 +40,7 @@ def phase_eta(results):
 
 def staircase(results):
     """Median interval in periods with its quartiles, and the locking index, against the period."""
-    sets = reduced(results, "sets").dropna(subset=["T", "tau_50"])
+    sets = stickslip.open(results).sets().to_pandas().dropna(subset=["T", "tau_50"])
     figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6, 6), height_ratios=[2, 1], layout="constrained")
     for amplitude, group in sets.sort_values("T").groupby("Delta"):
         quartiles = group[["tau_25", "tau_50", "tau_75"]].div(group["T"], axis=0)

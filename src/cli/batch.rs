@@ -4,13 +4,14 @@
 
 use super::exit::{Exit, UsageError};
 use super::output::{self, quoted};
-use super::{threads, time};
+use super::time;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf, absolute};
 use std::time::Duration;
 use stickslip::results::layout::Layout;
+use stickslip::run::threads;
 use stickslip::sweep::Sweep;
 use stickslip::table::shown::shown;
 

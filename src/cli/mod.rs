@@ -21,7 +21,6 @@ mod signals;
 mod simulate;
 mod status;
 mod sweep;
-mod threads;
 mod time;
 mod verify;
 

@@ -1,11 +1,10 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
-use super::exit::Exit;
+use super::exit::{Exit, UsageError};
 use super::planning::Planning;
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
-use super::threads::{self, Threads};
 use super::{output, plot, reduce, signals, time};
 use anyhow::Result;
 use clap::Args;
@@ -18,6 +17,7 @@ use stickslip::observe::measure;
 use stickslip::reduce::ReduceError;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
+use stickslip::run::threads::{self, Threads};
 use stickslip::run::{Options, RunReport, Shard};
 use stickslip::table::shown::shown;
 use stickslip::table::storage::Disk;
@@ -102,7 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
-    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))
+        .map_err(|error| UsageError(error.to_string()))?;
     let options = Options {
         threads: threads.count,
         stop,

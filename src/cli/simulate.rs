@@ -5,7 +5,7 @@
 
 mod outputs;
 
-use self::outputs::{Records, check_outputs, write_pictures, write_records, write_table};
+use self::outputs::{check_outputs, write_pictures, write_records, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
 use anyhow::Result;
@@ -13,18 +13,15 @@ use clap::{Arg, ArgGroup, ArgMatches, Args, FromArgMatches, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use stickslip::model::{Description, Parameters, Symbol, Value};
-use stickslip::observe::{
-    AttachedMap, ContactLog, Measurements, Observers, Profile, Recording, RecordingKey, Regime, SlipObserver, Trace,
-};
+use stickslip::observe::{Measurements, Recording, RecordingKey, Regime};
 use stickslip::results::tables;
 use stickslip::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
-use stickslip::solver::{self, Observer};
-use stickslip::sweep::{Job, Mistake, Sweep, SweepError};
+use stickslip::simulate::{self as single, Request};
+use stickslip::sweep::{Sweep, SweepError};
 use stickslip::table::file::Footer;
 
 /// Simulate one realisation and show what it does
@@ -87,6 +84,16 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    fn request(&self) -> Request {
+        Request {
+            sample: self.sample,
+            trace: self.trace.is_some() || self.draws(Panel::Force),
+            map: self.map.is_some() || self.draws(Panel::Map),
+            profile: self.profile.is_some(),
+            contacts: self.contacts.is_some(),
+        }
+    }
+
     /// Whether there is a plot with this panel.
     fn draws(&self, panel: Panel) -> bool {
         !self.plot.is_empty() && (self.panel == panel || self.panel == Panel::Both)
@@ -211,101 +218,53 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
         Some(path) => Sweep::from_file(path)?,
         None => Sweep::parse(&as_sweep(arguments)?, Path::new("flags")).map_err(as_flags)?,
     };
-    let job = only_job(&sweep)?;
+    let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
     check_outputs(arguments, &sweep, parameters)?;
-
-    let mut slips = SlipObserver::new(parameters, sweep.recording());
-    let mut trace = Trace::new(parameters, arguments.sample);
-    let mut map = AttachedMap::new(parameters, arguments.sample);
-    let mut profile = Profile::new(parameters);
-    let mut log = ContactLog::default();
-    let mut others: Vec<&mut dyn Observer> = Vec::new();
-    if arguments.trace.is_some() || arguments.draws(Panel::Force) {
-        others.push(&mut trace);
-    }
-    if arguments.map.is_some() || arguments.draws(Panel::Map) {
-        others.push(&mut map);
-    }
-    if arguments.profile.is_some() {
-        others.push(&mut profile);
-    }
-    if arguments.contacts.is_some() {
-        others.push(&mut log);
-    }
     output::warn(&sweep.warnings());
-    let never = AtomicBool::new(false);
     let begin = Instant::now();
-    let mut observer = Observers { lead: &mut slips, others };
-    let summary = solver::simulate(parameters, sweep.solver(), sweep.recording().limits(&never), &mut observer)?;
+    let never = AtomicBool::new(false);
+    let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
     let wall = begin.elapsed().as_secs_f64();
-    let result = Measurements::new(slips, summary);
 
     let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
-    let recorded = Records { trace: &trace.rows, map: &map.rows, profile: &profile.rows, events: &log.events };
-    write_records(arguments, &footer, recorded)?;
+    write_records(arguments, &footer, &recorded)?;
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
     if let Some(path) = &arguments.slip_table {
         let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
         write_table(path, &footer, rows)?;
     }
-    write_pictures(arguments, parameters, &trace.rows, &map.rows, &result.slips)?;
+    write_pictures(arguments, parameters, &recorded, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)
 }
 
-fn only_job(sweep: &Sweep) -> Result<Job> {
-    let mut jobs = sweep.jobs();
-    match (jobs.next(), jobs.count()) {
-        (Some(job), 0) => Ok(job),
-        (_, others) => {
-            let (name, count) = (sweep.name(), others + 1);
-            let problem = format!(
-                "sweep {name}: has {count} jobs, and one can be simulated; give each axis one value, or use `stickslip run`"
-            );
-            Err(UsageError(problem).into())
-        }
-    }
-}
-
 /// The flags as the text of a sweep with one point.
 fn as_sweep(arguments: &Arguments) -> Result<String> {
-    let mut model = String::new();
-    let mut keys = Vec::new();
+    let mut model = single::Written::new();
     for setting in &arguments.settings {
         let (key, value) = setting
             .split_once('=')
             .ok_or_else(|| UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")))?;
         let (key, value) = (key.trim(), value.trim());
-        if keys.contains(&key) {
+        if model.iter().any(|(earlier, _)| earlier == key) {
             return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")).into());
         }
-        keys.push(key);
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return Err(UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")).into());
         }
         // A word such as tension needs quotes in a sweep file.
         let written = number(value).unwrap_or_else(|_| format!("{value:?}"));
-        writeln!(model, "{key} = {written}")?;
-    }
-    let mut record = String::new();
-    for key in RecordingKey::ALL {
-        let given = |key| arguments.recording.0.get(&key).map(String::as_str);
-        let text = match (key, given(key)) {
-            (_, Some(text)) => text,
-            // With a time alone, slips do not end the run.
-            (RecordingKey::Slips, None) if given(RecordingKey::MaxTime).is_some() => "10000000",
-            (RecordingKey::Slips, None) => "20",
-            (RecordingKey::Discard, None) => "5",
-            _ => continue,
-        };
-        writeln!(record, "{} = {text}", key.key())?;
+        model.push((key.to_owned(), written));
     }
     let solver = match (arguments.solver, &arguments.dt) {
         (Method::EventDriven, None) => {
-            let tolerance = arguments.tolerance.iter().map(|tolerance| format!("tolerance = {tolerance}\n"));
-            let resolve = arguments.resolve.iter().map(|word| format!("resolve = {word:?}\n"));
-            format!("method = \"event-driven\"\n{}", tolerance.chain(resolve).collect::<String>())
+            let resolve = arguments.resolve.as_ref().map(|word| format!("{word:?}"));
+            vec![
+                ("method", Some("\"event-driven\"".to_owned())),
+                ("tolerance", arguments.tolerance.clone()),
+                ("resolve", resolve),
+            ]
         }
         (Method::EventDriven, Some(_)) => {
             return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()).into());
@@ -317,25 +276,18 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
             return Err(UsageError("--resolve: goes with --solver event-driven".to_owned()).into());
         }
         (Method::FixedStep, dt) => {
-            format!("method = \"fixed-step\"\ndt = {}\n", dt.as_deref().unwrap_or("1e-6"))
+            let step = dt.as_deref().unwrap_or("1e-6").to_owned();
+            vec![("method", Some("\"fixed-step\"".to_owned())), ("dt", Some(step))]
         }
     };
-    Ok(format!("name = \"simulate\"\n[model]\n{model}[record]\n{record}[solver]\n{solver}"))
+    let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
+    Ok(single::sweep_text(&model, &arguments.recording.0, &solver))
 }
 
 /// A message about the sweep text, as one about the flags.
 fn as_flags(error: SweepError) -> anyhow::Error {
     match error {
-        SweepError::Invalid { mistakes, .. } => {
-            // Flags have neither sections nor lines.
-            let problems = mistakes.iter().map(|Mistake { problem, .. }| {
-                let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));
-                let end = end.split_once(')').map_or("", |(_, rest)| rest);
-                format!("{start}{end}").replace(" in [model]", "")
-            });
-            let between = if mistakes.len() > 1 { "\n  " } else { " " };
-            UsageError(format!("in the flags:{between}{}", problems.collect::<Vec<_>>().join(between))).into()
-        }
+        SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     }
 }

@@ -1,7 +1,7 @@
 //! Records on request: traces, space-time maps and the contact log of one job. A sweep holds none of these.
 
 use crate::model::{Change, ContactEvent, Drive, Parameters};
-use crate::solver::{Observer, Segment};
+use crate::solver::{Observer, Segment, Spent};
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
 /// Several observers of one run; the first decides when it has seen enough.
@@ -21,6 +21,11 @@ impl Observer for Observers<'_> {
     fn contact(&mut self, event: &ContactEvent) {
         self.lead.contact(event);
         self.others.iter_mut().for_each(|other| other.contact(event));
+    }
+
+    fn spent(&mut self, spent: Spent) {
+        self.lead.spent(spent);
+        self.others.iter_mut().for_each(|other| other.spent(spent));
     }
 
     fn follows_attachments(&self) -> bool {

@@ -18,6 +18,7 @@ mod share;
 mod status;
 #[cfg(test)]
 mod tests;
+pub mod threads;
 mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};

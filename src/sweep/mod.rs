@@ -33,6 +33,5 @@ pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use schema::schema;
-pub(crate) use source::nearest;
-pub use source::{Mistake, SweepError};
+pub use source::{Mistake, SweepError, nearest};
 pub use walked::walked;

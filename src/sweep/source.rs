@@ -283,7 +283,8 @@ pub(super) fn hint(word: &str, known: &[&str]) -> String {
 }
 
 /// The known word that was probably meant by an unknown one.
-pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
+#[must_use]
+pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.
     let max = (word.chars().count() / 2).min(2);

@@ -297,6 +297,11 @@ impl<'a> Dataset<'a> {
         self.read(R::columns().into_iter().map(|column| column.name).collect()).map(|batch| batch?.rows_of())
     }
 
+    /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.
+    pub fn columns(self, names: &[String]) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
+        self.read(names.iter().cloned().map(Cow::Owned).collect())
+    }
+
     fn read(self, columns: Vec<Cow<'static, str>>) -> Reader<'a> {
         Reader { storage: self.storage, files: self.files.into_iter(), columns, current: None }
     }

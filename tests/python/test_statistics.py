@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from stickslip_analysis import statistics
-from stickslip_analysis.compare_sets import compare
-from stickslip_analysis.tables import Sweep
+from stickslip import statistics
+from stickslip.compare_sets import compare
+from stickslip.tables import Sweep
 
 
 def slips(generator, effect, seeds=12, each=20):

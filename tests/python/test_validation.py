@@ -9,8 +9,8 @@ import pandas
 import pytest
 from conftest import ROOT
 
-from stickslip_analysis import statistics
-from stickslip_analysis.validation import beyond, document, friction, intervals, kinematics, phase
+from stickslip import statistics
+from stickslip.validation import beyond, document, friction, intervals, kinematics, phase
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_stretches_of_periods_leave_out_the_gaps(holds, expected):
 
 
 def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
-    command = [sys.executable, "-m", "stickslip_analysis.validation", tmp_path, "--to", tmp_path / "validation.md"]
+    command = [sys.executable, "-m", "stickslip.validation", tmp_path, "--to", tmp_path / "validation.md"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2
     assert "sweeps/fig2.toml" in done.stderr

@@ -7,28 +7,22 @@ use super::{Arguments, Panel};
 use anyhow::{Result, anyhow};
 use std::path::Path;
 use stickslip::figure::{self, Look, Picture, Simulation};
-use stickslip::model::theory::typical_interval;
-use stickslip::model::{ContactEvent, Parameters};
-use stickslip::observe::{ContactRow, MapRow, ProfileRow, Slip, TraceRow};
+use stickslip::model::Parameters;
+use stickslip::observe::{ContactRow, Slip};
+use stickslip::simulate::Records;
 use stickslip::sweep::Sweep;
 use stickslip::table::columns::Table;
 use stickslip::table::file::{Footer, TableWriter};
 use stickslip::table::shown::shown;
 use stickslip::table::storage::{Disk, Storage};
 
-/// More samples than this, of 24 bytes each, are a mistake.
-const MAX_SAMPLES: f64 = 1e8;
-
 /// Refuses what could not be written, before anything runs.
 pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
-    let sample = arguments.sample;
-    if !(sample > 0.0 && sample.is_finite()) {
-        return Err(UsageError(format!("--sample {sample}: must be a finite number > 0, in s")).into());
-    }
+    let recording = sweep.recording();
+    arguments.request().check(parameters, recording).map_err(|error| UsageError(format!("--{error}")))?;
     if !(arguments.from >= 0.0 && arguments.from.is_finite()) {
         return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.from)).into());
     }
-    let recording = sweep.recording();
     let longest = recording.max_time.unwrap_or(f64::INFINITY);
     if arguments.from >= longest {
         let problem = format!("--from {}: must lie before the end, {longest} s", arguments.from);
@@ -36,16 +30,6 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     }
     if let Some(until) = arguments.until.filter(|until| !(*until > arguments.from && until.is_finite())) {
         let problem = format!("--until {until}: must be a finite number > {}, the first instant, in s", arguments.from);
-        return Err(UsageError(problem).into());
-    }
-    let maps = arguments.map.is_some() || arguments.draws(Panel::Map);
-    let traces = arguments.trace.is_some() || arguments.draws(Panel::Force);
-    let cells = if maps { parameters.blocks } else { usize::from(traces) };
-    let slips = recording.slips as f64 + recording.discard as f64;
-    let time = (slips * typical_interval(parameters)).min(longest);
-    if time / sample * cells as f64 > MAX_SAMPLES {
-        let problem =
-            format!("--sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one");
         return Err(UsageError(problem).into());
     }
     for path in &arguments.plot {
@@ -77,16 +61,7 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     Ok(())
 }
 
-/// What the observers of a simulation recorded; empty where nothing asked for it.
-#[derive(Clone, Copy)]
-pub(super) struct Records<'a> {
-    pub trace: &'a [TraceRow],
-    pub map: &'a [MapRow],
-    pub profile: &'a [ProfileRow],
-    pub events: &'a [ContactEvent],
-}
-
-pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: Records<'_>) -> Result<()> {
+pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: &Records) -> Result<()> {
     if let Some(path) = &arguments.trace {
         write_table(path, footer, recorded.trace.iter().copied())?;
     }
@@ -97,7 +72,7 @@ pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: Re
         write_table(path, footer, recorded.profile.iter().copied())?;
     }
     if let Some(path) = &arguments.contacts {
-        write_table(path, footer, recorded.events.iter().map(ContactRow::from))?;
+        write_table(path, footer, recorded.contacts.iter().map(ContactRow::from))?;
     }
     Ok(())
 }
@@ -118,13 +93,13 @@ pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Ite
 pub(super) fn write_pictures(
     arguments: &Arguments,
     parameters: &Parameters,
-    trace: &[TraceRow],
-    map: &[MapRow],
+    recorded: &Records,
     slips: &[Slip],
 ) -> Result<()> {
     if arguments.plot.is_empty() {
         return Ok(());
     }
+    let Records { trace, map, .. } = recorded;
     let last = trace.last().map(|row| row.time).or(map.last().map(|row| row.time)).unwrap_or(0.0);
     if arguments.from >= last {
         let from = arguments.from;
@@ -132,7 +107,7 @@ pub(super) fn write_pictures(
             format!("--from {from}: the simulation ended at {last} s; take an earlier instant, or a longer --time");
         return Err(UsageError(problem).into());
     }
-    let picture = draw(arguments, parameters, trace, map, slips)?;
+    let picture = draw(arguments, parameters, recorded, slips)?;
     for path in &arguments.plot {
         let bytes = picture.encoded(format_of(path)?)?;
         replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))?;
@@ -140,13 +115,8 @@ pub(super) fn write_pictures(
     Ok(())
 }
 
-fn draw(
-    arguments: &Arguments,
-    parameters: &Parameters,
-    trace: &[TraceRow],
-    map: &[MapRow],
-    slips: &[Slip],
-) -> Result<Picture> {
+fn draw(arguments: &Arguments, parameters: &Parameters, recorded: &Records, slips: &[Slip]) -> Result<Picture> {
+    let Records { trace, map, .. } = recorded;
     // The sample at an end is shown, however its time is rounded.
     let slack = 1e-6 * arguments.sample;
     let shown = arguments.from - slack..=arguments.until.unwrap_or(f64::INFINITY) + slack;

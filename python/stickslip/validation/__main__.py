@@ -1,4 +1,4 @@
-"""Writes docs/validation.md from measured results: ``python -m stickslip_analysis.validation [RESULTS] [--to FILE]``.
+"""Writes docs/validation.md from measured results: ``python -m stickslip.validation [RESULTS] [--to FILE]``.
 
 Run it in the project's folder. Every measured number comes from the tables below RESULTS; scripts/reproduce makes them.
 """
@@ -45,7 +45,7 @@ def document(results: Path) -> str:
         paragraph(
             "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
-            " is not smooth ([`statistics.py`](../python/stickslip_analysis/statistics.py)).",
+            " is not smooth ([`statistics.py`](../python/stickslip/statistics.py)).",
             "Differences between sets are taken seed by seed, since equal seeds have the same contacts.",
             "Where the paper gives no number, the criterion is a choice.",
             "*Random loads* are slips that come at a random load among those that exceed all before: without any locking"
@@ -62,7 +62,7 @@ def document(results: Path) -> str:
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m stickslip_analysis.validation", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m stickslip.validation", description=__doc__)
     parser.add_argument(
         "results", nargs="?", type=Path, default=Path("results"), help="folder of all results (%(default)s)"
     )

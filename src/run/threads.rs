@@ -1,13 +1,22 @@
-//! The number of threads: by the flag, by what a batch system grants, or all cores.
+//! The number of threads: as asked for, by what a batch system grants, or all cores.
 
-use super::exit::UsageError;
+use crate::table::shown::shown;
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
-use stickslip::table::shown::shown;
 
 /// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
 /// `HQ_CPUS` is not among them: it lists the cores by their ids.
 const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
+
+/// A variable that holds no number of threads.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{variable}={value}: must be a whole number >= 1; unset it, or give --threads")]
+pub struct ThreadsError {
+    /// The variable.
+    pub variable: &'static str,
+    /// What it holds, as it can be shown.
+    pub value: String,
+}
 
 /// How many threads, and who said so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,26 +28,29 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Those of the flag, else of the first variable that is set, else all cores.
+    /// Those that are asked for, else those of the first variable that is set, else all cores.
+    ///
+    /// # Errors
+    /// When that variable holds no whole number >= 1.
     pub fn choose(
-        flag: Option<NonZeroUsize>,
+        asked: Option<NonZeroUsize>,
         environment: impl Fn(&str) -> Option<OsString>,
-    ) -> Result<Self, UsageError> {
+    ) -> Result<Self, ThreadsError> {
         let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
-        let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| flag.is_none()) else {
-            return Ok(Self { count: flag, variable: None });
+        let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| asked.is_none()) else {
+            return Ok(Self { count: asked, variable: None });
         };
         // OpenMP's may be a list, of one number for each level of nesting.
         let count = value.to_str().and_then(|value| value.split(',').next()?.trim().parse().ok());
-        let count = count.ok_or_else(|| {
-            let value = shown(value.as_ref());
-            UsageError(format!("{variable}={value}: must be a whole number >= 1; unset it, or give --threads"))
-        })?;
+        let count = count.ok_or_else(|| ThreadsError { variable, value: shown(value.as_ref()).to_string() })?;
         Ok(Self { count: Some(count), variable: Some(variable) })
     }
 }
 
-/// The value of `--threads`.
+/// A number of threads, as a flag has it.
+///
+/// # Errors
+/// What is allowed.
 pub fn parse(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number >= 1")
 }
@@ -47,9 +59,9 @@ pub fn parse(text: &str) -> Result<NonZeroUsize, &'static str> {
 mod tests {
     use super::*;
 
-    fn choose(flag: Option<usize>, environment: &[(&str, &str)]) -> Result<Threads, UsageError> {
+    fn choose(asked: Option<usize>, environment: &[(&str, &str)]) -> Result<Threads, ThreadsError> {
         let value = |name: &str| environment.iter().find(|(key, _)| *key == name).map(|(_, value)| value.into());
-        Threads::choose(flag.map(|count| NonZeroUsize::new(count).unwrap()), value)
+        Threads::choose(asked.map(|count| NonZeroUsize::new(count).unwrap()), value)
     }
 
     fn threads(count: usize, variable: Option<&'static str>) -> Threads {
@@ -57,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flag_comes_before_the_environment_and_that_before_all_cores() {
+    fn what_is_asked_for_comes_before_the_environment_and_that_before_all_cores() {
         let slurm = ("SLURM_CPUS_PER_TASK", "16");
         let openmp = ("OMP_NUM_THREADS", "4,2");
         assert_eq!(choose(Some(3), &[slurm]).unwrap(), threads(3, None));

@@ -165,7 +165,7 @@ class ContactLog:
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """The command line of a module of the package, with the log and an option for each parameter."""
     parser = argparse.ArgumentParser(
-        prog=f"python -m stickslip_analysis.{module}",
+        prog=f"python -m stickslip.{module}",
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

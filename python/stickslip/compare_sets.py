@@ -1,6 +1,6 @@
 """Compares two parameter sets of a sweep seed by seed.
 
-    .venv/bin/python -m stickslip_analysis.compare_sets results/fig2 SET_ID SET_ID
+    .venv/bin/python -m stickslip.compare_sets results/fig2 SET_ID SET_ID
 
 A seed gives the same disorder in every set, so its effect drops out of the difference of two sets, and what is left
 shows smaller effects than two separate intervals. Prints the differences, first set minus second, of the mean interval
@@ -29,7 +29,7 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m stickslip_analysis.compare_sets",
+        prog="python -m stickslip.compare_sets",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

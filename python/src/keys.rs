@@ -1,0 +1,69 @@
+//! What can be set: the keys of a sweep file, from the descriptions that the library has of them.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use stickslip::model::{Parameters, Symbol, Value};
+use stickslip::observe::{Recording, RecordingKey};
+
+/// Sections of a sweep file.
+const MODEL: &str = "model";
+const RECORD: &str = "record";
+pub const SOLVER: &str = "solver";
+
+/// Keys that stand for others, and those of the solver: section, key, meaning, what is allowed.
+const OTHERS: [(&str, &str, &str, &str); 6] = [
+    (MODEL, "eta", "2 pi Delta / (T V0), in place of T", "a number > 0"),
+    (MODEL, "frequency", "1/T, in place of T", "a number > 0, in Hz"),
+    (SOLVER, "method", "solver", "\"event-driven\" or \"fixed-step\""),
+    (SOLVER, "tolerance", "tolerance of the event-driven solver, relative to fs/k", "a number"),
+    (SOLVER, "resolve", "how the event-driven solver resolves motion", "\"auto\", \"grid\" or \"taylor\""),
+    (SOLVER, "dt", "step of the fixed-step solver", "a number > 0, in s"),
+];
+
+/// Every key, with its section.
+fn sections() -> impl Iterator<Item = (&'static str, &'static str)> {
+    (Symbol::ALL.into_iter().map(|symbol| (symbol.key(), MODEL)))
+        .chain(RecordingKey::ALL.into_iter().map(|record| (record.key(), RECORD)))
+        .chain(OTHERS.map(|(section, other, ..)| (other, section)))
+}
+
+/// The section of a key.
+pub fn section(key: &str) -> Option<&'static str> {
+    sections().find(|(known, _)| *known == key).map(|(_, section)| section)
+}
+
+/// What was probably meant by an unknown key.
+pub fn hint(key: &str) -> String {
+    let known: Vec<&str> = sections().map(|(key, _)| key).collect();
+    match stickslip::sweep::nearest(key, &known) {
+        Some(near) => format!("did you mean {near}?"),
+        None => format!("allowed are {}", known.join(", ")),
+    }
+}
+
+/// Every key of a simulation: its meaning, what is allowed, and its default (`None`: not set).
+#[pyfunction]
+pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let keys = PyDict::new(py);
+    let (parameters, recording) = (Parameters::default(), Recording::default());
+    let model = Symbol::ALL.map(|symbol| (symbol.description(), parameters.get(symbol)));
+    let record = RecordingKey::ALL.map(|key| (key.description(), recording.get(key)));
+    for (field, default) in model.into_iter().chain(record) {
+        keys.set_item(field.key, (field.meaning, field.requirement(), object(py, default)?))?;
+    }
+    for (_, key, meaning, allowed) in OTHERS {
+        keys.set_item(key, (meaning, allowed, py.None()))?;
+    }
+    Ok(keys)
+}
+
+/// A value as Python has it.
+fn object(py: Python<'_>, value: Value) -> PyResult<Bound<'_, PyAny>> {
+    match value {
+        Value::Count(count) => Ok(count.into_pyobject(py)?.into_any()),
+        Value::Real(real) => Ok(real.into_pyobject(py)?.into_any()),
+        Value::Flag(flag) => Ok(flag.into_pyobject(py)?.to_owned().into_any()),
+        Value::BreakOn(rule) => Ok(rule.word().into_pyobject(py)?.into_any()),
+        Value::Absent => Ok(py.None().into_bound(py)),
+    }
+}

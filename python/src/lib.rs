@@ -1,0 +1,51 @@
+//! The module `stickslip._stickslip`: what the Python package `stickslip` takes from the library.
+//!
+//! ```text
+//! keys.rs       what can be set, from the descriptions of the library
+//! simulate.rs   one job -> tables
+//! run.rs        a sweep -> a results directory, with progress
+//! results.rs    a results directory -> tables
+//! table.rs      Arrow tables, handed on through the C interface of Arrow
+//! watched.rs    work without the interpreter's lock that obeys Ctrl-C
+//! errors.rs     errors as exceptions
+//! ```
+//!
+//! Words, defaults and plots are Python's, in `python/stickslip`. Contract: nothing here panics, or crashes the interpreter.
+
+#![expect(clippy::needless_pass_by_value, reason = "arguments come from Python by value")]
+
+mod errors;
+mod keys;
+mod results;
+mod run;
+mod simulate;
+mod table;
+mod watched;
+
+use pyo3::prelude::*;
+
+/// Least phase at which slips can begin at some eta, in rad (Eq. 2); `None` for eta < 1.
+#[pyfunction]
+fn minimum_phase(eta: f64) -> Option<f64> {
+    stickslip::model::theory::minimum_phase(eta)
+}
+
+#[pymodule]
+mod _stickslip {
+    #[pymodule_export]
+    use super::errors::{ResultsError, SimulationError, SweepError};
+    #[pymodule_export]
+    use super::keys::keys;
+    #[pymodule_export]
+    use super::minimum_phase;
+    #[pymodule_export]
+    use super::results::{read, reduce, sweep_of};
+    #[pymodule_export]
+    use super::run::run;
+    #[pymodule_export]
+    use super::simulate::{simulate, sweep_text};
+    #[pymodule_export]
+    use super::table::Table;
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+}

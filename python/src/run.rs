@@ -1,0 +1,137 @@
+//! A sweep, run into a results directory.
+
+use crate::errors::Error;
+use crate::simulate::read_sweep;
+use crate::watched::watched;
+use pyo3::prelude::*;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Duration;
+use stickslip::figure::draw_all;
+use stickslip::observe::measure;
+use stickslip::results::Results;
+use stickslip::results::layout::Layout;
+use stickslip::run::threads::Threads;
+use stickslip::run::{Options, RunEvent, RunReport, Shard};
+use stickslip::table::storage::Disk;
+
+/// What a run has come to, as a callback is shown it.
+#[derive(Default)]
+struct Progress {
+    jobs: u64,
+    jobs_done: u64,
+    predicted: f64,
+    predicted_done: f64,
+    others_jobs: u64,
+    others_predicted: f64,
+    messages: Vec<String>,
+    has_news: bool,
+}
+
+impl Progress {
+    fn note(&mut self, event: RunEvent) {
+        self.has_news = true;
+        match event {
+            RunEvent::Started { jobs, predicted_cost, jobs_there, threads, .. } => {
+                (self.jobs, self.predicted) = (jobs, predicted_cost);
+                self.messages.push(format!(
+                    "{jobs} jobs to run, {jobs_there} there already; about {:.1} s on {threads} threads",
+                    predicted_cost / threads as f64
+                ));
+            }
+            RunEvent::JobDone { predicted_cost, .. } => self.advance(predicted_cost),
+            RunEvent::JobFailed { job_id, reason, command, predicted_cost } => {
+                self.messages.push(format!("job {job_id} failed: {reason}\n  alone: {command}"));
+                self.advance(predicted_cost);
+            }
+            RunEvent::JobTakesLong { command, predicted_cost, wall } => self.messages.push(format!(
+                "1 job has run {wall:.1} s, {:.0} times its prediction: {command}",
+                wall / predicted_cost
+            )),
+            RunEvent::OthersDone { jobs, predicted_cost } => {
+                (self.others_jobs, self.others_predicted) = (jobs, predicted_cost);
+            }
+            _ => {}
+        }
+    }
+
+    fn advance(&mut self, predicted_cost: f64) {
+        self.jobs_done += 1;
+        self.predicted_done += predicted_cost;
+    }
+
+    /// Calls back with jobs done, all jobs, the share of the work that is done, and messages; if there is anything new.
+    fn show(&mut self, py: Python<'_>, callback: &Py<PyAny>) -> PyResult<()> {
+        if !std::mem::take(&mut self.has_news) || callback.is_none(py) {
+            return Ok(());
+        }
+        let done = self.predicted_done + self.others_predicted;
+        let share = if self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 };
+        let messages = std::mem::take(&mut self.messages);
+        callback.call1(py, (self.jobs_done + self.others_jobs, self.jobs, share, messages)).map(drop)
+    }
+}
+
+/// Runs or resumes a sweep file, or the text of one. Returns the results directory, and warnings.
+#[pyfunction]
+#[pyo3(signature = (file, text, out, threads, retry_failed, walltime, reduce, callback))]
+#[expect(clippy::too_many_arguments, reason = "called by keyword-only Python code")]
+pub fn run(
+    py: Python<'_>,
+    file: Option<PathBuf>,
+    text: &str,
+    out: Option<PathBuf>,
+    threads: Option<NonZeroUsize>,
+    retry_failed: bool,
+    walltime: Option<Duration>,
+    reduce: bool,
+    callback: Py<PyAny>,
+) -> PyResult<(PathBuf, Vec<String>)> {
+    let resumed = file.as_deref().filter(|file| file.is_dir());
+    let sweep = match resumed {
+        Some(directory) => Results::read(&Layout::new(&Disk, directory)).map_err(Error::from)?.sweep().clone(),
+        None => read_sweep(file.as_deref(), text, "sweep")?,
+    };
+    let root = out.or(resumed.map(ToOwned::to_owned)).unwrap_or_else(|| Layout::default_root(&sweep));
+    let threads = Threads::choose(threads, |variable| std::env::var_os(variable)).map_err(Error::from)?.count;
+    let progress = Mutex::new(Progress::default());
+    let report = watched(
+        py,
+        |stop, events| {
+            let layout = Layout::new(&Disk, &root);
+            let options = Options { threads, stop, retry_failed, shard: Shard::default(), walltime };
+            let (recording, solver) = (*sweep.recording(), sweep.solver());
+            stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport, Error> {
+                let kernel = |job: &stickslip::sweep::Job, interrupt: &_| {
+                    measure(&job.parameters, &recording, solver, interrupt)
+                };
+                // That nobody listens any more does not end a run.
+                let report = joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
+                if reduce && report.jobs_left == 0 && !report.stopped && joined.takes_reduction()? {
+                    stickslip::reduce::reduce(&Results::read(&layout)?)?;
+                    draw_all(&layout)?;
+                }
+                Ok(report)
+            })
+        },
+        |event| {
+            if let Ok(mut progress) = progress.lock() {
+                progress.note(event);
+            }
+        },
+        |py| progress.lock().map_or(Ok(()), |mut progress| progress.show(py, &callback)),
+    )?;
+    let mut warnings = sweep.warnings();
+    if report.jobs_failed > 0 {
+        warnings.push(format!(
+            "jobs failed: {}; jobs() has the reasons, retry_failed=True runs them again",
+            report.jobs_failed
+        ));
+    }
+    if report.jobs_left > 0 {
+        let why = if report.stopped { "the time was over; the same call resumes" } else { "others run them" };
+        warnings.push(format!("jobs left: {}; {why}", report.jobs_left));
+    }
+    Ok((root, warnings))
+}

@@ -1,0 +1,116 @@
+//! One job.
+
+use crate::errors::{Error, in_text};
+use crate::keys::{SOLVER, hint, section};
+use crate::table::Table;
+use crate::watched::watched;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stickslip::observe::{ContactRow, RecordingKey};
+use stickslip::results::tables::{All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel};
+use stickslip::simulate::{self as single, Records, Request, only_job};
+use stickslip::sweep::Sweep;
+use stickslip::table::columns::{Cell, Row};
+
+/// The text of a sweep with one job, from keys and their values as TOML.
+#[pyfunction]
+pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
+    let (mut model, mut record, mut solver, mut unknown) = (Vec::new(), BTreeMap::new(), Vec::new(), Vec::new());
+    for (key, value) in keys {
+        match (section(&key), RecordingKey::from_key(&key)) {
+            (_, Some(key)) => drop(record.insert(key, value)),
+            (Some(SOLVER), None) => solver.push((key, value)),
+            (Some(_), None) => model.push((key, value)),
+            (None, None) => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),
+        }
+    }
+    if unknown.is_empty() {
+        Ok(single::sweep_text(&model, &record, &solver))
+    } else {
+        Err(Error::Sweep(unknown.join("\n")).into())
+    }
+}
+
+/// Reads a sweep: a file, or a text that was made of something.
+pub fn read_sweep(file: Option<&Path>, text: &str, source: &str) -> Result<Sweep, Error> {
+    match file {
+        Some(file) => Ok(Sweep::from_file(file)?),
+        None => Sweep::parse(text, Path::new(source)).map_err(|error| in_text(error, source)),
+    }
+}
+
+/// A row of the jobs table, the text of the sweep, warnings, and tables by name.
+type Simulated<'py> = (Bound<'py, PyDict>, String, Vec<String>, BTreeMap<&'static str, Table>);
+
+/// Simulates the only job of a sweep.
+#[pyfunction]
+#[pyo3(signature = (file, text, source, sample, trace, map, profile, contacts))]
+#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "called by keyword-only Python code")]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    file: Option<PathBuf>,
+    text: &str,
+    source: &str,
+    sample: f64,
+    trace: bool,
+    map: bool,
+    profile: bool,
+    contacts: bool,
+) -> PyResult<Simulated<'py>> {
+    let sweep = read_sweep(file.as_deref(), text, source)?;
+    let parameters = only_job(&sweep).map_err(Error::from)?.parameters;
+    let request = Request { sample, trace, map, profile, contacts };
+    request.check(&parameters, sweep.recording()).map_err(Error::from)?;
+    let (row, tables) = watched::<_, ()>(
+        py,
+        |stop, _| {
+            let (measured, records) = single::simulate(&sweep, &parameters, request, stop)?;
+            let names = label::<DriveAndSeed>(&sweep, &parameters);
+            let row: JobRow = (relabel::<_, All>(&names), JobRecord::new(Ok(&measured)));
+            let Records { trace: samples, map: cells, profile: blocks, contacts: events } = records;
+            let mut tables = BTreeMap::new();
+            let slips = measured.slips.iter().map(|slip| -> SlipRow<'_> { (&names, slip) });
+            tables.insert("slips", Table::of_rows(slips)?);
+            if sweep.recording().precursors {
+                let rows = measured.precursors.iter().map(|precursor| -> PrecursorRow<'_> { (&names, precursor) });
+                tables.insert("precursors", Table::of_rows(rows)?);
+            }
+            if trace {
+                tables.insert("trace", Table::of_rows(samples.into_iter())?);
+            }
+            if map {
+                tables.insert("map", Table::of_rows(cells.into_iter())?);
+            }
+            if profile {
+                tables.insert("profile", Table::of_rows(blocks.into_iter())?);
+            }
+            if contacts {
+                tables.insert("contacts", Table::of_rows(events.iter().map(ContactRow::from))?);
+            }
+            Ok((row, tables))
+        },
+        |()| (),
+        |_| Ok(()),
+    )?;
+    Ok((as_dict(py, &row)?, sweep.text().to_owned(), sweep.warnings(), tables))
+}
+
+/// A row as a dict, by the names of the columns; `None` where a value is missing.
+fn as_dict<'py, R: Row>(py: Python<'py>, row: &R) -> PyResult<Bound<'py, PyDict>> {
+    let (columns, dict, mut written) = (R::columns(), PyDict::new(py), Ok(()));
+    row.cells(&mut |cell| {
+        let Some(column) = columns.get(dict.len()) else { return };
+        let name = column.name.as_ref();
+        let set = match cell {
+            Cell::Null => dict.set_item(name, py.None()),
+            Cell::Real(real) => dict.set_item(name, real),
+            Cell::Count(count) => dict.set_item(name, count),
+            Cell::Flag(flag) => dict.set_item(name, flag),
+            Cell::Text(text) => dict.set_item(name, text),
+        };
+        written = std::mem::replace(&mut written, Ok(())).and(set);
+    });
+    written.map(|()| dict)
+}

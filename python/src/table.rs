@@ -1,0 +1,152 @@
+//! Tables of Arrow, handed on without a copy through the C interface of Arrow.
+
+use crate::errors::Error;
+use arrow_array::ffi::FFI_ArrowSchema;
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::{RecordBatch, RecordBatchIterator};
+use arrow_schema::{DataType, Field, SchemaRef};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyDict};
+use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
+use stickslip::table::columns::Table as TableRow;
+
+/// A table with its units, in Arrow's memory layout.
+///
+/// pandas, polars, DuckDB and pyarrow take it as it is, without a copy: `pyarrow.table(slips)`,
+/// `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
+#[pyclass(frozen, module = "stickslip")]
+pub struct Table {
+    name: &'static str,
+    schema: SchemaRef,
+    batches: Vec<RecordBatch>,
+}
+
+impl Table {
+    pub fn new(name: &'static str, schema: SchemaRef, batches: Vec<RecordBatch>) -> Self {
+        Self { name, schema, batches }
+    }
+
+    /// A table of rows in memory.
+    pub fn of_rows<R: TableRow>(rows: impl Iterator<Item = R>) -> Result<Self, Error> {
+        let mut buffer = RowBuffer::new::<R>();
+        rows.for_each(|row| buffer.push(&row));
+        let batch = buffer.take()?;
+        Ok(Self::new(R::NAME, batch.schema(), vec![batch]))
+    }
+
+    /// What the metadata of the columns have under a key.
+    fn described<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
+        let texts = PyDict::new(py);
+        for field in self.schema.fields() {
+            texts.set_item(field.name(), metadata(field, key))?;
+        }
+        Ok(texts)
+    }
+}
+
+fn metadata<'f>(field: &'f Field, key: &str) -> &'f str {
+    field.metadata().get(key).map_or("", String::as_str)
+}
+
+/// A column's type in words.
+fn kind(field: &Field) -> &'static str {
+    match field.data_type() {
+        DataType::Float64 => "float",
+        DataType::Int64 => "int",
+        DataType::Boolean => "bool",
+        _ => "str",
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Name of the table.
+    #[getter]
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    /// Names of the columns.
+    #[getter]
+    fn columns(&self) -> Vec<&str> {
+        self.schema.fields().iter().map(|field| field.name().as_str()).collect()
+    }
+
+    /// Unit of each column; "" for a pure number or a text.
+    #[getter]
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.described(py, UNIT)
+    }
+
+    /// Meaning of each column.
+    #[getter]
+    fn meaning<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.described(py, DESCRIPTION)
+    }
+
+    /// Number of rows.
+    fn __len__(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    fn __repr__(&self) -> String {
+        let fields = self.schema.fields();
+        let width =
+            |text: fn(&Field) -> &str| fields.iter().map(|field| text(field).chars().count()).max().unwrap_or(0);
+        let (names, units) = (width(|field| field.name()), width(|field| metadata(field, UNIT)));
+        let line = |field: &std::sync::Arc<Field>| {
+            let (unit, meaning) = (metadata(field, UNIT), metadata(field, DESCRIPTION));
+            format!("  {:names$}  {:5}  {unit:units$}  {meaning}", field.name(), kind(field))
+        };
+        let rows = match self.__len__() {
+            1 => "1 row".to_owned(),
+            rows => format!("{rows} rows"),
+        };
+        let lines: Vec<String> = fields.iter().map(|field| line(field).trim_end().to_owned()).collect();
+        format!("{}: {rows}\n{}", self.name, lines.join("\n"))
+    }
+
+    /// Hands the table on as a stream of Arrow; `requested_schema` is not looked at.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // A consumer casts by itself what it wants in another type, as the interface allows.
+        drop(requested_schema);
+        let batches = self.batches.clone().into_iter().map(Ok);
+        let reader = RecordBatchIterator::new(batches, SchemaRef::clone(&self.schema));
+        PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), c"arrow_array_stream")
+    }
+
+    /// Hands on the names, types, units and meanings of the columns.
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let schema = FFI_ArrowSchema::try_from(self.schema.as_ref()).map_err(Error::from)?;
+        PyCapsule::new_with_value(py, schema, c"arrow_schema")
+    }
+
+    /// The table as a `pyarrow.Table`; units and meanings are in the metadata of its fields.
+    fn to_pyarrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        py.import(intern!(py, "pyarrow"))?.call_method1(intern!(py, "table"), (slf,))
+    }
+
+    /// The table as a `pandas.DataFrame`; units and meanings are in `.attrs["units"]` and `.attrs["meaning"]`.
+    fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let frame = Self::to_pyarrow(slf)?.call_method0(intern!(py, "to_pandas"))?;
+        let attributes = PyDict::new(py);
+        attributes.set_item("units", slf.get().units(py)?)?;
+        attributes.set_item("meaning", slf.get().meaning(py)?)?;
+        frame.setattr(intern!(py, "attrs"), attributes)?;
+        Ok(frame)
+    }
+
+    /// The table as a `polars.DataFrame`, which keeps no units: see `units`.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        py.import(intern!(py, "polars"))?.call_method1(intern!(py, "DataFrame"), (slf,))
+    }
+}

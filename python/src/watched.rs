@@ -1,0 +1,56 @@
+//! Work on a thread of its own, without the interpreter's lock, while this one waits for it and obeys Ctrl-C: signals reach
+//! the main thread alone, and there Python looks at them only when it is asked to.
+
+use crate::errors::Error;
+use pyo3::prelude::*;
+use std::any::Any;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// How often Python is asked for signals, and shown what has happened.
+const POLL: Duration = Duration::from_millis(50);
+
+/// Does some work until it ends. What it sends is collected by `note`, and shown by `show` now and then. An exception, of
+/// `show` or by Ctrl-C, sets the flag that `work` looks at, and is raised once that has ended.
+pub fn watched<T: Send, M: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&AtomicBool, &Sender<M>) -> Result<T, Error> + Send,
+    mut note: impl FnMut(M) + Send,
+    mut show: impl FnMut(Python<'_>) -> PyResult<()> + Send,
+) -> Result<T, Error> {
+    py.detach(|| {
+        let stop = &AtomicBool::new(false);
+        let (sender, receiver) = channel();
+        thread::scope(|scope| {
+            // The sender is dropped with the work, which ends the loop.
+            let worker = scope.spawn(move || work(stop, &sender));
+            let (mut raised, mut last_look) = (Ok(()), Instant::now());
+            loop {
+                match receiver.recv_timeout(POLL) {
+                    Ok(message) => note(message),
+                    Err(RecvTimeoutError::Timeout) => (),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                }
+                if raised.is_ok() && last_look.elapsed() >= POLL {
+                    last_look = Instant::now();
+                    raised = Python::attach(|py| py.check_signals().and_then(|()| show(py)));
+                    if raised.is_err() {
+                        stop.store(true, Ordering::Relaxed);
+                    }
+                }
+            }
+            let ended = worker.join().unwrap_or_else(|panic| Err(Error::Simulation(message_of(&*panic))));
+            raised?;
+            Python::attach(&mut show)?;
+            ended
+        })
+    })
+}
+
+fn message_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message");
+    format!("panic: {text}")
+}

@@ -1,0 +1,77 @@
+"""What the package takes from the library in Rust. Use it through `stickslip`."""
+
+from collections.abc import Callable
+from datetime import timedelta
+from os import PathLike
+from pathlib import Path
+from typing import Any, final
+
+import pandas
+import polars
+import pyarrow
+
+__all__ = [
+    "ResultsError",
+    "SimulationError",
+    "SweepError",
+    "Table",
+    "VERSION",
+    "keys",
+    "minimum_phase",
+    "read",
+    "reduce",
+    "run",
+    "simulate",
+    "sweep_of",
+    "sweep_text",
+]
+
+VERSION: str
+
+class SweepError(ValueError): ...
+class ResultsError(RuntimeError): ...
+class SimulationError(RuntimeError): ...
+
+@final
+class Table:
+    @property
+    def name(self) -> str: ...
+    @property
+    def columns(self) -> list[str]: ...
+    @property
+    def units(self) -> dict[str, str]: ...
+    @property
+    def meaning(self) -> dict[str, str]: ...
+    def __len__(self) -> int: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> Any: ...
+    def __arrow_c_schema__(self) -> Any: ...
+    def to_pyarrow(self) -> pyarrow.Table: ...
+    def to_pandas(self) -> pandas.DataFrame: ...
+    def to_polars(self) -> polars.DataFrame: ...
+
+def keys() -> dict[str, tuple[str, str, Any]]: ...
+def sweep_text(keys: list[tuple[str, str]]) -> str: ...
+def simulate(
+    file: str | PathLike[str] | None,
+    text: str,
+    source: str,
+    sample: float,
+    trace: bool,
+    map: bool,
+    profile: bool,
+    contacts: bool,
+) -> tuple[dict[str, Any], str, list[str], dict[str, Table]]: ...
+def run(
+    file: str | PathLike[str] | None,
+    text: str,
+    out: str | PathLike[str] | None,
+    threads: int | None,
+    retry_failed: bool,
+    walltime: timedelta | None,
+    reduce: bool,
+    callback: Callable[[int, int, float, list[str]], object] | None,
+) -> tuple[Path, list[str]]: ...
+def sweep_of(directory: str | PathLike[str]) -> tuple[str, str]: ...
+def reduce(directory: str | PathLike[str]) -> None: ...
+def read(directory: str | PathLike[str], table: str, columns: list[str] | None, join: bool) -> Table: ...
+def minimum_phase(eta: float) -> float | None: ...

@@ -1,0 +1,200 @@
+"""Figures of a results directory with matplotlib, in the look of the program's, as a start for your own.
+
+Each returns its axes, so that anything can be added or changed: `axes.set_xlim(...)`, `axes.figure.savefig(...)`.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ._stickslip import ResultsError, minimum_phase
+
+if TYPE_CHECKING:
+    import numpy
+    import pandas
+    from matplotlib.axes import Axes
+
+    from .results import Results
+
+#: The program's colours: slips of locked sets and others, averages, theory, bars; and lines side by side (Okabe and Ito).
+LOCKED, OTHERS, AVERAGE, THEORY, BARS = "black", "#8c8c8c", "#1f55c4", "#d62020", "#9db4d6"
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+
+STYLE: Any = {
+    "axes.labelsize": 12,
+    "axes.linewidth": 0.8,
+    "figure.constrained_layout.use": True,
+    "figure.facecolor": "white",
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.minor.visible": True,
+    "ytick.minor.visible": True,
+}
+#: Width and height of a figure, and height of a panel of histograms, in inches.
+SIZE, PANEL = (6.4, 4.6), 1.9
+#: Sets that go onto a sheet of histograms.
+MAX_PANELS = 8
+#: Multiples of T that are marked; more would be a grey area.
+MAX_MULTIPLES = 40
+
+_Draw = TypeVar("_Draw", bound=Callable[..., Any])
+
+
+@contextmanager
+def _styled() -> Iterator[None]:
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        yield
+
+
+def _in_style(draw: _Draw) -> _Draw:
+    """Draws in the program's look, whatever is set elsewhere."""
+
+    @wraps(draw)
+    def styled(*arguments: Any, **options: Any) -> Any:
+        with _styled():
+            return draw(*arguments, **options)
+
+    return styled  # type: ignore[return-value]
+
+
+def _new_axes() -> "Axes":
+    from matplotlib import pyplot
+
+    return pyplot.subplots(figsize=SIZE)[1]
+
+
+class Plot:
+    """The figures of a results directory. `axes` are matplotlib's to draw on; new ones if they are not given."""
+
+    def __init__(self, results: "Results") -> None:
+        self._results = results
+
+    @_in_style
+    def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
+        """Phases of slips (rad) against eta, with means over locked sets and where Eq. 2 lets slips begin (Fig. 3e)."""
+        points = self._slips("phase")
+        bins = self._results.backbone().to_pandas().dropna(subset="locked_phase_mean")
+        axes = axes or _new_axes()
+        low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
+        axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
+        _scatter(axes, points, "eta", "phase")
+        mean = bins["locked_phase_mean"]
+        bars = abs(bins[["locked_phase_mean_low", "locked_phase_mean_high"]].sub(mean, axis=0)).T.to_numpy()
+        axes.errorbar(
+            bins["eta_centre"], mean, bars, fmt="o", color=AVERAGE, markersize=5, capsize=2, label="mean of locked sets"
+        )
+        axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
+        axes.set(
+            xscale="log",
+            xlim=(low, high),
+            xlabel=r"$\eta = 2\pi\Delta/(T\,V_0)$",
+            ylabel=r"Phase $\phi$ (rad)",
+        )
+        _in_units_of_pi(axes)
+        axes.legend(loc="best")
+        return axes
+
+    @_in_style
+    def intervals(self, axes: "Axes | None" = None, *, lines: int = len(COLOURS)) -> "Axes":
+        """Intervals in periods, tau/T, against the period T (s), with a line for each of the most frequent n (Fig. 3c)."""
+        points = self._slips("interval")
+        points = points.assign(periods=points["interval"] / points["T"])
+        axes = axes or _new_axes()
+        _scatter(axes, points, "T", "periods")
+        counts = points.loc[points["n"] > 0, "n"].value_counts()
+        for n, colour in zip(sorted(counts.index[:lines]), COLOURS, strict=False):
+            axes.axhline(n, color=colour, linewidth=0.8, zorder=0)
+            of_n = points[(points["n"] == n) & points["locked"]]
+            axes.plot(of_n["T"], of_n["periods"], ".", color=colour, markersize=2.5)
+            axes.annotate(f"{n:.0f}", (1, n), (3, 0), ("axes fraction", "data"), "offset points", color=colour, va="center")
+        axes.set(xscale="log", yscale="log", xlabel="Modulation period $T$ (s)", ylabel=r"Slip interval $\tau/T$")
+        axes.legend(loc="best")
+        return axes
+
+    @_in_style
+    def histograms(self, sets: "list[str] | None" = None) -> "numpy.ndarray":
+        """Histograms of the interval tau (s), a panel for each set, by rising frequency; at most 8 (Fig. 2).
+
+        `sets` are ids of sets, such as those of `results.sets()`; by default all. Returns an array of axes.
+        """
+        from matplotlib import pyplot
+
+        table = self._results.sets().to_pandas().set_index("set_id")
+        table = (table if sets is None else table.loc[sets]).dropna(subset="tau_mean").sort_values("T", ascending=False)
+        # Those without modulation first.
+        table = table.iloc[table["T"].notna().argsort(kind="stable")]
+        if not 1 <= len(table) <= MAX_PANELS:
+            raise ValueError(f"there are {len(table)} sets with intervals; name 1 to {MAX_PANELS} of them in sets=")
+        bins = self._results.histograms().to_pandas()
+        size = (SIZE[0], 0.8 + PANEL * len(table))
+        figure, panels = pyplot.subplots(len(table), sharex=True, squeeze=False, figsize=size)
+        for axes, letter, (set_id, one) in zip(panels[:, 0], "abcdefgh", table.iterrows(), strict=False):
+            bars = bins[bins["set_id"] == set_id]
+            width = bars["high"] - bars["low"]
+            axes.bar(bars["low"], bars["density"], width, align="edge", color=BARS, edgecolor="0.25", linewidth=0.6)
+            axes.set_title(f"({letter})  {_named(one)}, {one['intervals']:.0f} intervals", loc="left", fontsize=10)
+        for axes, period in zip(panels[:, 0], table["T"], strict=True):
+            _multiples(axes, period)
+        panels[-1, 0].set_xlabel(r"Slip interval $\tau$ (s)")
+        figure.supylabel("Probability density (1/s)", fontsize=12)
+        return panels[:, 0]
+
+    def _slips(self, column: str) -> "pandas.DataFrame":
+        """Slips under modulation with a value in a column."""
+        points = self._results.points().to_pandas().dropna(subset=["T", column])
+        if points.empty:
+            raise ResultsError(f"{self._results.directory}: has no slips under modulation to draw")
+        return points
+
+
+def _scatter(axes: "Axes", points: "pandas.DataFrame", x: str, y: str) -> None:
+    """Slips, those of locked sets over the others."""
+    for locked, colour, label in ((False, OTHERS, "other slips"), (True, LOCKED, "slips of locked sets")):
+        of_kind = points[points["locked"] == locked]
+        axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=2.5, alpha=0.5, markeredgewidth=0, label=label)
+
+
+def _least_phases(high: float) -> "tuple[numpy.ndarray, numpy.ndarray]":
+    """eta from 1, and the least phase (rad) at which slips can begin there."""
+    import numpy
+
+    eta = numpy.geomspace(1, max(high, 1.01), 400)
+    return eta, numpy.array([minimum_phase(one) for one in eta], dtype=float)
+
+
+def _in_units_of_pi(axes: "Axes") -> None:
+    from fractions import Fraction
+    from math import pi
+
+    from matplotlib.ticker import AutoMinorLocator, FuncFormatter, MultipleLocator
+
+    def named(value: float, _: int) -> str:
+        share = Fraction(round(2 * value / pi), 2)
+        above = {1: "π", -1: "−π"}.get(share.numerator, f"{share.numerator}π".replace("-", "−"))
+        return "0" if share == 0 else above if share.denominator == 1 else f"{above}/{share.denominator}"
+
+    axes.yaxis.set_major_locator(MultipleLocator(pi / 2))
+    axes.yaxis.set_minor_locator(AutoMinorLocator(3))
+    axes.yaxis.set_major_formatter(FuncFormatter(named))
+
+
+def _named(one: "pandas.Series") -> str:
+    """The modulation of a set."""
+    if not one["Delta"] > 0:
+        return r"$\Delta$ = 0"
+    return rf"$\Delta$ = {one['Delta'] * 1e6:.3g} µm, $1/T$ = {1 / one['T']:.4g} Hz"
+
+
+def _multiples(axes: "Axes", period: float) -> None:
+    """Marks the multiples of a period, unless they are too many."""
+    low, high = axes.get_xlim()
+    if (high - low) / period <= MAX_MULTIPLES:  # never without a period, which is NaN
+        for n in range(max(1, int(low / period)), int(high / period) + 1):
+            axes.axvline(n * period, color=OTHERS, linewidth=0.7, linestyle=(0, (3, 3)), zorder=0)

@@ -1,0 +1,98 @@
+"""Results directories, and their tables."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from . import _stickslip
+from ._stickslip import Table
+
+if TYPE_CHECKING:
+    from .figures import Plot
+
+
+def open(directory: str | PathLike[str]) -> "Results":
+    """Opens a results directory, also one whose sweep still runs.
+
+    Raises `ResultsError` if it is none.
+
+    >>> results = stickslip.open("results/fig3")
+    >>> slips = results.slips().to_pandas()
+    """
+    return Results(directory)
+
+
+class Results:
+    """The results directory of a sweep. Each table is read when it is asked for, as far as it is there.
+
+    Every table is one of Arrow (`stickslip.Table`), with units, and goes into pandas, polars, DuckDB or pyarrow as it is.
+    `columns` are names of columns to read, which saves time and memory; what a row means is in `Table.meaning`.
+    """
+
+    def __init__(self, directory: str | PathLike[str]) -> None:
+        self._directory = Path(fspath(directory))
+        #: Name of the sweep, and its text as TOML.
+        self.name, self.sweep = _stickslip.sweep_of(self._directory)
+
+    @property
+    def directory(self) -> Path:
+        """Where the results are."""
+        return self._directory
+
+    def __repr__(self) -> str:
+        return f"stickslip.open({str(self._directory)!r})"
+
+    def slips(self, columns: Sequence[str] | None = None, *, join: bool = False) -> Table:
+        """One row per slip past start-up: onset and interval (s), phase (rad), forces (N), and more.
+
+        V0, Delta, T, seed and eta are columns. Any other parameter, or column of the jobs, can be named in `columns`;
+        `join=True` adds them all.
+
+        >>> results.slips(["Kd", "interval", "phase"]).to_polars()
+        """
+        return self._table("slips", columns, join)
+
+    def precursors(self, columns: Sequence[str] | None = None, *, join: bool = False) -> Table:
+        """One row per precursor, if the sweep records them; `columns` and `join` as of `slips`."""
+        return self._table("precursors", columns, join)
+
+    def jobs(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per job: all parameters, outcome, mean friction (N), counts."""
+        return self._table("jobs", columns)
+
+    def sets(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per parameter set, all seeds together: statistics of intervals, phases and friction, with intervals."""
+        return self._table("sets", columns)
+
+    def histograms(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per bin of the intervals of a set."""
+        return self._table("histograms", columns)
+
+    def backbone(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per bin of eta: phases of all its slips."""
+        return self._table("backbone", columns)
+
+    def startup(self, columns: Sequence[str] | None = None) -> Table:
+        """Intervals by the number of the slip, to see how long start-up lasts."""
+        return self._table("startup", columns)
+
+    def points(self, columns: Sequence[str] | None = None) -> Table:
+        """Slips for scatter figures: all up to 20,000, or every k-th."""
+        return self._table("points", columns)
+
+    def reduce(self) -> None:
+        """Reduces the tables again, as far as they are there: for `sets` and the others that a stopped run does not make."""
+        _stickslip.reduce(self._directory)
+
+    @cached_property
+    def plot(self) -> "Plot":
+        """Figures with matplotlib: `results.plot.phase_eta()`."""
+        from .figures import Plot
+
+        return Plot(self)
+
+    def _table(self, name: str, columns: Sequence[str] | None, join: bool = False) -> Table:
+        columns = None if columns is None else [columns] if isinstance(columns, str) else list(columns)
+        return _stickslip.read(self._directory, name, columns, join)

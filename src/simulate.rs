@@ -1,0 +1,171 @@
+//! One job with records on request: that of a sweep file, or of keys, which become the text of a sweep with one point, so
+//! that values, messages and the id of the job are the same.
+
+use crate::model::theory::typical_interval;
+use crate::model::{ContactEvent, Parameters};
+use crate::observe::{
+    AttachedMap, ContactLog, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, RecordingKey,
+    SlipObserver, Trace, TraceRow,
+};
+use crate::solver::{self, Observer, SimulationError};
+use crate::sweep::{Job, Mistake, Sweep};
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+
+/// More samples than this, of 24 bytes each, are a mistake.
+const MAX_SAMPLES: f64 = 1e8;
+
+/// A simulation that is not one, or would record too much.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RequestError {
+    /// A sweep has several jobs, or none.
+    #[error(
+        "sweep {name}: has {jobs} jobs, and one can be simulated; give each axis one value, or use `stickslip run`"
+    )]
+    NotOneJob {
+        /// Name of the sweep.
+        name: String,
+        /// Its jobs.
+        jobs: usize,
+    },
+    /// The time between samples is no time.
+    #[error("sample {0}: must be a finite number > 0, in s")]
+    BadSample(f64),
+    /// A trace or a map would have too many samples.
+    #[error("sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one")]
+    TooManySamples {
+        /// Time between samples, in s.
+        sample: f64,
+        /// Time of the simulation, in s.
+        time: f64,
+    },
+}
+
+/// Keys of a sweep file with their values as it has them.
+pub type Written = Vec<(String, String)>;
+
+/// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
+#[must_use]
+pub fn sweep_text(model: &Written, record: &BTreeMap<RecordingKey, String>, solver: &Written) -> String {
+    let recorded = |key| match (key, record.get(&key)) {
+        (_, Some(value)) => Some(value.as_str()),
+        // With a time alone, slips do not end the run.
+        (RecordingKey::Slips, None) if record.contains_key(&RecordingKey::MaxTime) => Some("10000000"),
+        (RecordingKey::Slips, None) => Some("20"),
+        (RecordingKey::Discard, None) => Some("5"),
+        _ => None,
+    };
+    let line = |(key, value): (&str, &str)| format!("{key} = {value}");
+    let lines = |entries: &Written| entries.iter().map(|(key, value)| line((key, value))).collect::<Vec<_>>();
+    let record = RecordingKey::ALL.into_iter().filter_map(|key| Some(line((key.key(), recorded(key)?))));
+    let sections = [("model", lines(model)), ("record", record.collect()), ("solver", lines(solver))];
+    let sections = sections.map(|(title, lines)| format!("[{title}]\n{}\n", lines.join("\n")));
+    format!("name = \"simulate\"\n{}", sections.concat())
+}
+
+/// The mistakes in such a text, as those in what it was made from, which has neither sections nor lines.
+#[must_use]
+pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
+    let problems = mistakes.iter().map(|Mistake { problem, .. }| {
+        let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));
+        let end = end.split_once(')').map_or("", |(_, rest)| rest);
+        format!("{start}{end}").replace(" in [model]", "")
+    });
+    let between = if mistakes.len() > 1 { "\n  " } else { " " };
+    format!("in the {source}:{between}{}", problems.collect::<Vec<_>>().join(between))
+}
+
+/// The job of a sweep that has one.
+///
+/// # Errors
+/// When it has others.
+pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
+    let mut jobs = sweep.jobs();
+    match (jobs.next(), jobs.count()) {
+        (Some(job), 0) => Ok(job),
+        (_, others) => Err(RequestError::NotOneJob { name: sweep.name().to_owned(), jobs: others + 1 }),
+    }
+}
+
+/// What to record beside slips.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each table that may be recorded")]
+pub struct Request {
+    /// Time between samples of trace and map, in s.
+    pub sample: f64,
+    /// Shear force, displacement and attached fraction over time.
+    pub trace: bool,
+    /// Attached fraction of every block over time.
+    pub map: bool,
+    /// Displacement of every block at the end.
+    pub profile: bool,
+    /// Every contact event.
+    pub contacts: bool,
+}
+
+impl Request {
+    /// Makes sure that what is recorded fits into memory.
+    ///
+    /// # Errors
+    /// When there would be too many samples, or the time between them is none.
+    pub fn check(&self, parameters: &Parameters, recording: &Recording) -> Result<(), RequestError> {
+        let sample = self.sample;
+        if !(sample > 0.0 && sample.is_finite()) {
+            return Err(RequestError::BadSample(sample));
+        }
+        let cells = if self.map { parameters.blocks } else { usize::from(self.trace) };
+        let slips = recording.slips as f64 + recording.discard as f64;
+        let time = (slips * typical_interval(parameters)).min(recording.max_time.unwrap_or(f64::INFINITY));
+        if time / sample * cells as f64 > MAX_SAMPLES {
+            return Err(RequestError::TooManySamples { sample, time });
+        }
+        Ok(())
+    }
+}
+
+/// What was recorded beside slips; empty where nothing asked for it.
+#[derive(Clone, Debug, Default)]
+pub struct Records {
+    /// Samples of the trace.
+    pub trace: Vec<TraceRow>,
+    /// Cells of the map, instant by instant.
+    pub map: Vec<MapRow>,
+    /// Blocks at the end.
+    pub profile: Vec<ProfileRow>,
+    /// Contact events, in order.
+    pub contacts: Vec<ContactEvent>,
+}
+
+/// Simulates a job, and records what is asked for. The slips are those of a run of the sweep, to the bit.
+///
+/// # Errors
+/// When the simulation cannot continue, or is interrupted.
+pub fn simulate(
+    sweep: &Sweep,
+    parameters: &Parameters,
+    request: Request,
+    interrupt: &AtomicBool,
+) -> Result<(Measurements, Records), SimulationError> {
+    let recording = sweep.recording();
+    let mut slips = SlipObserver::new(parameters, recording);
+    let mut trace = Trace::new(parameters, request.sample);
+    let mut map = AttachedMap::new(parameters, request.sample);
+    let mut profile = Profile::new(parameters);
+    let mut log = ContactLog::default();
+    let all: [(bool, &mut dyn Observer); 4] = [
+        (request.trace, &mut trace),
+        (request.map, &mut map),
+        (request.profile, &mut profile),
+        (request.contacts, &mut log),
+    ];
+    let others = all.into_iter().filter_map(|(wanted, observer)| wanted.then_some(observer)).collect();
+    let observer = &mut Observers { lead: &mut slips, others };
+    let (limits, solver) = (recording.limits(interrupt), sweep.solver());
+    let summary = if recording.energies {
+        solver::simulate_audited(parameters, solver, limits, observer)?.0
+    } else {
+        solver::simulate(parameters, solver, limits, observer)?
+    };
+    let records = Records { trace: trace.rows, map: map.rows, profile: profile.rows, contacts: log.events };
+    Ok((Measurements::new(slips, summary), records))
+}

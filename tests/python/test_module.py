@@ -1,0 +1,337 @@
+"""The module stickslip: the same bits as the command line, tables that every library takes, and no way to hang or crash."""
+
+import inspect
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+
+import duckdb
+import nbformat
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from conftest import ROOT
+from nbclient import NotebookClient
+
+import stickslip as module
+
+KEYS = {"N": 9, "Delta": 1e-6, "frequency": 29, "slips": 6}
+FLAGS = ("--set", "N=9", "--set", "Delta=1e-6", "--set", "frequency=29", "--slips", 6)
+SWEEP = {
+    "name": "from-a-dict",
+    "where": ["Delta < 1e-5"],
+    "model": {"N": 9, "break_on": "magnitude"},
+    "axes": {"zip": [{"Delta": [0, 1e-6], "frequency": [29, 29]}], "seed": {"count": 3}},
+    "record": {"slips": 6, "discard": 2, "precursors": True},
+}
+# More work than any test waits for.
+LONG = {"name": "long", "axes": {"seed": {"count": 5000}}, "record": {"slips": 200}}
+
+
+@pytest.fixture(scope="module")
+def opened(results):
+    """The results of a sweep that the program has run."""
+    return module.open(results)
+
+
+def bare(table):
+    """An Arrow table without the metadata of a file."""
+    return pa.table(table).replace_schema_metadata(None)
+
+
+def files(directory):
+    """The files of tables and reduced data, by name."""
+    paths = (path for folder in ("tables", "reduced") for path in sorted((directory / folder).rglob("*.parquet")))
+    return {path.relative_to(directory).as_posix(): path.read_bytes() for path in paths}
+
+
+def test_a_simulation_has_the_bits_of_the_command(stickslip, tmp_path):
+    tables = ("trace", "map", "profile", "contacts")
+    paths = {name: tmp_path / f"{name}.parquet" for name in (*tables, "slip_table")}
+    flags = [word for name, path in paths.items() for word in (f"--{name.replace('_', '-')}", path)]
+    stickslip("simulate", *FLAGS, *flags)
+    one = module.simulate(**KEYS, **dict.fromkeys(tables, True))
+    assert one.outcome == "done" and len(one.slips()) == 6
+    for name, path in paths.items():
+        written = pq.ParquetFile(path).read()
+        found = pa.table(getattr(one, name.removeprefix("slip_").replace("table", "slips"))())
+        assert found.equals(written.replace_schema_metadata(None)), name
+        assert [field.metadata for field in found.schema] == [
+            {key: text for key, text in field.metadata.items() if key != b"PARQUET:field_id"} for field in written.schema
+        ]
+
+
+def test_a_simulation_has_the_bits_of_a_sweep(opened):
+    jobs = opened.jobs().to_pandas()
+    job = jobs[(jobs["Delta"] > 0) & (jobs["seed"] == 1)].iloc[0]
+    one = module.simulate(
+        {"name": "one", "model": {"N": 9, "Delta": 1e-6, "frequency": 29, "seed": 1},
+         "record": {"slips": 6, "discard": 2, "precursors": True}}
+    )
+    assert one.job["job_id"] == job["job_id"] and one.job["mean_friction"] == job["mean_friction"]
+    for name in ("slips", "precursors"):
+        table = pl.DataFrame(getattr(opened, name)()).filter(pl.col("job_id") == job["job_id"])
+        assert table.equals(pl.DataFrame(getattr(one, name)())), name
+
+
+def test_a_dict_runs_as_the_file_with_its_text_does(stickslip, tmp_path):
+    ran = module.run(SWEEP, tmp_path / "dict", progress=False)
+    assert tomllib.loads(ran.sweep) == SWEEP and ran.name == "from-a-dict"
+    (tmp_path / "sweep.toml").write_text(ran.sweep)
+    stickslip("run", tmp_path / "sweep.toml", "--out", tmp_path / "command")
+    module.run(tmp_path / "sweep.toml", out=tmp_path / "file", threads=1, progress=False)
+    expected = files(tmp_path / "command")
+    # Three tables of six parts, one for each job, and the reduced data.
+    assert len(expected) == 3 * 6 + 5
+    assert files(tmp_path / "dict") == files(tmp_path / "file") == expected
+    again = module.run(tmp_path / "dict", progress=False)
+    assert again.directory == tmp_path / "dict" and files(tmp_path / "dict") == expected
+
+
+def test_arrays_of_numpy_are_lists(tmp_path):
+    sweep = {"name": "arrays", "axes": {"V0": np.geomspace(1e-5, 1e-4, 3), "seed": np.arange(2)}, "record": {"slips": 1}}
+    jobs = module.run(sweep, tmp_path / "arrays", progress=False).jobs().to_pandas()
+    assert sorted(set(jobs["V0"])) == list(np.geomspace(1e-5, 1e-4, 3)) and set(jobs["seed"]) == {0, 1}
+
+
+def test_every_library_takes_the_slips(results, opened):
+    written = pd.read_parquet(results / "tables" / "slips")
+    slips = opened.slips()
+    assert len(slips) == len(written) > 0
+    pd.testing.assert_frame_equal(slips.to_pandas(), written)
+    pd.testing.assert_frame_equal(pd.DataFrame.from_arrow(slips), written, check_dtype=False)
+    assert slips.to_polars().equals(pl.read_parquet(results / "tables" / "slips"))
+    assert slips.to_pyarrow().equals(pa.table(slips))
+    found = duckdb.sql("select count(*), avg(\"interval\") from slips").fetchall()[0]
+    assert found == (len(written), pytest.approx(written["interval"].mean()))
+
+
+def test_tables_are_handed_on_without_a_copy(opened):
+    slips = opened.slips(["phase"])
+    addresses = {pa.table(slips)["phase"].chunk(0).buffers()[1].address for _ in range(2)}
+    assert len(addresses) == 1
+
+
+def test_every_table_is_that_of_its_files(results, opened):
+    for name in ("jobs", "precursors"):
+        pd.testing.assert_frame_equal(getattr(opened, name)().to_pandas(), pd.read_parquet(results / "tables" / name))
+    for name in ("sets", "histograms", "backbone", "startup", "points"):
+        written = pd.read_parquet(results / "reduced" / f"{name}.parquet")
+        pd.testing.assert_frame_equal(getattr(opened, name)().to_pandas(), written)
+
+
+def test_units_are_everywhere(opened):
+    slips = opened.slips(join=True)
+    units = {"V0": "m/s", "interval": "s", "phase": "rad", "Kd": "N/m", "mean_friction": "N", "n": ""}
+    assert {name: slips.units[name] for name in units} == units
+    assert pa.table(slips).schema.field("Kd").metadata[b"unit"] == b"N/m"
+    assert pa.schema(slips).field("Kd").metadata[b"description"] == slips.meaning["Kd"].encode()
+    assert slips.to_pandas().attrs == {"units": slips.units, "meaning": slips.meaning}
+    assert re.search(r"^  interval +float +s +time since", repr(slips), re.M), repr(slips)
+    assert repr(slips).startswith(f"slips: {len(slips)} rows\n")
+
+
+def test_parameters_of_the_job_join_the_slips(opened):
+    slips, jobs = opened.slips().to_pandas(), opened.jobs().to_pandas()
+    others = [column for column in jobs if column not in slips]
+    expected = slips.merge(jobs[["job_id", *others]], on="job_id")
+    pd.testing.assert_frame_equal(opened.slips(join=True).to_pandas(), expected)
+    columns = ["Kd", "phase", "outcome", "seed"]
+    pd.testing.assert_frame_equal(opened.slips(columns).to_pandas(), expected[columns])
+    assert opened.slips("N").columns == ["N"]
+    with pytest.raises(ValueError, match="slips: there is no column Kdd; did you mean Kd?"):
+        opened.slips(["Kdd"])
+    with pytest.raises(ValueError, match="jobs: there is no column phase; there are job_id"):
+        opened.jobs(["phase"])
+
+
+def test_mistakes_have_the_words_of_the_command(program, tmp_path):
+    def command(*arguments):
+        done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 2
+        return done.stderr.removeprefix("error: ").strip()
+
+    with pytest.raises(module.SweepError) as found:
+        module.simulate(V0=-1)
+    assert str(found.value) == command("simulate", "--set", "V0=-1").replace("in the flags", "in the keys")
+    with pytest.raises(module.SweepError, match="in the keys: Vo = 1: unknown key; did you mean V0?"):
+        module.simulate(Vo=1)
+    with pytest.raises(module.SweepError, match="slipz = 1: unknown key; did you mean slips?"):
+        module.simulate(slipz=1)
+    with pytest.raises(module.SweepError, match="in the sweep: name is missing"):
+        module.run({"model": {"V0": 1e-5}}, tmp_path / "none")
+    with pytest.raises(module.SweepError, match="model = None: must be a number"):
+        module.run({"name": "none", "model": None}, tmp_path / "none")
+    (tmp_path / "bad.toml").write_text('name = "bad"\n[model]\nV1 = 3\nT = -1\n')
+    with pytest.raises(module.SweepError) as found:
+        module.run(tmp_path / "bad.toml")
+    assert str(found.value) == command("run", tmp_path / "bad.toml")
+    with pytest.raises(module.ResultsError) as found:
+        module.open(tmp_path)
+    assert str(found.value) == command("status", tmp_path)
+    with pytest.raises(module.SweepError, match="sample 0: must be a finite number > 0, in s"):
+        module.simulate(sample=0)
+    assert issubclass(module.SweepError, ValueError)
+
+
+def test_a_simulation_records_energies_as_a_sweep_does():
+    slips = module.simulate(N=9, slips=2, energies=True).slips().to_pandas()
+    assert (slips["drive_work"] > 0).all() and slips["break_loss"].notna().all()
+
+
+def test_what_was_not_recorded_is_named(tmp_path):
+    with pytest.raises(module.SimulationError, match="give trace=True"):
+        module.simulate(N=9, slips=1).trace()
+    results = module.run({"name": "a", "model": {"N": 9}, "record": {"slips": 1}}, tmp_path / "a", progress=False, reduce=False)
+    with pytest.raises(module.ResultsError, match="precursors = true"):
+        results.precursors()
+    with pytest.raises(module.ResultsError, match=r"call reduce\(\)"):
+        results.sets()
+    results.reduce()
+    assert len(results.sets()) == 1
+
+
+def test_progress_is_shown_and_ends_at_one(tmp_path):
+    seen = []
+    module.run({**SWEEP, "where": []}, tmp_path / "seen", progress=seen.append)
+    assert (seen[-1].jobs_done, seen[-1].jobs, seen[-1].share) == (6, 6, 1.0)
+    assert "6 jobs to run" in seen[0].messages[0]
+
+
+def test_a_failed_job_is_a_warning_and_a_row(tmp_path):
+    sweep = {"name": "fails", "model": {"N": 9}, "record": {"slips": 5, "max_events": 100}}
+    with pytest.warns(UserWarning, match="jobs failed: 1"):
+        results = module.run(sweep, tmp_path / "fails", progress=False)
+    assert results.jobs().to_pandas()["outcome"].tolist() == ["failed"]
+    with pytest.raises(module.SimulationError, match="events"):
+        module.simulate(N=9, slips=5, max_events=100)
+
+
+def test_an_exception_in_the_callback_stops_the_run_and_keeps_what_is_done(tmp_path):
+    def stop(progress):
+        if progress.jobs_done >= 2:
+            raise RuntimeError("enough")
+
+    begin = time.monotonic()
+    with pytest.raises(RuntimeError, match="enough"):
+        module.run(LONG, tmp_path / "long", progress=stop)
+    assert time.monotonic() - begin < 60
+    assert module.open(tmp_path / "long").name == "long"
+
+
+INTERRUPTED = """
+import sys, stickslip
+def show(progress):
+    if progress.jobs_done >= 3:
+        print("running", flush=True)
+try:
+    stickslip.run({sweep}, sys.argv[1], progress=show, reduce=False)
+except KeyboardInterrupt:
+    sys.exit(42)
+"""
+
+
+def test_ctrl_c_raises_keyboard_interrupt_and_keeps_finished_jobs(stickslip, tmp_path):
+    script = INTERRUPTED.format(sweep=LONG)
+    child = subprocess.Popen([sys.executable, "-c", script, tmp_path / "long"], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "running\n"
+    child.send_signal(signal.SIGINT)
+    assert child.wait(timeout=60) == 42
+    child.stdout.close()
+    status = stickslip("status", tmp_path / "long").stdout
+    kept = [int(number) for number in re.findall(r"(\d+)", status)]
+    spilled = list((tmp_path / "long" / "run" / "spill").glob("*"))
+    assert spilled or len(module.open(tmp_path / "long").jobs()) > 0, (status, kept)
+
+
+def test_ctrl_c_ends_a_simulation():
+    script = "import stickslip\nprint('running', flush=True)\nstickslip.simulate(slips=10_000_000)"
+    child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "running\n"
+    time.sleep(0.5)
+    child.send_signal(signal.SIGINT)
+    _, errors = child.communicate(timeout=60)
+    assert "KeyboardInterrupt" in errors and child.returncode == -signal.SIGINT
+
+
+def test_other_threads_run_meanwhile():
+    ticks, over = 0, threading.Event()
+
+    def tick():
+        nonlocal ticks
+        while not over.wait(0.001):
+            ticks += 1
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    module.simulate(slips=400)
+    elapsed = time.monotonic() - begin
+    over.set()
+    thread.join()
+    # With the lock held there would be one at most.
+    assert ticks > 5 and elapsed > 0.05, (ticks, elapsed)
+
+
+def test_simulations_run_in_threads_at_once():
+    expected = module.simulate(N=9, slips=3).slips().to_pandas()
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(module.simulate(N=9, slips=3))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 4
+    for one in found:
+        pd.testing.assert_frame_equal(one.slips().to_pandas(), expected)
+
+
+def test_keys_are_described_where_people_look():
+    signature = inspect.signature(module.simulate)
+    assert signature.parameters["V0"].default == 1e-4 and signature.parameters["slips"].default == 20
+    assert "V0\n    Drive velocity. A finite number > 0, in m/s. Default: 0.0001." in module.simulate.__doc__
+    assert {"eta", "frequency", "max_time", "tolerance", "dt", "method"} <= set(signature.parameters)
+
+
+def test_figures_show_the_data(results, opened):
+    points = pd.read_parquet(results / "reduced" / "points.parquet")
+    axes = opened.plot.phase_eta()
+    slips = [line for line in axes.get_lines() if line.get_label() in ("other slips", "slips of locked sets")]
+    assert sum(len(line.get_xdata()) for line in slips) == points["phase"].notna().sum() > 0
+    assert "rad" in axes.get_ylabel()
+    axes = opened.plot.intervals()
+    assert "(s)" in axes.get_xlabel() and len(axes.get_lines()) > 2
+    panels = opened.plot.histograms()
+    assert len(panels) == 2 and "(s)" in panels[-1].get_xlabel()
+    heights = [sum(bar.get_height() * bar.get_width() for bar in axes.patches) for axes in panels]
+    assert heights == pytest.approx([1, 1])
+
+
+def test_importing_it_imports_no_other_library():
+    script = "import sys, stickslip; print(*sorted(set(sys.modules) & {'numpy', 'pandas', 'polars', 'pyarrow', 'matplotlib'}))"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout == "\n"
+
+
+def test_the_notebook_runs_and_holds_no_output(tmp_path):
+    path = ROOT / "python" / "examples" / "tutorial.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert len(cells) > 3 and not any(cell.outputs or cell.execution_count for cell in cells)
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": tmp_path}}).execute()
+
+
+def test_the_stubs_are_those_of_the_module(tmp_path):
+    # The other libraries are many and large, and their types are not what is compared.
+    (tmp_path / "mypy.ini").write_text("[mypy]\nfollow_imports = skip\nignore_missing_imports = True\n")
+    command = [sys.executable, "-m", "mypy.stubtest", "stickslip._stickslip", "--mypy-config-file", tmp_path / "mypy.ini"]
+    environment = {**os.environ, "MYPY_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
