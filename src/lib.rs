@@ -12,7 +12,7 @@
 //! `run`, `reduce` <- `report`.
 //! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
 //! `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
-//! to figures. Only the binary's `cli` prints; `python/` makes a Python module of the library.
+//! to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -34,6 +34,8 @@
 
 #[cfg(feature = "sweeps")]
 pub mod accuracy;
+#[cfg(feature = "sweeps")]
+pub mod cli;
 #[cfg(test)]
 mod documented;
 #[cfg(feature = "sweeps")]

@@ -1,9 +1,7 @@
 //! The command line of `stickslip`.
 
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    ExitCode::from(stickslip::cli::main(None, std::env::args_os()))
 }

@@ -23,11 +23,19 @@ mod table;
 mod watched;
 
 use pyo3::prelude::*;
+use std::ffi::OsString;
+use std::path::PathBuf;
 
 /// Least phase at which slips can begin at some eta, in rad (Eq. 2); `None` for eta < 1.
 #[pyfunction]
 fn minimum_phase(eta: f64) -> Option<f64> {
     stickslip::model::theory::minimum_phase(eta)
+}
+
+/// Does what a command line asks, for the program `stickslip` at a path; returns the exit code.
+#[pyfunction]
+fn main(program: PathBuf, arguments: Vec<OsString>) -> u8 {
+    stickslip::cli::main(Some(&program), arguments)
 }
 
 #[pymodule]
@@ -37,8 +45,6 @@ mod _stickslip {
     #[pymodule_export]
     use super::keys::keys;
     #[pymodule_export]
-    use super::minimum_phase;
-    #[pymodule_export]
     use super::results::{read, reduce, sweep_of};
     #[pymodule_export]
     use super::run::run;
@@ -46,6 +52,8 @@ mod _stickslip {
     use super::simulate::{simulate, sweep_text};
     #[pymodule_export]
     use super::table::Table;
+    #[pymodule_export]
+    use super::{main, minimum_phase};
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

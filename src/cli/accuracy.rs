@@ -2,14 +2,14 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use anyhow::Result;
-use clap::Args;
-use std::path::PathBuf;
-use stickslip::accuracy::{
+use crate::accuracy::{
     self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
     hard_cases, scaling_report, solver_in_words, stability_report, study_report,
 };
-use stickslip::table::shown::shown;
+use crate::table::shown::shown;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]

@@ -5,15 +5,15 @@
 use super::exit::{Exit, UsageError};
 use super::output::{self, quoted};
 use super::time;
+use crate::results::layout::Layout;
+use crate::run::threads;
+use crate::sweep::Sweep;
+use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf, absolute};
 use std::time::Duration;
-use stickslip::results::layout::Layout;
-use stickslip::run::threads;
-use stickslip::sweep::Sweep;
-use stickslip::table::shown::shown;
 
 /// Print a script that submits a sweep to a batch system
 #[derive(Debug, Args)]
@@ -91,11 +91,14 @@ struct Submission<'a> {
     options: &'a [String],
 }
 
-pub fn batch(arguments: &Arguments) -> Result<Exit> {
+pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     let sweep = Sweep::from_file(&arguments.sweep)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
-    let program = std::env::current_exe().context("cannot find out where this program lies")?;
+    let program = match program {
+        Some(program) => program.to_owned(),
+        None => std::env::current_exe().context("cannot find out where this program lies")?,
+    };
     let (program, file, root) = (whole_path(&program)?, whole_path(&arguments.sweep)?, whole_path(&root)?);
     let (workers, starts) = (arguments.workers.get(), arguments.starts.unwrap_or(arguments.workers).get());
     if starts < workers {

@@ -2,14 +2,14 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::results::Results;
+use crate::results::compact::Compacted;
+use crate::results::layout::Layout;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use stickslip::results::Results;
-use stickslip::results::compact::Compacted;
-use stickslip::results::layout::Layout;
-use stickslip::table::storage::Disk;
 
 /// Make few large files of the tables of a results directory, the same bytes whatever its history
 #[derive(Debug, Args)]

@@ -1,12 +1,12 @@
 //! Exit codes, and which error ends with which.
 
-use stickslip::figure::FigureError;
-use stickslip::reduce::ReduceError;
-use stickslip::report::ReportError;
-use stickslip::results::{ErrorKind, ResultsError};
-use stickslip::solver::SimulationError;
-use stickslip::sweep::SweepError;
-use stickslip::table::file::DatasetError;
+use crate::figure::FigureError;
+use crate::reduce::ReduceError;
+use crate::report::ReportError;
+use crate::results::{ErrorKind, ResultsError};
+use crate::solver::SimulationError;
+use crate::sweep::SweepError;
+use crate::table::file::DatasetError;
 
 /// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

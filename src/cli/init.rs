@@ -3,17 +3,17 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::sweep::Preset;
+use crate::model::{Description, Parameters, Symbol, Value};
+use crate::observe::{Recording, RecordingKey};
+use crate::solver::Solver;
+use crate::sweep::Sweep;
+use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::Args;
 use std::fmt::Write as _;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
-use stickslip::model::{Description, Parameters, Symbol, Value};
-use stickslip::observe::{Recording, RecordingKey};
-use stickslip::solver::Solver;
-use stickslip::sweep::Sweep;
-use stickslip::table::shown::shown;
 
 /// Write a commented sweep file to start from
 #[derive(Debug, Args)]

@@ -3,10 +3,10 @@
 use super::Cli;
 use super::exit::Exit;
 use super::output;
+use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, CommandFactory};
 use std::path::PathBuf;
-use stickslip::table::shown::shown;
 
 /// Write manual pages, one for each command
 #[derive(Debug, Args)]

@@ -2,13 +2,13 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::results::layout::Layout;
+use crate::results::merge::{Merged, merge as merge_all};
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use stickslip::results::layout::Layout;
-use stickslip::results::merge::{Merged, merge as merge_all};
-use stickslip::table::storage::Disk;
 
 /// Put together the directories of shards that were run without a common disk
 #[derive(Debug, Args)]

@@ -26,7 +26,8 @@ mod verify;
 
 use self::exit::Exit;
 use clap::{Parser, Subcommand};
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::path::Path;
 
 /// Parameter sweeps of stick-slip friction: a slider held by breakable contacts (Capozza et al., PRL 107, 024301, 2011).
 #[derive(Debug, Parser)]
@@ -66,13 +67,14 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Parses the command line, does what it asks, and says how it ended.
-pub fn main() -> ExitCode {
-    let ended = match Cli::parse().command {
+/// Parses a command line, does what it asks, and returns the exit code. `program` is what starts this program again, by
+/// default the executable itself; the first of the arguments is its name.
+pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let ended = match Cli::parse_from(arguments).command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
         Command::Run(arguments) => run::run(&arguments),
-        Command::Batch(arguments) => batch::batch(&arguments),
+        Command::Batch(arguments) => batch::batch(&arguments, program),
         Command::Status(arguments) => status::status(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => plot::plot(&arguments),
@@ -90,7 +92,7 @@ pub fn main() -> ExitCode {
         output::report(&format!("error: {}", message(&error)));
         Exit::of(&error)
     });
-    ExitCode::from(exit as u8)
+    exit as u8
 }
 
 /// An error and its causes, without those that it already quotes.

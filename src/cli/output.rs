@@ -1,10 +1,10 @@
 //! Text for people and JSON for programs.
 
+use crate::table::shown::{is_plain, shown};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use stickslip::table::shown::{is_plain, shown};
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
 pub fn print(text: &str) -> Result<()> {

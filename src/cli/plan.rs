@@ -4,16 +4,16 @@ use super::exit::Exit;
 use super::planning::Planning;
 use super::sweep::{self, Preset};
 use super::{output, signals};
+use crate::results::layout::Layout;
+use crate::results::{ErrorKind, Results};
+use crate::run::{Overview, status};
+use crate::sweep::{Extension, Plan, Sweep};
+use crate::table::shown::{serialize_path, shown};
+use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use stickslip::results::layout::Layout;
-use stickslip::results::{ErrorKind, Results};
-use stickslip::run::{Overview, status};
-use stickslip::sweep::{Extension, Plan, Sweep};
-use stickslip::table::shown::{serialize_path, shown};
-use stickslip::table::storage::{Disk, Storage};
 
 /// Show what a sweep would run, and what of it is done: jobs, parts, predicted cost. Nothing is written
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::sweep::walked;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process::exit;
@@ -12,7 +13,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
-use stickslip::sweep::walked;
 
 /// Time between two looks at the flag and the clock.
 const POLL: Duration = Duration::from_millis(100);

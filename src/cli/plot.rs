@@ -2,14 +2,14 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
+use crate::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use stickslip::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::table::shown::shown;
-use stickslip::table::storage::Disk;
 
 /// Draw the figures of a results directory from its reduced data, or one of your own
 #[derive(Debug, Args)]

@@ -1,11 +1,11 @@
 //! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
 
 use super::output;
+use crate::run::RunEvent;
+use crate::run::threads::Threads;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
-use stickslip::run::RunEvent;
-use stickslip::run::threads::Threads;
 
 /// Time between two plain lines.
 const PLAIN_SPACING: Duration = Duration::from_secs(10);

@@ -2,14 +2,14 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::reduce::ReductionSummary;
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use stickslip::reduce::ReductionSummary;
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::table::shown::shown;
-use stickslip::table::storage::Disk;
 
 /// Reduce the tables of a results directory to Fig. 3-style data
 #[derive(Debug, Args)]
@@ -25,7 +25,7 @@ pub struct Arguments {
 
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    let summary = stickslip::reduce::reduce(&results)?;
+    let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
         output::json(&summary)?;
     } else {
@@ -37,7 +37,7 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
 
 /// Says which jobs were not there to be reduced.
 pub fn report_missing(results: &Results<'_>) -> Result<()> {
-    let overview = stickslip::run::status(results)?.overview;
+    let overview = crate::run::status(results)?.overview;
     if overview.jobs_missing > 0 {
         let (jobs, parts) =
             (output::count(overview.jobs_missing, "job"), output::count(overview.parts_missing, "part"));

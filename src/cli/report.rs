@@ -2,17 +2,17 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::reduce::ReduceError;
+use crate::report::ReportError;
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::run::{RunEvent, RunReport};
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use stickslip::reduce::ReduceError;
-use stickslip::report::ReportError;
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::run::{RunEvent, RunReport};
-use stickslip::table::shown::shown;
-use stickslip::table::storage::Disk;
 
 /// Write one HTML page to explore a results directory in a browser
 #[derive(Debug, Args)]
@@ -37,9 +37,9 @@ pub struct Arguments {
 pub fn report(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let path = match &arguments.output {
-        None => stickslip::report::write(&results, None)?,
+        None => crate::report::write(&results, None)?,
         Some(path) => {
-            let page = stickslip::report::page(&results, None)?;
+            let page = crate::report::page(&results, None)?;
             output::replace(path, |draft| Ok(std::fs::write(draft, &page)?))?;
             path.clone()
         }
@@ -95,7 +95,7 @@ impl<'a> Reporter<'a> {
     }
 
     fn write(&self, refresh: Option<Duration>) -> Result<Option<PathBuf>, ReportError> {
-        match stickslip::report::write(&Results::read(self.layout)?, refresh) {
+        match crate::report::write(&Results::read(self.layout)?, refresh) {
             Err(ReportError::Reduce(ReduceError::NoJobs { .. })) => Ok(None),
             written => Ok(Some(written?)),
         }

@@ -6,21 +6,21 @@ use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
 use super::{output, plot, reduce, signals, time};
+use crate::figure::{Format, draw_all};
+use crate::observe::measure;
+use crate::reduce::ReduceError;
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::run::threads::{self, Threads};
+use crate::run::{Options, RunReport, Shard};
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
-use stickslip::figure::{Format, draw_all};
-use stickslip::observe::measure;
-use stickslip::reduce::ReduceError;
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::run::threads::{self, Threads};
-use stickslip::run::{Options, RunReport, Shard};
-use stickslip::table::shown::shown;
-use stickslip::table::storage::Disk;
 
 /// Run or resume a sweep; then reduce and plot
 #[derive(Debug, Args)]
@@ -115,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
     let mut reporter = arguments.report.then(|| Reporter::new(&layout));
-    let report = stickslip::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
+    let report = crate::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
         drop(planning);
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
@@ -167,7 +167,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 /// Reduces and draws what is there: other shards may be at work still.
 fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
     let results = Results::read(layout)?;
-    let summary = match stickslip::reduce::reduce(&results) {
+    let summary = match crate::reduce::reduce(&results) {
         Err(ReduceError::NoJobs { .. }) => {
             output::report("no part is committed yet, so there is nothing to reduce");
             return Ok(());

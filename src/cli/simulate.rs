@@ -8,6 +8,13 @@ mod outputs;
 use self::outputs::{check_outputs, write_pictures, write_records, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
+use crate::model::{Description, Parameters, Symbol, Value};
+use crate::observe::{Measurements, Recording, RecordingKey, Regime};
+use crate::results::tables;
+use crate::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
+use crate::simulate::{self as single, Request};
+use crate::sweep::{Sweep, SweepError};
+use crate::table::file::Footer;
 use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, FromArgMatches, ValueEnum};
 use serde::Serialize;
@@ -16,13 +23,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-use stickslip::model::{Description, Parameters, Symbol, Value};
-use stickslip::observe::{Measurements, Recording, RecordingKey, Regime};
-use stickslip::results::tables;
-use stickslip::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
-use stickslip::simulate::{self as single, Request};
-use stickslip::sweep::{Sweep, SweepError};
-use stickslip::table::file::Footer;
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]

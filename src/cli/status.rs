@@ -3,15 +3,15 @@
 use super::exit::Exit;
 use super::planning::Planning;
 use super::{output, signals};
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::results::workers::Worker;
+use crate::run::{Failure, Overview, Present};
+use crate::table::shown::shown_text;
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::results::workers::Worker;
-use stickslip::run::{Failure, Overview, Present};
-use stickslip::table::shown::shown_text;
-use stickslip::table::storage::Disk;
 
 /// Show what of a results directory is done, failed and missing, who is at work, and the predicted time left
 #[derive(Debug, Args)]
@@ -33,7 +33,7 @@ pub struct Arguments {
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let planning = Planning::watch(signals::catch()?, None)?;
-    let status = stickslip::run::status(&Results::read(&Layout::new(&Disk, &arguments.directory))?)?;
+    let status = crate::run::status(&Results::read(&Layout::new(&Disk, &arguments.directory))?)?;
     drop(planning);
     let overview = status.overview;
     if arguments.json {

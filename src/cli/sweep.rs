@@ -1,9 +1,9 @@
 //! The sweep that a command is about: a file, or a preset, one of the files of the folder `sweeps/`.
 
+use crate::sweep::{Sweep, SweepError};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use std::path::Path;
-use stickslip::sweep::{Sweep, SweepError};
 
 /// A sweep file that the program holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

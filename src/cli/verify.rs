@@ -2,15 +2,15 @@
 
 use super::exit::Exit;
 use super::output;
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::results::verify::{Problem, Verification};
+use crate::table::shown::{shown, shown_text};
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use stickslip::results::Results;
-use stickslip::results::layout::Layout;
-use stickslip::results::verify::{Problem, Verification};
-use stickslip::table::shown::{shown, shown_text};
-use stickslip::table::storage::Disk;
 
 /// Check that every file of a results directory is whole and every job is there once, and say what to do if not
 #[derive(Debug, Args)]

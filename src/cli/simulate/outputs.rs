@@ -4,17 +4,17 @@ use super::super::exit::UsageError;
 use super::super::output::replace;
 use super::super::plot::format_of;
 use super::{Arguments, Panel};
+use crate::figure::{self, Look, Picture, Simulation};
+use crate::model::Parameters;
+use crate::observe::{ContactRow, Slip};
+use crate::simulate::Records;
+use crate::sweep::Sweep;
+use crate::table::columns::Table;
+use crate::table::file::{Footer, TableWriter};
+use crate::table::shown::shown;
+use crate::table::storage::{Disk, Storage};
 use anyhow::{Result, anyhow};
 use std::path::Path;
-use stickslip::figure::{self, Look, Picture, Simulation};
-use stickslip::model::Parameters;
-use stickslip::observe::{ContactRow, Slip};
-use stickslip::simulate::Records;
-use stickslip::sweep::Sweep;
-use stickslip::table::columns::Table;
-use stickslip::table::file::{Footer, TableWriter};
-use stickslip::table::shown::shown;
-use stickslip::table::storage::{Disk, Storage};
 
 /// Refuses what could not be written, before anything runs.
 pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
