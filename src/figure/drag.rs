@@ -166,7 +166,7 @@ mod tests {
         let on = |stage, n| (0..200).map(move |step| point(Some(stage), 0.03 + 5e-5 * f64::from(step), n));
         let points: Vec<Point> = on(RampStage::Up, 4.0).chain(on(RampStage::Down, 3.0)).collect();
         let svg = drag(&points, &Look::default()).unwrap().svg();
-        for text in ["n = 3", "n = 4", "there", "back", "τ/T"] {
+        for text in ["n = 3", "n = 4", "there", "back", "τ / T"] {
             assert!(svg.contains(text), "{text}");
         }
         let after: Vec<Point> = on(RampStage::After, 4.0).chain([point(None, 0.03, 4.0)]).collect();

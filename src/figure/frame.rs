@@ -346,7 +346,7 @@ mod tests {
             layout.page("", &look, &[]).1.finish().size()
         };
         for style in [Style::Screen, Style::Print] {
-            let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 110.0 } };
+            let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 140.0 } };
             let found = drawn(style, Some(size));
             assert!((found.width - size.width).abs() < 1e-9 && (found.height - size.height).abs() < 1e-9, "{found:?}");
             let found = drawn(style, Some(Size { width: 5.0, height: 5.0 }));

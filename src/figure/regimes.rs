@@ -207,7 +207,7 @@ mod tests {
         for text in
             ["Drive velocity V₀ (m/s)", "Share of time within slips", "Mean friction (N)", "Mean interval τ (s)"]
         {
-            assert!(svg.contains(&format!(">{text}<")), "{text}");
+            assert!(svg.contains(&format!("{text}<")), "{text}");
         }
         assert_eq!(
             svg.matches(&format!("fill=\"{WHITE}\"")).count(),

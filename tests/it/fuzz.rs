@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use stickslip::figure::draw_all;
+use stickslip::figure::{Format, Look, draw_all};
 use stickslip::observe::measure;
 use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, StartupRow, reduce};
 use stickslip::results::Results;
@@ -304,7 +304,7 @@ fn read_all(root: &Path, file: &Path) {
     let _ = Results::verify(&layout);
     if let Ok(results) = Results::read(&layout) {
         if file.starts_with(layout.reduced()) {
-            let _ = draw_all(&layout);
+            let _ = draw_all(&layout, &Look::default(), &Format::ALL);
         } else {
             let _ = status(&results);
             let _ = reduce(&results);
