@@ -50,8 +50,8 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
 
 /// Least time between two reports of a run.
 const MIN_SPACING: Duration = Duration::from_secs(5);
-/// The time between two is so many times as long as one takes, which keeps them below half a percent of the run.
-const SPACING: u32 = 200;
+/// The time between two is so many times as long as one takes, which keeps them below one percent of the run.
+const SPACING: u32 = 100;
 /// How soon a browser is to look again for what other workers write.
 const OTHERS_SPACING: Duration = Duration::from_secs(30);
 
@@ -70,8 +70,8 @@ impl<'a> Reporter<'a> {
         Self { layout, is_due: false, last: None, spacing: MIN_SPACING, has_failed: false }
     }
 
-    /// Writes a report if there is something new and the last is long enough ago. One that cannot be written does not end
-    /// the run.
+    /// Writes a report if there is something new and the last is long enough ago. One that cannot be written does not
+    /// end the run.
     pub fn follow(&mut self, event: &RunEvent) {
         self.is_due |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::OthersDone { jobs: 1.., .. });
         if !self.is_due || self.last.is_some_and(|last| last.elapsed() < self.spacing) {

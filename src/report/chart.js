@@ -8,65 +8,8 @@ const MANY = 4000;
 const HIDDEN = 255;
 
 const cssColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const isDark = () => !document.documentElement.classList.contains("printing") && matchMedia("(prefers-color-scheme: dark)").matches;
-
-class Axis {
-  constructor({ label, log = false, low, high, whole = false }) {
-    Object.assign(this, { label, log, low, high, whole });
-    this.start = log ? Math.log(low) : low;
-    this.span = (log ? Math.log(high) : high) - this.start;
-  }
-
-  /** Where a value lies, from 0 to 1. */
-  place(value) {
-    return ((this.log ? Math.log(value) : value) - this.start) / this.span;
-  }
-
-  value(place) {
-    return this.log ? this.low * (this.high / this.low) ** place : this.low + place * (this.high - this.low);
-  }
-
-  /** Values with their labels; without for those between. */
-  ticks(room) {
-    return this.log && this.high / this.low > 3 ? this.logTicks(room) : this.linearTicks(room);
-  }
-
-  linearTicks(room) {
-    const rough = (this.high - this.low) / Math.max(2, room);
-    const power = 10 ** Math.floor(Math.log10(rough));
-    let step = power * ([1, 2, 5].find((factor) => factor * power >= rough) ?? 10);
-    if (this.whole) step = Math.max(1, Math.round(step));
-    const ticks = [];
-    for (let k = Math.ceil(this.low / step); k * step <= this.high && ticks.length < 40; k++) {
-      ticks.push([k * step, number(k * step, 6)]);
-    }
-    return ticks;
-  }
-
-  logTicks(room) {
-    const [first, last] = [Math.floor(Math.log10(this.low)), Math.ceil(Math.log10(this.high))];
-    const decades = Math.log10(this.high / this.low);
-    const every = Math.max(1, Math.ceil(decades / room));
-    const ticks = [];
-    for (let decade = first; decade <= last; decade++) {
-      for (let digit = 1; digit < 10; digit++) {
-        const value = Number(`${digit}e${decade}`);
-        if (value < this.low || value > this.high) continue;
-        const isLabelled = digit === 1 ? decade % every === 0 : decades < 2 && (digit === 2 || digit === 5);
-        ticks.push([value, isLabelled ? power(digit, decade) : ""]);
-      }
-    }
-    return ticks;
-  }
-}
-
-const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
-
-/** A digit times a power of ten. */
-function power(digit, exponent) {
-  if (exponent >= -3 && exponent <= 3) return number(Number(`${digit}e${exponent}`));
-  return `${digit === 1 ? "" : `${digit}·`}10${[...String(exponent)].map((c) => RAISED[c]).join("")}`;
-}
+const isDark = () =>
+  !document.documentElement.classList.contains("printing") && matchMedia("(prefers-color-scheme: dark)").matches;
 
 const charts = [];
 
@@ -153,7 +96,10 @@ class Chart {
     this.isDue = false;
     if (!this.content) return;
     const { clientWidth: width, clientHeight: height } = this.plot;
-    const scale = Math.max(window.devicePixelRatio || 1, document.documentElement.classList.contains("printing") ? 2 : 1);
+    const scale = Math.max(
+      window.devicePixelRatio || 1,
+      document.documentElement.classList.contains("printing") ? 2 : 1,
+    );
     for (const canvas of [this.base, this.over]) {
       canvas.width = Math.round(width * scale);
       canvas.height = Math.round(height * scale);
@@ -174,7 +120,12 @@ class Chart {
     const [x, y] = this.view ? [this.view.x, this.view.y] : this.content.isSquare ? alike(...ranges) : ranges;
     this.x = new Axis({ ...this.content.x, low: x[0], high: x[1] });
     this.y = new Axis({ ...this.content.y, low: y[0], high: y[1] });
-    this.frame = { left: MARGIN.left, top: MARGIN.top, width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
+    this.frame = {
+      left: MARGIN.left,
+      top: MARGIN.top,
+      width: width - MARGIN.left - MARGIN.right,
+      height: height - MARGIN.top - MARGIN.bottom,
+    };
     this.drawAxes(ctx);
     this.named = null;
     ctx.save();
@@ -203,7 +154,10 @@ class Chart {
     for (const [value, label] of this.x.ticks(width / 75)) {
       const at = Math.round(this.px(value)) + 0.5;
       ctx.strokeStyle = label ? grid : line;
-      stroke(ctx, [[at, label ? top : top + height - 4], [at, top + height]]);
+      stroke(ctx, [
+        [at, label ? top : top + height - 4],
+        [at, top + height],
+      ]);
       ctx.fillText(label, at, top + height + 6);
     }
     ctx.textAlign = "right";
@@ -211,7 +165,10 @@ class Chart {
     for (const [value, label] of this.y.ticks(height / 45)) {
       const at = Math.round(this.py(value)) + 0.5;
       ctx.strokeStyle = label ? grid : line;
-      stroke(ctx, [[left, at], [label ? left + width : left + 4, at]]);
+      stroke(ctx, [
+        [left, at],
+        [label ? left + width : left + 4, at],
+      ]);
       ctx.fillText(label, left - 6, at);
     }
     ctx.strokeStyle = line;
@@ -321,7 +278,10 @@ class Chart {
     for (let k = 0; k < x.length; k++) {
       if ((group && group[k] === HIDDEN) || [x[k], low[k], high[k]].includes(null)) continue;
       const below = this.y.log && low[k] <= 0 ? this.frame.top + this.frame.height : this.py(low[k]);
-      stroke(ctx, [[this.px(x[k]), below], [this.px(x[k]), this.py(high[k])]]);
+      stroke(ctx, [
+        [this.px(x[k]), below],
+        [this.px(x[k]), this.py(high[k])],
+      ]);
     }
   }
 
@@ -399,7 +359,8 @@ class Chart {
       const place = this.places.find(({ layer }) => layer.pick) ?? this.places[0];
       if (!place) return;
       const { left, top, width, height } = this.frame;
-      const isSeen = (k) => place.at[k] >= left && place.at[k] <= left + width && place.up[k] >= top && place.up[k] <= top + height;
+      const isSeen = (k) =>
+        place.at[k] >= left && place.at[k] <= left + width && place.up[k] >= top && place.up[k] <= top + height;
       const order = [...place.at.keys()].filter(isSeen).sort((a, b) => place.at[a] - place.at[b] || a - b);
       const step = event.key === "ArrowRight" ? 1 : -1;
       const now = this.current?.layer === place.layer ? order.indexOf(this.current.k) : step > 0 ? -1 : 0;
@@ -439,7 +400,9 @@ class Chart {
     ctx.arc(found.x, found.y, 6, 0, 7);
     ctx.stroke();
     const tip = element("tip");
-    tip.replaceChildren(...found.layer.tip(found.k).map((line) => (typeof line === "string" ? make("p", {}, line) : line)));
+    tip.replaceChildren(
+      ...found.layer.tip(found.k).map((line) => (typeof line === "string" ? make("p", {}, line) : line)),
+    );
     tip.hidden = false;
     const box = this.over.getBoundingClientRect();
     const [x, y] = [box.left + found.x, box.top + found.y];

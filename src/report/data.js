@@ -23,7 +23,9 @@ function number(value, digits = 4) {
   return Number(value.toPrecision(digits)).toExponential().replace("e+", "e");
 }
 
-const counted = (count, noun) => `${count.toLocaleString("en-US")} ${noun}${count === 1 ? "" : "s"}`;
+/** A count with its digits in groups. */
+const many = (count) => count.toLocaleString("en-US");
+const counted = (count, noun) => `${many(count)} ${noun}${count === 1 ? "" : "s"}`;
 
 /** A duration in s, in the unit that suits it. */
 function duration(seconds) {
@@ -37,7 +39,8 @@ const titled = (column) => (column.unit ? `${column.name} (${column.unit})` : co
 const isNumeric = (column) => column.kind === "real" || column.kind === "count";
 
 /** The columns of a table by name, each with its values. */
-const byName = ({ columns, values }) => new Map(columns.map((column, k) => [column.name, { ...column, values: values[k] }]));
+const byName = ({ columns, values }) =>
+  new Map(columns.map((column, k) => [column.name, { ...column, values: values[k] }]));
 
 /** Unpacks the page's data. */
 async function unpack() {
@@ -101,6 +104,11 @@ class Report {
     return `${this.sets.commands[set]} --set seed=${seed} ${this.sets.command_end}`.trim();
   }
 
+  /** Seeds of the jobs of a set with a slip on the page. */
+  seeds(set) {
+    return this.slips.jobs.filter(([of]) => of === set).map(([, seed]) => seed);
+  }
+
   /** The swept parameters of a set, as a line. */
   settings(set) {
     const shown = this.swept.map(({ key, unit }) => [key, this.values(key)[set], unit]);
@@ -114,7 +122,19 @@ class Report {
 }
 
 // What the reader has chosen: in the fragment of the address, so that it survives a reload and can be shared.
-const state = { set: "", filter: "", colour: "", sort: "", page: "0", columns: "", of: "", x: "", y: "", logx: "", logy: "" };
+const state = {
+  set: "",
+  filter: "",
+  colour: "",
+  sort: "",
+  page: "0",
+  columns: "",
+  of: "",
+  x: "",
+  y: "",
+  logx: "",
+  logy: "",
+};
 
 function readState() {
   for (const [key, value] of new URLSearchParams(location.hash.slice(1))) {

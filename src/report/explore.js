@@ -1,54 +1,4 @@
-// Charts of all sets and of the selected one.
-
-const DISTINCT = 8;
-const CATEGORIES = {
-  light: ["#0072b2", "#d55e00", "#009e73", "#b0408f", "#b07d00", "#3a9bd9", "#6b4ea0", "#8a4b2d"],
-  dark: ["#5eb5f0", "#ff9a5c", "#3fd0a4", "#f08fd0", "#f0c04a", "#9ad5ff", "#b79cf0", "#e0a98a"],
-};
-const GRADIENT = {
-  light: [[62, 38, 130], [49, 104, 142], [33, 145, 140], [74, 180, 90], [176, 190, 20]],
-  dark: [[120, 110, 220], [70, 140, 190], [50, 175, 165], [110, 205, 100], [240, 225, 60]],
-};
-const PALE = { light: "#aeb8c2", dark: "#5a6672" };
-const REGIMES = ["stick-slip", "mixed", "sliding"];
-const ink = (colours) => colours[isDark() ? "dark" : "light"];
-
-/** A colour of the gradient, at a place from 0 to 1. */
-function gradient(place) {
-  const stops = ink(GRADIENT);
-  const at = Math.min(0.9999, Math.max(0, place)) * (stops.length - 1);
-  const [low, high] = [stops[Math.floor(at)], stops[Math.floor(at) + 1]];
-  return `rgb(${low.map((value, k) => Math.round(value + (at % 1) * (high[k] - value))).join(" ")})`;
-}
-
-/** Colours of the sets by a column: of each set its group, and of each group its colour and its words. */
-function colouring(report, name) {
-  const column = report.columns.get(name);
-  const group = new Uint8Array(report.setCount);
-  if (!column) return { group, groups: [[ink(CATEGORIES)[0], ""]] };
-  const { values } = column;
-  const distinct = [...new Set(values)].filter((value) => value !== null);
-  const none = [ink(PALE), "none"];
-  if (!isNumeric(column)) {
-    const words = name === "regime" ? REGIMES : distinct.sort();
-    values.forEach((value, set) => (group[set] = value === null ? words.length : words.indexOf(value)));
-    const shade = (value, k) => (value === false ? ink(PALE) : ink(CATEGORIES)[column.kind === "flag" ? 0 : k % DISTINCT]);
-    const word = (value) => (column.kind === "flag" ? (value ? name : `not ${name}`) : value);
-    return { group, groups: [...words.map((value, k) => [shade(value, k), word(value)]), none] };
-  }
-  distinct.sort((a, b) => a - b);
-  const [low, high] = [distinct[0], distinct[distinct.length - 1]];
-  if (distinct.length <= DISTINCT) {
-    values.forEach((value, set) => (group[set] = value === null ? distinct.length : distinct.indexOf(value)));
-    const shades = distinct.map((value, k) => [gradient(k / Math.max(1, distinct.length - 1)), `${name} = ${number(value)} ${column.unit}`]);
-    return { group, groups: [...shades, none] };
-  }
-  const axis = new Axis({ label: "", log: low > 0 && high / low > 30, low, high });
-  const steps = 24;
-  values.forEach((value, set) => (group[set] = value === null ? steps : Math.min(steps - 1, Math.floor(axis.place(value) * steps))));
-  const legend = (k) => (k % 6 === 0 || k === steps - 1 ? `${k ? "" : `${name}: `}${number(axis.value(k === steps - 1 ? 1 : k / steps), 3)} ${column.unit}` : "");
-  return { group, groups: [...Array.from({ length: steps }, (_, k) => [gradient(k / (steps - 1)), legend(k)]), none] };
-}
+// Charts of all sets, and what is said of their points.
 
 class Explorer {
   constructor(report, select) {
@@ -62,8 +12,7 @@ class Explorer {
       this.ratio = new Chart(element("tau-T"), "τ / T");
     }
     this.free = new Chart(element("free"), "Any against any");
-    this.histogram = new Chart(element("histogram"), "τ");
-    this.sequence = new Chart(element("sequence"), modulated ? "Phases over time" : "Intervals over time");
+    this.setView = new SetView(report, this);
     this.defaults();
     this.fillTools();
   }
@@ -73,7 +22,9 @@ class Explorer {
     const { report } = this;
     const regimes = new Set(report.values("regime"));
     // In the order of the sweep file.
-    const keys = report.axes.flatMap(([keys]) => keys.split(", ")).filter((key) => report.swept.some((swept) => swept.key === key));
+    const keys = report.axes
+      .flatMap(([keys]) => keys.split(", "))
+      .filter((key) => report.swept.some((swept) => swept.key === key));
     const [first, second] = keys.filter((key) => isNumeric(report.columns.get(key)));
     const colour = report.isModulated ? "locked" : regimes.size > 1 ? "regime" : (second ?? "");
     this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
@@ -104,8 +55,13 @@ class Explorer {
     const { report } = this;
     const option = (value, words, chosen) => make("option", { value, selected: value === chosen }, words);
     const colour = element("colour");
-    const names = [...report.columns.values()].filter(({ name, values }) => name !== "set_id" && new Set(values).size > 1);
-    colour.replaceChildren(option("-", "one colour", this.chosen("colour")), ...names.map((column) => option(column.name, titled(column), this.chosen("colour"))));
+    const names = [...report.columns.values()].filter(
+      ({ name, values }) => name !== "set_id" && new Set(values).size > 1,
+    );
+    colour.replaceChildren(
+      option("-", "one colour", this.chosen("colour")),
+      ...names.map((column) => option(column.name, titled(column), this.chosen("colour"))),
+    );
     colour.addEventListener("change", () => {
       keep({ colour: colour.value });
       this.draw();
@@ -121,20 +77,40 @@ class Explorer {
       this.drawFree();
     };
     const choice = (label, key, options) => {
-      const select = make("select", { onchange: () => redraw(key === "of" ? { of: select.value, x: "", y: "", logx: "", logy: "" } : { [key]: select.value, [`log${key}`]: "" }) });
-      select.replaceChildren(...options.map(([value, words]) => make("option", { value, selected: value === this.axisName(key) }, words)));
+      const select = make("select", {
+        onchange: () =>
+          redraw(
+            key === "of"
+              ? { of: select.value, x: "", y: "", logx: "", logy: "" }
+              : { [key]: select.value, [`log${key}`]: "" },
+          ),
+      });
+      select.replaceChildren(
+        ...options.map(([value, words]) => make("option", { value, selected: value === this.axisName(key) }, words)),
+      );
       return make("label", {}, label, select);
     };
     const columns = [...this.table().values()].filter(isNumeric).map((column) => [column.name, titled(column)]);
     const log = (key) => {
-      const box = make("input", { type: "checkbox", checked: this.isLog(key), onchange: () => redraw({ [`log${key}`]: box.checked ? "yes" : "no" }) });
+      const box = make("input", {
+        type: "checkbox",
+        checked: this.isLog(key),
+        onchange: () => redraw({ [`log${key}`]: box.checked ? "yes" : "no" }),
+      });
       return make("label", { class: "inline" }, box, `log ${key}`);
     };
-    const of = choice("Of", "of", [["sets", "sets"], ["slips", "slips"]]);
+    const of = choice("Of", "of", [
+      ["sets", "sets"],
+      ["slips", "slips"],
+    ]);
     const focused = document.activeElement?.closest?.("#free label")?.firstChild?.textContent;
     this.free.controls.className = "tools controls";
     this.free.controls.replaceChildren(of, choice("y", "y", columns), choice("x", "x", columns), log("x"), log("y"));
-    if (focused) [...this.free.controls.children].find((label) => label.firstChild.textContent === focused)?.querySelector("select")?.focus();
+    if (focused)
+      [...this.free.controls.children]
+        .find((label) => label.firstChild.textContent === focused)
+        ?.querySelector("select")
+        ?.focus();
   }
 
   /** The column of an axis of the free chart. */
@@ -172,7 +148,8 @@ class Explorer {
     this.setGroup = group.map((value, set) => (shown[set] ? value : HIDDEN));
     this.slipGroup = Uint8Array.from(report.slipSet, (set) => this.setGroup[set]);
     const used = new Set(this.setGroup);
-    const isSeen = ([, words], k) => words && (used.has(k) || groups.length > DISTINCT + 2) && (words !== "none" || used.has(k));
+    const isSeen = ([, words], k) =>
+      words && (used.has(k) || groups.length > DISTINCT + 2) && (words !== "none" || used.has(k));
     element("legend").replaceChildren(
       ...groups.filter(isSeen).map(([colour, words]) => {
         const swatch = make("span", { class: "swatch" });
@@ -185,7 +162,7 @@ class Explorer {
       this.drawRatio();
     }
     this.drawFree();
-    this.drawSet();
+    this.setView.draw();
   }
 
   /** What is said of a slip. */
@@ -210,9 +187,15 @@ class Explorer {
   /** What is said of a set. */
   setTip(set, names) {
     const { report } = this;
-    const given = names.map((name) => report.columns.get(name)).map(({ name, unit, values }) => `${name} = ${number(values[set])} ${unit}`.trim());
+    const given = names
+      .map((name) => report.columns.get(name))
+      .map(({ name, unit, values }) => `${name} = ${number(values[set])} ${unit}`.trim());
     return [
-      make("strong", {}, `${report.name(set)}: ${counted(report.values("jobs")[set], "job")}, ${counted(report.values("slips")[set], "slip")}`),
+      make(
+        "strong",
+        {},
+        `${report.name(set)}: ${counted(report.values("jobs")[set], "job")}, ${counted(report.values("slips")[set], "slip")}`,
+      ),
       report.settings(set),
       given.join(", "),
       make("code", { class: "command" }, report.command(set, report.seeds(set)[0] ?? 0)),
@@ -234,10 +217,23 @@ class Explorer {
     const [eta, phase] = ["eta", "phase"].map((name) => report.slip.get(name).values);
     const red = ink({ light: "#c22f1c", dark: "#ff7a66" });
     const mean = cssColour("ink");
-    const curve = (k) => ({ x: report.curves.map(([at]) => at), y: report.curves.map((point) => point[k]), type: "line", colour: red });
+    const curve = (k) => ({
+      x: report.curves.map(([at]) => at),
+      y: report.curves.map((point) => point[k]),
+      type: "line",
+      colour: red,
+    });
     const bins = byName(report.backbone);
-    const [centre, locked, low, high] = ["eta_centre", "locked_phase_mean", "locked_phase_mean_low", "locked_phase_mean_high"].map((name) => bins.get(name).values);
-    const binTip = (k) => [make("strong", {}, `${counted(bins.get("locked_sets").values[k], "locked set")} at η = ${number(centre[k])}`), `mean φ = ${number(locked[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`];
+    const [centre, locked, low, high] = [
+      "eta_centre",
+      "locked_phase_mean",
+      "locked_phase_mean_low",
+      "locked_phase_mean_high",
+    ].map((name) => bins.get(name).values);
+    const binTip = (k) => [
+      make("strong", {}, `${counted(bins.get("locked_sets").values[k], "locked set")} at η = ${number(centre[k])}`),
+      `mean φ = ${number(locked[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
+    ];
     this.phase.show({
       x: { label: "η = 2πΔ / (T V0)", log: true },
       y: { label: "φ (rad)" },
@@ -248,7 +244,10 @@ class Explorer {
         { type: "intervals", x: centre, low, high, colour: mean },
         { type: "points", x: centre, y: locked, colours: [mean], size: 4, tip: binTip },
       ],
-      key: [[mean, "mean of locked sets, 95 %"], [red, "φ_min, Eq. 2; dashed: −2√(π/η)", "stroke"]],
+      key: [
+        [mean, "mean of locked sets, 95 %"],
+        [red, "φ_min, Eq. 2; dashed: −2√(π/η)", "stroke"],
+      ],
       empty: "no slip under modulation",
     });
   }
@@ -257,9 +256,18 @@ class Explorer {
     const { report } = this;
     const [period, ratio] = ["T_onset", "tau / T"].map((name) => report.slip.get(name).values);
     const [low, high] = extremes(ratio, this.slipGroup);
-    const whole = [1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 500, 1000].filter((n) => n > 0.7 * low && n < 1.1 * high);
+    const whole = [1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 500, 1000].filter(
+      (n) => n > 0.7 * low && n < 1.1 * high,
+    );
     const ends = extremes(period, this.slipGroup);
-    const line = (n) => ({ type: "line", x: [ends[0] / 2, ends[1] * 2], y: [n, n], colour: cssColour("line"), width: 1, label: `n = ${n}` });
+    const line = (n) => ({
+      type: "line",
+      x: [ends[0] / 2, ends[1] * 2],
+      y: [n, n],
+      colour: cssColour("line"),
+      width: 1,
+      label: `n = ${n}`,
+    });
     this.ratio.show({
       x: { label: "T (s)", log: true },
       y: { label: "τ / T", log: true },
@@ -273,121 +281,58 @@ class Explorer {
     const { report } = this;
     const [x, y] = ["x", "y"].map((key) => this.table().get(this.axisName(key)));
     const axes = { x: { label: titled(x), log: this.isLog("x") }, y: { label: titled(y), log: this.isLog("y") } };
-    const key = [["transparent", `y: ${y.meaning}`], ["transparent", `x: ${x.meaning}`]];
+    const key = [
+      ["transparent", `y: ${y.meaning}`],
+      ["transparent", `x: ${x.meaning}`],
+    ];
     if (this.chosen("of") === "slips") {
-      const layers = this.slipLayers(x.values, y.values).map((layer) => layer.tip ? { ...layer, tip: (slip) => this.slipTip(slip, [x.name, y.name]) } : layer);
+      const layers = this.slipLayers(x.values, y.values).map((layer) =>
+        layer.tip ? { ...layer, tip: (slip) => this.slipTip(slip, [x.name, y.name]) } : layer,
+      );
       this.free.show({ ...axes, layers, key });
       return;
     }
     const pick = (set) => this.select(set);
     const tip = (set) => this.setTip(set, [...new Set([x.name, y.name])]);
-    const points = { type: "points", x: x.values, y: y.values, group: this.setGroup, colours: this.colours, size: 4, alpha: 0.85, tip, pick };
+    const points = {
+      type: "points",
+      x: x.values,
+      y: y.values,
+      group: this.setGroup,
+      colours: this.colours,
+      size: 4,
+      alpha: 0.85,
+      tip,
+      pick,
+    };
     const ends = ["low", "high"].map((end) => report.columns.get(`${y.name}_${end}`)?.values);
-    const bars = ends[0] ? [{ type: "intervals", x: x.values, low: ends[0], high: ends[1], group: this.setGroup, colour: cssColour("muted") }] : [];
-    const own = this.selected < 0 ? [] : [{ ...points, tip: null, group: this.setGroup.map((_, set) => (set === this.selected ? 0 : HIDDEN)), colours: [cssColour("mark")], size: 6, alpha: 1 }];
+    const bars = ends[0]
+      ? [
+          {
+            type: "intervals",
+            x: x.values,
+            low: ends[0],
+            high: ends[1],
+            group: this.setGroup,
+            colour: cssColour("muted"),
+          },
+        ]
+      : [];
+    const own =
+      this.selected < 0
+        ? []
+        : [
+            {
+              ...points,
+              tip: null,
+              group: this.setGroup.map((_, set) => (set === this.selected ? 0 : HIDDEN)),
+              colours: [cssColour("mark")],
+              size: 6,
+              alpha: 1,
+            },
+          ];
     if (bars.length) key.push(["transparent", "vertical bars: 95 % confidence interval"]);
     this.free.show({ ...axes, layers: [...bars, points, ...own], key });
-  }
-
-  /** Charts and facts of the selected set; without one, the intervals of all that are shown. */
-  drawSet() {
-    const { report, selected } = this;
-    const colour = selected < 0 ? ink(CATEGORIES)[0] : cssColour("mark");
-    const mean = report.values("tau_mean");
-    const counts = new Map();
-    const add = (set) => {
-      const bins = report.sets.histograms[set];
-      for (let k = 0; k < bins.length; k += 2) counts.set(bins[k], (counts.get(bins[k]) ?? 0) + bins[k + 1]);
-    };
-    if (selected < 0) this.shown.forEach((isShown, set) => isShown && add(set));
-    else add(selected);
-    const total = [...counts.values()].reduce((sum, count) => sum + count, 0);
-    const bins = [...counts.keys()].sort((a, b) => a - b);
-    const width = (selected < 0 ? 1 : (mean[selected] ?? 1)) / 60;
-    const y = bins.map((bin) => counts.get(bin));
-    const tip = (k) => [`${number(bins[k] * width)} to ${number((bins[k] + 1) * width)}${selected < 0 ? "" : " s"}: ${counted(y[k], "interval")}`];
-    const period = selected < 0 ? null : report.values("T")[selected];
-    const multiples = period && report.values("ramp_time")[selected] === 0 ? this.multiples(period, bins, width, y) : [];
-    this.histogram.title = selected < 0 ? "τ of all sets that are shown" : "τ of the set";
-    this.histogram.show({
-      x: { label: selected < 0 ? "τ / mean τ of its set" : "interval τ (s)" },
-      y: { label: `intervals, of ${total.toLocaleString("en-US")}`, whole: true },
-      layers: [...multiples, { type: "bars", low: bins.map((bin) => bin * width), high: bins.map((bin) => (bin + 1) * width), y, colour, tip }],
-      key: multiples.length ? [[cssColour("muted"), "whole numbers of periods", "stroke"]] : [],
-      empty: "no interval between slips",
-    });
-    this.drawSequence(colour);
-  }
-
-  /** Lines at whole numbers of periods, if they are far enough apart to be seen. */
-  multiples(period, bins, width, y) {
-    if (!bins.length) return [];
-    const [low, high] = [bins[0] * width, (bins[bins.length - 1] + 1) * width];
-    if ((high - low) / period > 60) return [];
-    const lines = [];
-    for (let n = Math.max(1, Math.ceil(low / period)); n * period <= high; n++) {
-      lines.push({ type: "line", x: [n * period, n * period], y: [0, Math.max(...y) * 1.04], colour: cssColour("muted"), width: 1, dash: [2, 3] });
-    }
-    return lines;
-  }
-
-  drawSequence() {
-    const { report, selected } = this;
-    const name = report.isModulated ? "phase" : "interval";
-    const slips = [...report.slipSet.keys()].filter((slip) => report.slipSet[slip] === selected);
-    const [x, y] = ["onset", name].map((column) => slips.map((slip) => report.slip.get(column).values[slip]));
-    const jobs = [...new Set(slips.map((slip) => report.slipJob[slip]))];
-    const group = Uint8Array.from(slips, (slip) => jobs.indexOf(report.slipJob[slip]) % DISTINCT);
-    const tip = (k) => this.slipTip(slips[k]);
-    const shades = ink(CATEGORIES);
-    const seeds = jobs.slice(0, DISTINCT).map((job, k) => [shades[k], `seed ${report.slips.jobs[job][1]}`]);
-    this.sequence.show({
-      x: { label: "time t of the onset (s)" },
-      y: { label: name === "phase" ? "φ (rad)" : "τ (s)" },
-      layers: [{ type: "points", x, y, group, colours: shades, size: 3.5, tip }],
-      key: jobs.length > DISTINCT ? [["transparent", `${jobs.length} seeds`]] : seeds,
-      empty: selected < 0 ? "select a set: click a point, or a row of the table" : "the set has no slips here",
-    });
-    this.facts();
-  }
-
-  facts() {
-    const { report, selected } = this;
-    const facts = element("set-facts");
-    if (selected < 0) {
-      facts.replaceChildren(make("p", {}, "None is selected. Click a point of a chart, or a row of the table."));
-      return;
-    }
-    const value = (name) => {
-      const { values, unit } = report.columns.get(name);
-      return `${typeof values[selected] === "boolean" ? (values[selected] ? "yes" : "no") : number(values[selected])} ${unit}`.trim();
-    };
-    const interval = (name) => (report.values(`${name}_low`)[selected] === null ? value(name) : `${value(name)} (95 %: ${number(report.values(`${name}_low`)[selected])} to ${number(report.values(`${name}_high`)[selected])})`);
-    const swept = report.swept.map(({ key, meaning }) => [`${key}, ${meaning}`, value(key)]);
-    const modulated = report.isModulated ? [["eta", value("eta")], ["locked", value("locked")], ["locking index", interval("locking_index")], ["mean phase", interval("phase_mean")], ["resultant length", interval("resultant_length")]] : [];
-    const rows = [
-      ["regime", value("regime")],
-      ["jobs, failed", `${value("jobs")}, ${value("failed_jobs")}`],
-      ["slips", value("slips")],
-      ["mean interval", interval("tau_mean")],
-      ["mean stress drop", interval("drop_mean")],
-      ["mean friction", interval("mean_friction")],
-    ];
-    const list = (pairs) => make("dl", {}, ...pairs.flatMap(([term, words]) => [make("dt", {}, term), make("dd", {}, words)]));
-    const seeds = report.seeds(selected);
-    const code = make("code", { class: "command" });
-    const input = make("input", { type: "number", min: "0", step: "1", value: seeds[0] ?? 0, list: "seeds" });
-    const show = () => (code.textContent = report.command(selected, input.value || 0));
-    input.addEventListener("input", show);
-    show();
-    facts.replaceChildren(
-      make("p", {}, make("strong", {}, "Set "), make("code", {}, report.setIds[selected]), " ", make("button", { type: "button", onclick: () => this.select(-1) }, "Deselect")),
-      make("div", { class: "facts" }, list([...swept, ...rows.slice(0, 3)]), list([...rows.slice(3), ...modulated])),
-      make("label", {}, "One of its jobs alone, with seed ", input),
-      make("datalist", { id: "seeds" }, ...seeds.map((seed) => make("option", { value: seed }))),
-      code,
-      make("p", { class: "hint" }, "A sweep records no traces. With --plot trace.png this command draws the shear force over time; with --trace trace.parquet it writes it."),
-    );
   }
 }
 
@@ -401,8 +346,3 @@ function extremes(values, group) {
   }
   return [low, high];
 }
-
-/** Seeds of the jobs of a set with a slip on the page. */
-Report.prototype.seeds = function seeds(set) {
-  return this.slips.jobs.filter(([of]) => of === set).map(([, seed]) => seed);
-};

@@ -8,23 +8,24 @@ const QUIET = 4000;
 function follow(report) {
   const live = element("live");
   const { status } = report;
+  const total = status.jobs_done + status.jobs_failed + status.jobs_missing;
   if (!report.live) {
-    const missing = status.jobs_missing > 0;
-    live.hidden = !missing;
-    live.textContent = `${counted(status.jobs_missing, "job")} of ${(status.jobs_done + status.jobs_failed + status.jobs_missing).toLocaleString("en-US")} were missing when this page was written; stickslip run resumes with them.`;
+    live.hidden = status.jobs_missing === 0;
+    const missing = `${counted(status.jobs_missing, "job")} of ${many(total)}`;
+    live.textContent = `${missing} were missing when this page was written; stickslip run resumes with them.`;
     return;
   }
   const { refresh, written } = report.live;
   const seen = notes.get("seen");
   const unchanged = seen?.written === written ? seen.unchanged + 1 : 0;
   notes.set("seen", { written, unchanged });
-  const total = status.jobs_done + status.jobs_failed + status.jobs_missing;
   const share = Math.floor((100 * (total - status.jobs_missing)) / total);
   const left = status.time_left === null ? "" : `, about ${duration(status.time_left)} left`;
   const when = new Date(1000 * written).toLocaleTimeString();
   const isStale = unchanged >= PATIENCE;
   live.hidden = false;
-  live.textContent = `Running: ${share} % of ${counted(total, "job")}${left}. Written at ${when}. ${isStale ? "It has not changed for some time: reload it by hand." : "The page reloads by itself."}`;
+  const next = isStale ? "It has not changed for some time: reload it by hand." : "The page reloads by itself.";
+  live.textContent = `Running: ${share} % of ${counted(total, "job")}${left}. Written at ${when}. ${next}`;
   if (isStale) return;
   let touched = 0;
   for (const kind of ["pointermove", "pointerdown", "keydown", "wheel", "touchstart"]) {
@@ -54,8 +55,11 @@ async function start() {
   const apply = () => {
     const { shown, problems } = filtered(report, state.filter);
     const left = shown.reduce((sum, isShown) => sum + isShown, 0);
-    const hint = "Examples: V0>1e-5, regime=sliding, locked=true, or the first characters of a set. All conditions must hold.";
-    element("filter-note").textContent = problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${report.setCount.toLocaleString("en-US")} fit.` : hint);
+    const hint =
+      "Examples: V0>1e-5, regime=sliding, locked=true, or the first characters of a set. All conditions must hold.";
+    element("filter-note").textContent =
+      problems.join(" ") ||
+      (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
     element("filter-note").classList.toggle("bad", problems.length > 0);
     filter.setAttribute("aria-invalid", String(problems.length > 0));
     table.draw(shown);
@@ -111,8 +115,13 @@ async function start() {
 function writeSamples(report) {
   const { slips, sets_every: sets, census, setCount } = report;
   const samples = [];
-  if (sets > 1) samples.push(`The page has one in ${sets} of ${counted(census.sets, "set")}, ${setCount.toLocaleString("en-US")} in all.`);
-  if (slips.every > 1) samples.push(`The charts of slips have one in ${slips.every} slips of these sets, ${slips.rows.toLocaleString("en-US")} in all; histograms and statistics count every slip.`);
+  if (sets > 1) {
+    samples.push(`The page has one in ${sets} of ${counted(census.sets, "set")}, ${many(setCount)} in all.`);
+  }
+  if (slips.every > 1) {
+    samples.push(`The charts have one in ${slips.every} slips of these sets, ${many(slips.rows)} in all.`);
+    samples.push("Histograms and statistics count every slip.");
+  }
   element("sample-note").textContent = samples.join(" ");
   element("sample-note").hidden = samples.length === 0;
 }

@@ -7,9 +7,8 @@
 //! page.rs      content and page.html, style.css, *.js -> one file
 //! ```
 //!
-//! No chart library: the crate `plotly` 0.14 brings 7.6 MB of scripts into the program and 1.9 MB, compressed, into each
-//! page; crates of lighter libraries load them from the network. `chart.js` draws 100,000 points on a canvas, and no more
-//! is needed.
+//! No chart library: the crate `plotly` 0.14 would bring 7.6 MB of scripts into the program, and 1.9 MB into each page,
+//! compressed. `chart.js` draws 100,000 points on a canvas, and no more is needed.
 
 mod content;
 mod page;

@@ -11,10 +11,13 @@ use std::io::{self, Write};
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
 /// In the order in which they need each other.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("data.js"),
+    include_str!("axis.js"),
     include_str!("chart.js"),
+    include_str!("colours.js"),
     include_str!("table.js"),
+    include_str!("set.js"),
     include_str!("explore.js"),
     include_str!("sections.js"),
     include_str!("main.js"),

@@ -9,26 +9,52 @@ function writeSweep(report) {
   const { status, census } = report;
   element("title").textContent = status.name;
   document.title = `${status.name} – stickslip report`;
-  const failed = status.jobs_failed ? `, ${status.jobs_failed.toLocaleString("en-US")} failed` : "";
-  const missing = status.jobs_missing ? `, ${status.jobs_missing.toLocaleString("en-US")} missing` : "";
-  element("summary").textContent = `Report of stickslip: ${counted(census.sets, "parameter set")}, ${counted(status.jobs_done, "job")} done${failed}${missing}, ${counted(census.slips, "slip")}.`;
+  const failed = status.jobs_failed ? `, ${many(status.jobs_failed)} failed` : "";
+  const missing = status.jobs_missing ? `, ${many(status.jobs_missing)} missing` : "";
+  const done = `${counted(census.sets, "parameter set")}, ${counted(status.jobs_done, "job")} done${failed}${missing}`;
+  element("summary").textContent = `Report of stickslip: ${done}, ${counted(census.slips, "slip")}.`;
   const axis = new Map(report.axes.flatMap(([keys, count]) => keys.split(", ").map((key) => [key, count])));
   const swept = report.swept.map(({ key, symbol, unit, meaning }) => {
     const values = report.values(key).filter((value) => value !== null);
     const distinct = [...new Set(values)];
     const isNumber = typeof distinct[0] === "number";
-    const range = isNumber ? [distinct.reduce((a, b) => Math.min(a, b)), distinct.reduce((a, b) => Math.max(a, b))] : null;
-    const words = distinct.length <= 6 ? distinct.sort((a, b) => a - b).map((value) => number(value)).join(", ") : `${number(range[0])} to ${number(range[1])}`;
-    return [symbol && symbol !== key ? `${key} (${symbol})` : key, meaning, distinct.length.toLocaleString("en-US"), words, unit];
+    const range = isNumber
+      ? [distinct.reduce((a, b) => Math.min(a, b)), distinct.reduce((a, b) => Math.max(a, b))]
+      : null;
+    const words =
+      distinct.length <= 6
+        ? distinct
+            .sort((a, b) => a - b)
+            .map((value) => number(value))
+            .join(", ")
+        : `${number(range[0])} to ${number(range[1])}`;
+    return [
+      symbol && symbol !== key ? `${key} (${symbol})` : key,
+      meaning,
+      many(distinct.length),
+      words,
+      unit,
+    ];
   });
   const derived = [...axis].filter(([key]) => !report.swept.some((parameter) => parameter.key === key));
-  const others = derived.map(([key, count]) => [key, key === "seed" ? "realisations of the disorder" : "fixes the period T", count.toLocaleString("en-US"), "", ""]);
+  const others = derived.map(([key, count]) => [
+    key,
+    key === "seed" ? "realisations of the disorder" : "fixes the period T",
+    many(count),
+    "",
+    "",
+  ]);
   element("swept").replaceChildren(...rows(["Parameter", "Meaning", "Values", "Range", "Unit"], [...swept, ...others]));
   const fixed = report.fixed.map(({ key, unit, meaning }) => [key, meaning, number(report.values(key)[0], 6), unit]);
   element("fixed").replaceChildren(...rows(["Parameter", "Meaning", "Value", "Unit"], fixed));
   const last = report.sweeps.length - 1;
   element("sweep-files").replaceChildren(
-    ...report.sweeps.flatMap((text, k) => [last > 0 ? make("h3", {}, k === last ? "The last sweep" : `Sweep ${k + 1}, extended since`) : null, make("pre", { tabindex: "0" }, text)].filter(Boolean)),
+    ...report.sweeps.flatMap((text, k) =>
+      [
+        last > 0 ? make("h3", {}, k === last ? "The last sweep" : `Sweep ${k + 1}, extended since`) : null,
+        make("pre", { tabindex: "0" }, text),
+      ].filter(Boolean),
+    ),
   );
 }
 
@@ -47,10 +73,31 @@ function writeRegimes(report, filterBy) {
     const swatch = make("span", { class: "swatch" });
     swatch.style.background = part.style.background;
     const choose = () => filterBy(`regime=${regime || "null"}`);
-    return make("li", {}, swatch, `${regime || "no finished job"}: ${counted(count, "set")} `, make("button", { type: "button", onclick: choose, "aria-label": `Filter: ${regime || "no finished job"}` }, "Filter"));
+    return make(
+      "li",
+      {},
+      swatch,
+      `${regime || "no finished job"}: ${counted(count, "set")} `,
+      make(
+        "button",
+        { type: "button", onclick: choose, "aria-label": `Filter: ${regime || "no finished job"}` },
+        "Filter",
+      ),
+    );
   });
   if (report.isModulated) {
-    words.push(make("li", {}, `locked to the modulation: ${counted(locked, "set")} of ${sets.toLocaleString("en-US")} `, make("button", { type: "button", onclick: () => filterBy("locked=true"), "aria-label": "Filter: locked" }, "Filter")));
+    words.push(
+      make(
+        "li",
+        {},
+        `locked to the modulation: ${counted(locked, "set")} of ${many(sets)} `,
+        make(
+          "button",
+          { type: "button", onclick: () => filterBy("locked=true"), "aria-label": "Filter: locked" },
+          "Filter",
+        ),
+      ),
+    );
   }
   element("regimes").replaceChildren(make("h3", {}, "Regimes"), bar, make("ul", { class: "legend" }, ...words));
 }
@@ -59,11 +106,22 @@ function writeFailures(report) {
   const { jobs_failed: failed, failures } = report.status;
   element("failures").hidden = failed === 0;
   document.querySelector("nav a[href='#failures']").hidden = failed === 0;
-  const rest = failed > failures.length ? ` The first ${failures.length} are here; all are in tables/jobs, with outcome and reason.` : "";
-  element("failures-note").textContent = `${counted(failed, "job")} failed.${rest} Each command runs one of them alone; run --retry-failed runs all of them again.`;
+  const rest =
+    failed > failures.length
+      ? ` The first ${failures.length} are here; all are in tables/jobs, with outcome and reason.`
+      : "";
+  element("failures-note").textContent =
+    `${counted(failed, "job")} failed.${rest} Each command runs one of them alone; run --retry-failed runs all of them again.`;
   element("failures-list").replaceChildren(
     ...failures.map(({ job_id: id, reason, command }) =>
-      make("li", {}, make("span", { class: "bad" }, reason), " ", make("small", {}, `job ${id}`), make("code", { class: "command" }, command)),
+      make(
+        "li",
+        {},
+        make("span", { class: "bad" }, reason),
+        " ",
+        make("small", {}, `job ${id}`),
+        make("code", { class: "command" }, command),
+      ),
     ),
   );
 }
@@ -73,14 +131,21 @@ function writeCost(report) {
   const chart = (report.costChart ??= new Chart(element("cost-chart"), "CPU time of parts"));
   const ratio = measured / predicted;
   const left = report.status.time_left;
-  const rest = report.status.jobs_missing && left !== null ? ` What is missing takes about ${duration(left)} of wall time at the pace so far.` : "";
+  const rest =
+    report.status.jobs_missing && left !== null
+      ? ` What is missing takes about ${duration(left)} of wall time at the pace so far.`
+      : "";
+  const took = `took ${duration(measured)} of CPU time, predicted were ${duration(predicted)}`;
   element("cost-note").textContent = jobs
-    ? `${counted(jobs, "job")} in ${counted(parts, "part")} took ${duration(measured)} of CPU time, predicted were ${duration(predicted)}: a ratio of ${number(ratio, 3)}.${rest}`
+    ? `${counted(jobs, "job")} in ${counted(parts, "part")} ${took}: a ratio of ${number(ratio, 3)}.${rest}`
     : "No log has the cost of a part: the tables were merged or copied from elsewhere.";
   const [x, y] = [2, 3].map((k) => shown.map((part) => part[k]));
   const both = [...x, ...y].filter((value) => value > 0);
   const ends = [both.reduce((a, b) => Math.min(a, b), 1e3) / 10, both.reduce((a, b) => Math.max(a, b), 1e-6) * 10];
-  const tip = (k) => [make("strong", {}, shown[k][0]), `${counted(shown[k][1], "job")}: predicted ${duration(x[k])}, measured ${duration(y[k])}, ratio ${number(y[k] / x[k], 3)}`];
+  const tip = (k) => [
+    make("strong", {}, shown[k][0]),
+    `${counted(shown[k][1], "job")}: predicted ${duration(x[k])}, measured ${duration(y[k])}, ratio ${number(y[k] / x[k], 3)}`,
+  ];
   chart.show({
     x: { label: "predicted CPU time (s)", log: true },
     y: { label: "measured CPU time (s)", log: true },
@@ -103,7 +168,15 @@ function writeProvenance(report) {
     ["directory", report.directory],
     ["parts", `${report.status.parts_done} done, ${report.status.parts_missing} missing`],
   ];
-  element("versions").replaceChildren(...versions.flatMap(([term, words]) => [make("dt", {}, term), make("dd", {}, String(words))]));
-  const runs = report.runs.map(({ program, host, threads, jobs, ended }) => [program, host, String(threads), jobs.toLocaleString("en-US"), ended ? `${counted(ended[0], "job")} in ${duration(ended[1])}` : "at work, or killed"]);
+  element("versions").replaceChildren(
+    ...versions.flatMap(([term, words]) => [make("dt", {}, term), make("dd", {}, String(words))]),
+  );
+  const runs = report.runs.map(({ program, host, threads, jobs, ended }) => [
+    program,
+    host,
+    String(threads),
+    many(jobs),
+    ended ? `${counted(ended[0], "job")} in ${duration(ended[1])}` : "at work, or killed",
+  ]);
   element("runs").replaceChildren(...rows(["Run by", "Host", "Threads", "Jobs to run", "Ran"], runs));
 }

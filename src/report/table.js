@@ -36,7 +36,11 @@ function condition(report, word) {
 
 /** Which sets fulfil all words of a filter, and what is wrong with it. */
 function filtered(report, text) {
-  const words = text.toLowerCase().replace(/\s*(<=|>=|!=|==|=|<|>)\s*/g, "$1").split(/\s+/).filter(Boolean);
+  const words = text
+    .toLowerCase()
+    .replace(/\s*(<=|>=|!=|==|=|<|>)\s*/g, "$1")
+    .split(/\s+/)
+    .filter(Boolean);
   const conditions = words.map((word) => condition(report, word));
   const problems = conditions.filter((one) => typeof one === "string");
   const tests = conditions.filter((one) => typeof one !== "string");
@@ -125,8 +129,19 @@ class SetTable {
       this.table.querySelector(`th[data-column="${name}"] button`)?.focus();
     };
     const order = isSorted ? (direction === "up" ? "ascending" : "descending") : null;
-    const attributes = { scope: "col", "data-column": name, "aria-sort": order, title: column.meaning, class: isNumeric(column) ? "number" : "text" };
-    return make("th", attributes, make("button", { type: "button", onclick: sort }, name), make("small", {}, column.unit || " "));
+    const attributes = {
+      scope: "col",
+      "data-column": name,
+      "aria-sort": order,
+      title: column.meaning,
+      class: isNumeric(column) ? "number" : "text",
+    };
+    return make(
+      "th",
+      attributes,
+      make("button", { type: "button", onclick: sort }, name),
+      make("small", {}, column.unit || " "),
+    );
   }
 
   row(set, names) {
@@ -147,7 +162,8 @@ class SetTable {
     const head = make("thead", {}, make("tr", {}, first, ...names.map((name) => this.head(name))));
     const rows = order.slice(page * ROWS, (page + 1) * ROWS).map((set) => this.row(set, names));
     this.table.replaceChildren(head, make("tbody", {}, ...rows));
-    element("sets-note").textContent = `${counted(order.length, "set")} of ${this.report.setCount.toLocaleString("en-US")}; all seeds of a set together, units are SI.`;
+    element("sets-note").textContent =
+      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together, units are SI.`;
     element("page").textContent = `Page ${page + 1} of ${pages}`;
     element("earlier").disabled = page === 0;
     element("later").disabled = page === pages - 1;

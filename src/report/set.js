@@ -1,0 +1,157 @@
+// The selected set: its intervals, its slips over time, its statistics and its command.
+
+class SetView {
+  constructor(report, explorer) {
+    this.report = report;
+    this.explorer = explorer;
+    this.histogram = new Chart(element("histogram"), "τ");
+    this.sequence = new Chart(element("sequence"), report.isModulated ? "Phases over time" : "Intervals over time");
+  }
+
+  /** Charts and facts of the selected set; without one, the intervals of all that are shown. */
+  draw() {
+    const { report } = this;
+    const { selected, shown } = this.explorer;
+    const colour = selected < 0 ? ink(CATEGORIES)[0] : cssColour("mark");
+    const mean = report.values("tau_mean");
+    const counts = new Map();
+    const add = (set) => {
+      const bins = report.sets.histograms[set];
+      for (let k = 0; k < bins.length; k += 2) counts.set(bins[k], (counts.get(bins[k]) ?? 0) + bins[k + 1]);
+    };
+    if (selected < 0) shown.forEach((isShown, set) => isShown && add(set));
+    else add(selected);
+    const total = [...counts.values()].reduce((sum, count) => sum + count, 0);
+    const bins = [...counts.keys()].sort((a, b) => a - b);
+    const width = (selected < 0 ? 1 : (mean[selected] ?? 1)) / 60;
+    const y = bins.map((bin) => counts.get(bin));
+    const tip = (k) => [
+      `${number(bins[k] * width)} to ${number((bins[k] + 1) * width)}${selected < 0 ? "" : " s"}: ${counted(y[k], "interval")}`,
+    ];
+    const period = selected < 0 ? null : report.values("T")[selected];
+    const multiples =
+      period && report.values("ramp_time")[selected] === 0 ? this.multiples(period, bins, width, y) : [];
+    this.histogram.title = selected < 0 ? "τ of all sets that are shown" : "τ of the set";
+    this.histogram.show({
+      x: { label: selected < 0 ? "τ / mean τ of its set" : "interval τ (s)" },
+      y: { label: `intervals, of ${many(total)}`, whole: true },
+      layers: [
+        ...multiples,
+        {
+          type: "bars",
+          low: bins.map((bin) => bin * width),
+          high: bins.map((bin) => (bin + 1) * width),
+          y,
+          colour,
+          tip,
+        },
+      ],
+      key: multiples.length ? [[cssColour("muted"), "whole numbers of periods", "stroke"]] : [],
+      empty: "no interval between slips",
+    });
+    this.drawSequence();
+  }
+
+  /** Lines at whole numbers of periods, if they are far enough apart to be seen. */
+  multiples(period, bins, width, y) {
+    if (!bins.length) return [];
+    const [low, high] = [bins[0] * width, (bins[bins.length - 1] + 1) * width];
+    if ((high - low) / period > 60) return [];
+    const lines = [];
+    for (let n = Math.max(1, Math.ceil(low / period)); n * period <= high; n++) {
+      lines.push({
+        type: "line",
+        x: [n * period, n * period],
+        y: [0, Math.max(...y) * 1.04],
+        colour: cssColour("muted"),
+        width: 1,
+        dash: [2, 3],
+      });
+    }
+    return lines;
+  }
+
+  drawSequence() {
+    const { report } = this;
+    const { selected } = this.explorer;
+    const name = report.isModulated ? "phase" : "interval";
+    const slips = [...report.slipSet.keys()].filter((slip) => report.slipSet[slip] === selected);
+    const [x, y] = ["onset", name].map((column) => slips.map((slip) => report.slip.get(column).values[slip]));
+    const jobs = [...new Set(slips.map((slip) => report.slipJob[slip]))];
+    const group = Uint8Array.from(slips, (slip) => jobs.indexOf(report.slipJob[slip]) % DISTINCT);
+    const tip = (k) => this.explorer.slipTip(slips[k]);
+    const shades = ink(CATEGORIES);
+    const seeds = jobs.slice(0, DISTINCT).map((job, k) => [shades[k], `seed ${report.slips.jobs[job][1]}`]);
+    this.sequence.show({
+      x: { label: "time t of the onset (s)" },
+      y: { label: name === "phase" ? "φ (rad)" : "τ (s)" },
+      layers: [{ type: "points", x, y, group, colours: shades, size: 3.5, tip }],
+      key: jobs.length > DISTINCT ? [["transparent", `${jobs.length} seeds`]] : seeds,
+      empty: selected < 0 ? "select a set: click a point, or a row of the table" : "the set has no slips here",
+    });
+    this.facts();
+  }
+
+  facts() {
+    const { report } = this;
+    const { selected } = this.explorer;
+    const facts = element("set-facts");
+    if (selected < 0) {
+      facts.replaceChildren(make("p", {}, "None is selected. Click a point of a chart, or a row of the table."));
+      return;
+    }
+    const value = (name) => {
+      const { values, unit } = report.columns.get(name);
+      return `${typeof values[selected] === "boolean" ? (values[selected] ? "yes" : "no") : number(values[selected])} ${unit}`.trim();
+    };
+    const interval = (name) =>
+      report.values(`${name}_low`)[selected] === null
+        ? value(name)
+        : `${value(name)} (95 %: ${number(report.values(`${name}_low`)[selected])} to ${number(report.values(`${name}_high`)[selected])})`;
+    const swept = report.swept.map(({ key, meaning }) => [`${key}, ${meaning}`, value(key)]);
+    const modulated = report.isModulated
+      ? [
+          ["eta", value("eta")],
+          ["locked", value("locked")],
+          ["locking index", interval("locking_index")],
+          ["mean phase", interval("phase_mean")],
+          ["resultant length", interval("resultant_length")],
+        ]
+      : [];
+    const rows = [
+      ["regime", value("regime")],
+      ["jobs, failed", `${value("jobs")}, ${value("failed_jobs")}`],
+      ["slips", value("slips")],
+      ["mean interval", interval("tau_mean")],
+      ["mean stress drop", interval("drop_mean")],
+      ["mean friction", interval("mean_friction")],
+    ];
+    const list = (pairs) =>
+      make("dl", {}, ...pairs.flatMap(([term, words]) => [make("dt", {}, term), make("dd", {}, words)]));
+    const seeds = report.seeds(selected);
+    const code = make("code", { class: "command" });
+    const input = make("input", { type: "number", min: "0", step: "1", value: seeds[0] ?? 0, list: "seeds" });
+    const show = () => (code.textContent = report.command(selected, input.value || 0));
+    input.addEventListener("input", show);
+    show();
+    facts.replaceChildren(
+      make(
+        "p",
+        {},
+        make("strong", {}, "Set "),
+        make("code", {}, report.setIds[selected]),
+        " ",
+        make("button", { type: "button", onclick: () => this.explorer.select(-1) }, "Deselect"),
+      ),
+      make("div", { class: "facts" }, list([...swept, ...rows.slice(0, 3)]), list([...rows.slice(3), ...modulated])),
+      make("label", {}, "One of its jobs alone, with seed ", input),
+      make("datalist", { id: "seeds" }, ...seeds.map((seed) => make("option", { value: seed }))),
+      code,
+      make(
+        "p",
+        { class: "hint" },
+        "A sweep records no traces. With --plot trace.png this command draws the shear force over time; with --trace trace.parquet it writes it.",
+      ),
+    );
+  }
+}
