@@ -58,8 +58,7 @@ async function start() {
     const hint =
       "Examples: V0>1e-5, regime=sliding, locked=true, or the first characters of a set. All conditions must hold.";
     element("filter-note").textContent =
-      problems.join(" ") ||
-      (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
+      problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
     element("filter-note").classList.toggle("bad", problems.length > 0);
     filter.setAttribute("aria-invalid", String(problems.length > 0));
     table.draw(shown);

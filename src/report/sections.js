@@ -28,13 +28,7 @@ function writeSweep(report) {
             .map((value) => number(value))
             .join(", ")
         : `${number(range[0])} to ${number(range[1])}`;
-    return [
-      symbol && symbol !== key ? `${key} (${symbol})` : key,
-      meaning,
-      many(distinct.length),
-      words,
-      unit,
-    ];
+    return [symbol && symbol !== key ? `${key} (${symbol})` : key, meaning, many(distinct.length), words, unit];
   });
   const derived = [...axis].filter(([key]) => !report.swept.some((parameter) => parameter.key === key));
   const others = derived.map(([key, count]) => [

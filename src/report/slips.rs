@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn numbers_keep_five_digits_and_what_is_missing_is_not_a_number() {
         let back = |cell| f32::from_bits(bits(cell));
-        for real in [0.137_123_456, -3.141_592_65, 1e-9, 5e7, 476.951_234] {
+        for real in [0.137_123_456, -3.051_592_65, 1e-9, 5e7, 476.951_234] {
             assert!((f64::from(back(Cell::Real(real))) / real - 1.0).abs() < 8e-6, "{real}");
         }
         assert_eq!((back(Cell::Count(131_071)), back(Cell::Real(0.0))), (131_071.0, 0.0));

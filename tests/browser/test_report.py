@@ -217,7 +217,7 @@ def test_a_page_with_a_hundred_thousand_slips_is_small_and_quick(browser, report
 
 def test_a_page_reloads_while_a_run_goes_on_and_stops_at_its_end(browser, program, tmp_path):
     sweep, results = tmp_path / "sweep.toml", tmp_path / "results"
-    sweep.write_text(LARGE.replace("count = 2 }", "count = 100000 }"))
+    sweep.write_text(LARGE.replace("count = 2 }", "count = 400 }"))
     run = [program, "run", sweep, "--out", results, "--report", "--threads", "1"]
     child = subprocess.Popen(run, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
