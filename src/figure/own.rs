@@ -139,10 +139,8 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
         if groups.len() > 1 {
             frame.heading(&mut sheet, title, "");
         }
-        if index + 1 == layout.columns.min(groups.len()) {
-            if let Some(bar) = hues.as_ref().and_then(Hues::bar) {
-                bar.draw(&mut sheet, &frame);
-            }
+        if let Some(bar) = hues.as_ref().and_then(Hues::bar).filter(|_| index + 1 == layout.columns.min(groups.len())) {
+            bar.draw(&mut sheet, &frame);
         }
     }
     Ok(sheet.finish())
