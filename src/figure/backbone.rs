@@ -79,8 +79,11 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummar
     Some(sheet.finish())
 }
 
+/// η, mean phase in rad, and the ends of its interval.
+type Average = (f64, f64, Option<(f64, f64)>);
+
 /// Mean phases of the locked sets of each bin, at the mean η of these sets, with their intervals.
-fn averages(bins: &[BackboneBin], sets: &[SetSummary]) -> Vec<(f64, f64, Option<(f64, f64)>)> {
+fn averages(bins: &[BackboneBin], sets: &[SetSummary]) -> Vec<Average> {
     let average = |bin: &BackboneBin| {
         let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
         let locked = sets.iter().filter(|set| set.is_locked).map(|set| set.parameters.eta()).filter(within);

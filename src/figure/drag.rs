@@ -1,7 +1,7 @@
 //! Drag: τ on a ramp of the modulation, on the way there and on the way back, with the lines τ = nT, and τ/T in bins.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Frame, Layout, ROW_GAP};
+use super::frame::{Frame, Layout, ROW_GAP, tag};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Anchor, Dot, Ink, Picture, Sheet, Stroke};
 use super::style::{GRID, INKS, LEGEND_TEXT, Look};
@@ -102,7 +102,7 @@ fn draw_intervals(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &
             sheet.centred_text(place, &text, LEGEND_TEXT, Anchor::Start);
         } else if end > top && start < top {
             let x = frame.x_of(left + (right - left) * (top - start) / (end - start));
-            frame.tag(sheet, (x.max(frame.left + 26.0) - 18.0, frame.top + 16.0), &text, Anchor::Middle);
+            tag(sheet, (x.max(frame.left + 26.0) - 18.0, frame.top + 16.0), &text, Anchor::Middle);
         }
     }
 }

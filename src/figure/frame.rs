@@ -312,19 +312,19 @@ impl Frame {
         sheet.text((self.left, y), text, LEGEND_TEXT, Anchor::Start);
         sheet.text((self.right(), y), amount, LEGEND_TEXT, Anchor::End);
     }
+}
 
-    /// A short text in the frame, on the ground that it needs to be read.
-    pub(super) fn tag(&self, sheet: &mut Sheet, (x, y): (f64, f64), text: &str, anchor: Anchor) {
-        let (size, width) = (f64::from(LEGEND_TEXT), font::width(text, LEGEND_TEXT));
-        let left = match anchor {
-            Anchor::Start => x,
-            Anchor::Middle => x - 0.5 * width,
-            Anchor::End => x - width,
-        };
-        let ground = [left - 2.0, y - 0.6 * size, width + 4.0, 1.2 * size];
-        sheet.rectangle(ground, Fill { ink: WHITE, opacity: 0.8 });
-        sheet.centred_text((x, y), text, LEGEND_TEXT, anchor);
-    }
+/// A short text in a frame, on the ground that it needs to be read.
+pub(super) fn tag(sheet: &mut Sheet, (x, y): (f64, f64), text: &str, anchor: Anchor) {
+    let (size, width) = (f64::from(LEGEND_TEXT), font::width(text, LEGEND_TEXT));
+    let left = match anchor {
+        Anchor::Start => x,
+        Anchor::Middle => x - 0.5 * width,
+        Anchor::End => x - width,
+    };
+    let ground = [left - 2.0, y - 0.6 * size, width + 4.0, 1.2 * size];
+    sheet.rectangle(ground, Fill { ink: WHITE, opacity: 0.8 });
+    sheet.centred_text((x, y), text, LEGEND_TEXT, anchor);
 }
 
 /// Values at the ticks of an axis, and their lengths.

@@ -42,7 +42,7 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let critical_amplitude = |place: f64| MICROMETRES * drive_velocity * periods.period(place) / TAU;
     let numbers = Numbers::of(&modulated);
     let indices = Axis::linear("", 0.0, 1.0);
-    let cell_colours: [&dyn Fn(&SetSummary) -> Option<Color>; 2] = [
+    let cell_colours: [&CellColour<'_>; 2] = [
         &|set| Some(if set.is_locked { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) }),
         &|set| set.locking_index.map(|index| shade(index.value)),
     ];
@@ -84,6 +84,9 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     }
     Some(sheet.finish())
 }
+
+/// The colour of a set in a panel, if it has one.
+type CellColour<'a> = dyn Fn(&SetSummary) -> Option<Color> + 'a;
 
 /// The median interval in periods, rounded.
 fn whole_periods(set: &SetSummary) -> Option<usize> {

@@ -139,10 +139,8 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
         if groups.len() > 1 {
             frame.heading(&mut sheet, title, "");
         }
-        if index + 1 == layout.columns.min(groups.len()) {
-            if let Some(bar) = hues.as_ref().and_then(Hues::bar) {
-                bar.draw(&mut sheet, &frame);
-            }
+        if let Some(bar) = hues.as_ref().and_then(Hues::bar).filter(|_| index + 1 == layout.columns.min(groups.len())) {
+            bar.draw(&mut sheet, &frame);
         }
     }
     Ok(sheet.finish())
@@ -166,6 +164,7 @@ impl Asked<'_> {
 
     /// The axis, from one limit or end of the data to the other.
     fn axis(&self, sets: &[usize]) -> Result<Axis, FigureError> {
+        const SLACK: f64 = 1e-9;
         let label = self.label.clone().unwrap_or_else(|| self.values.label());
         if self.values.is_worded() {
             let name = &self.values.column.name;
@@ -196,7 +195,9 @@ impl Asked<'_> {
         let values = || sets.iter().flat_map(ends);
         let natural = if self.is_log { logarithmic_bounds(values()) } else { bounds(values()).map(widened) };
         let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value".to_owned()))?;
-        let (low, high) = (self.limits.0.unwrap_or(low), self.limits.1.unwrap_or(high));
+        // Values at a limit are shown, however they are rounded.
+        let low = self.limits.0.map_or(low, |end| end - SLACK * end.abs());
+        let high = self.limits.1.map_or(high, |end| end + SLACK * end.abs());
         if low >= high {
             return Err(
                 self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's")

@@ -4,7 +4,7 @@
 use super::font;
 use kuva::render::color::Color;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
-use pdf_writer::types::{CidFontType, FontFlags, LineJoinStyle, SystemInfo, UnicodeCmap};
+use pdf_writer::types::{CidFontType, FontFlags, LineCapStyle, LineJoinStyle, SystemInfo, UnicodeCmap};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use std::collections::BTreeMap;
 use subsetter::GlyphRemapper;
@@ -16,8 +16,6 @@ const FONT_NAME: Name = Name(b"STICKS+DejaVuSans");
 const SYSTEM: SystemInfo = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
 /// Units of widths and heights per em, in a PDF.
 const EM: f32 = 1000.0;
-/// How far from its corner a quarter of a circle has its handles, over the radius.
-const HANDLE: f32 = 0.552_284_8;
 const COMPRESSION: u8 = 8;
 
 /// The scene, with this many points per unit.
@@ -111,20 +109,17 @@ impl Page<'_> {
         self.content.rect(x, y, width, height).fill_nonzero();
     }
 
+    /// Points of a round pen: far shorter than curves. One by one: where dots overlap, faint ones add up.
     fn circles(&mut self, xs: &[f64], ys: &[f64], radius: f64, fill: &Color) {
-        self.fill(fill);
-        let (r, h) = (single(radius), HANDLE * single(radius));
+        let [red, green, blue] = parts(fill);
+        self.content.save_state();
+        self.content.set_stroke_rgb(red, green, blue).set_line_cap(LineCapStyle::RoundCap);
+        self.content.set_line_width(single(2.0 * radius));
         for (&x, &y) in xs.iter().zip(ys) {
             let (x, y) = (single(x), single(y));
-            self.content.move_to(x + r, y);
-            for [a, b, c, d, e, f] in
-                [[r, h, h, r, 0.0, r], [-h, r, -r, h, -r, 0.0], [-r, -h, -h, -r, 0.0, -r], [h, -r, r, -h, r, 0.0]]
-            {
-                self.content.cubic_to(x + a, y + b, x + c, y + d, x + e, y + f);
-            }
-            // One by one: where dots overlap, faint ones add up.
-            self.content.fill_nonzero();
+            self.content.move_to(x, y).line_to(x, y).stroke();
         }
+        self.content.restore_state();
     }
 
     fn with_opacity(&mut self, opacity: Option<f64>, draw: impl FnOnce(&mut Self)) {

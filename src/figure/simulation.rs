@@ -136,7 +136,8 @@ fn period(parameters: &Parameters, time: f64) -> Option<f64> {
 fn peaks(period: Option<f64>, first: f64, last: f64) -> Vec<f64> {
     let Some(period) = period.filter(|period| (last - first) / period <= MAX_PEAKS) else { return Vec::new() };
     let start = (first / period).ceil();
-    (0..).map(|step| (start + f64::from(step)) * period).take_while(|&peak| peak <= last).collect()
+    let peaks = (0..=u32::MAX).map(|step| (start + f64::from(step)) * period);
+    peaks.take_while(|&peak| peak <= last).collect()
 }
 
 fn marks(sheet: &mut Sheet, frame: &Frame, instants: &[f64], stroke: Stroke) {

@@ -20,7 +20,7 @@ const POINTS_PER_MILLIMETRE: f64 = 72.0 / 25.4;
 /// Widths of one and of two columns of a journal, in mm.
 const COLUMNS: [f64; 2] = [86.0, 178.0];
 /// Widest figure, in units, that goes into one column.
-const MAX_ONE_COLUMN: f64 = 720.0;
+const MAX_ONE_COLUMN: f64 = 800.0;
 
 impl Style {
     /// Points per unit.
