@@ -41,6 +41,12 @@ SIZE, PANEL = (6.4, 4.6), 1.9
 MAX_PANELS = 8
 #: Multiples of T that are marked; more would be a grey area.
 MAX_MULTIPLES = 40
+#: Least ratio of two n with a line each: closer ones would merge.
+MIN_RATIO = 1.4
+#: Locked sets with a mean of their own; of more, bins are shown.
+MAX_MEANS = 60
+#: Size of a slip.
+MARKER = 3.5
 
 _Draw = TypeVar("_Draw", bound=Callable[..., Any])
 
@@ -80,42 +86,38 @@ class Plot:
     def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
         """Phases of slips (rad) against eta, with means over locked sets and where Eq. 2 lets slips begin (Fig. 3e)."""
         points = self._slips("phase")
-        bins = self._results.backbone().to_pandas().dropna(subset="locked_phase_mean")
         axes = axes or _new_axes()
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
         axes.axvspan(min(low, 1), 1, color="0.9", zorder=0, label=r"$\eta$ < 1")
         _scatter(axes, points, "eta", "phase")
-        mean = bins["locked_phase_mean"]
-        bars = abs(bins[["locked_phase_mean_low", "locked_phase_mean_high"]].sub(mean, axis=0)).T.to_numpy()
-        axes.errorbar(
-            bins["eta_centre"], mean, bars, fmt="o", color=AVERAGE, markersize=5, capsize=2, label="mean of locked sets"
-        )
+        eta, mean, bars, what = self._mean_phases()
+        axes.errorbar(eta, mean, bars, fmt="o", color=AVERAGE, markersize=4.5, elinewidth=1, label=what)
         axes.plot(*_least_phases(high), color=THEORY, linewidth=1.6, label=r"$\phi_{\min}$, Eq. 2")
-        axes.set(
-            xscale="log",
-            xlim=(low, high),
-            xlabel=r"$\eta = 2\pi\Delta/(T\,V_0)$",
-            ylabel=r"Phase $\phi$ (rad)",
-        )
+        label = r"$\eta = 2\pi\Delta/(T\,V_0)$"
+        axes.set(xscale="log", xlim=(low, high), xlabel=label, ylabel=r"Phase $\phi$ (rad)")
+        axes.xaxis.set_major_formatter("{x:g}")
         _in_units_of_pi(axes)
-        axes.legend(loc="best")
+        # No slip begins there.
+        axes.legend(loc="lower right", markerscale=1.5)
         return axes
 
     @_in_style
-    def intervals(self, axes: "Axes | None" = None, *, lines: int = len(COLOURS)) -> "Axes":
+    def intervals(self, axes: "Axes | None" = None) -> "Axes":
         """Intervals in periods, tau/T, against the period T (s), with a line for each of the most frequent n (Fig. 3c)."""
         points = self._slips("interval")
         points = points.assign(periods=points["interval"] / points["T"])
         axes = axes or _new_axes()
         _scatter(axes, points, "T", "periods")
-        counts = points.loc[points["n"] > 0, "n"].value_counts()
-        for n, colour in zip(sorted(counts.index[:lines]), COLOURS, strict=False):
-            axes.axhline(n, color=colour, linewidth=0.8, zorder=0)
-            of_n = points[(points["n"] == n) & points["locked"]]
-            axes.plot(of_n["T"], of_n["periods"], ".", color=colour, markersize=2.5)
-            axes.annotate(f"{n:.0f}", (1, n), (3, 0), ("axes fraction", "data"), "offset points", color=colour, va="center")
-        axes.set(xscale="log", yscale="log", xlabel="Modulation period $T$ (s)", ylabel=r"Slip interval $\tau/T$")
-        axes.legend(loc="best")
+        for n, colour in zip(_frequent(points), COLOURS, strict=False):
+            of_n = points[points["n"] == n]
+            low, high = of_n["T"].min() / 1.25, of_n["T"].max() * 1.25
+            axes.plot([low, high], [n, n], color=colour, linewidth=1, zorder=0)
+            axes.annotate(f"{n:.0f}", (high, n), (3, 0), textcoords="offset points", color=colour, va="center")
+            of_n = of_n[of_n["locked"]]
+            axes.plot(of_n["T"], of_n["periods"], ".", color=colour, markersize=MARKER)
+        label = r"Slip interval $\tau/T$; coloured: near $n$"
+        axes.set(xscale="log", yscale="log", xlabel="Modulation period $T$ (s)", ylabel=label)
+        axes.legend(loc="best", markerscale=1.5)
         return axes
 
     @_in_style
@@ -141,10 +143,21 @@ class Plot:
             axes.bar(bars["low"], bars["density"], width, align="edge", color=BARS, edgecolor="0.25", linewidth=0.6)
             axes.set_title(f"({letter})  {_named(one)}, {one['intervals']:.0f} intervals", loc="left", fontsize=10)
         for axes, period in zip(panels[:, 0], table["T"], strict=True):
-            _multiples(axes, period)
+            _mark_multiples(axes, period)
         panels[-1, 0].set_xlabel(r"Slip interval $\tau$ (s)")
         figure.supylabel("Probability density (1/s)", fontsize=12)
         return panels[:, 0]
+
+    def _mean_phases(self) -> "tuple[pandas.Series, pandas.Series, numpy.ndarray, str]":
+        """eta, mean phase of locked sets (rad), lower and upper bars, and what they are: sets, or bins of many sets."""
+        columns = ["eta", "phase_mean", "phase_mean_low", "phase_mean_high", "locked"]
+        found = self._results.sets(columns).to_pandas()
+        found, what = found[found["locked"]].drop(columns="locked"), "mean of a locked set"
+        if len(found) > MAX_MEANS:
+            columns = ["eta_centre", *(f"locked_{column}" for column in columns[1:4])]
+            found, what = self._results.backbone(columns).to_pandas().dropna(), "mean of locked sets"
+        eta, mean, low, high = (found[column] for column in found)
+        return eta, mean, abs(found[[low.name, high.name]].sub(mean, axis=0)).T.to_numpy(), what
 
     def _slips(self, column: str) -> "pandas.DataFrame":
         """Slips under modulation with a value in a column."""
@@ -158,7 +171,7 @@ def _scatter(axes: "Axes", points: "pandas.DataFrame", x: str, y: str) -> None:
     """Slips, those of locked sets over the others."""
     for locked, colour, label in ((False, OTHERS, "other slips"), (True, LOCKED, "slips of locked sets")):
         of_kind = points[points["locked"] == locked]
-        axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=2.5, alpha=0.5, markeredgewidth=0, label=label)
+        axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=MARKER, alpha=0.5, markeredgewidth=0, label=label)
 
 
 def _least_phases(high: float) -> "tuple[numpy.ndarray, numpy.ndarray]":
@@ -192,9 +205,24 @@ def _named(one: "pandas.Series") -> str:
     return rf"$\Delta$ = {one['Delta'] * 1e6:.3g} µm, $1/T$ = {1 / one['T']:.4g} Hz"
 
 
-def _multiples(axes: "Axes", period: float) -> None:
+def _frequent(points: "pandas.DataFrame") -> list[float]:
+    """The n of the most slips, of locked sets if there are any, not too close to each other, in order."""
+    locked = points[points["locked"] & (points["n"] > 0)]
+    counts = (locked if len(locked) else points[points["n"] > 0])["n"].value_counts()
+    chosen: list[float] = []
+    for n in counts.index:
+        if len(chosen) < len(COLOURS) and all(max(n, other) >= MIN_RATIO * min(n, other) for other in chosen):
+            chosen.append(n)
+    return sorted(chosen)
+
+
+def _mark_multiples(axes: "Axes", period: float) -> None:
     """Marks the multiples of a period, unless they are too many."""
+    from math import ceil
+
     low, high = axes.get_xlim()
     if (high - low) / period <= MAX_MULTIPLES:  # never without a period, which is NaN
-        for n in range(max(1, int(low / period)), int(high / period) + 1):
-            axes.axvline(n * period, color=OTHERS, linewidth=0.7, linestyle=(0, (3, 3)), zorder=0)
+        places = [n * period for n in range(ceil(low / period), int(high / period) + 1)]
+        dashed = {"color": OTHERS, "linewidth": 0.7, "linestyle": (0, (3, 3)), "zorder": 0}
+        lines = [axes.axvline(place, **dashed) for place in places]
+        axes.legend(lines[:1], [r"$\tau = nT$"], loc="upper right")
