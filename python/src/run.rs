@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
-use stickslip::figure::draw_all;
+use stickslip::figure::{Format, Look, draw_all};
 use stickslip::observe::measure;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
@@ -110,7 +110,7 @@ pub fn run(
                 let report = joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
                 if reduce && report.jobs_left == 0 && !report.stopped && joined.takes_reduction()? {
                     stickslip::reduce::reduce(&Results::read(&layout)?)?;
-                    draw_all(&layout)?;
+                    draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
                 }
                 Ok(report)
             })

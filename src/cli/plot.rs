@@ -131,7 +131,7 @@ impl Arguments {
             Medium::Screen => Style::Screen,
             Medium::Print => Style::Print,
         };
-        Look { style, size: self.size, ..look(results) }
+        Look { style, size: self.size, ..Look::of_sweep(results.sweep().name()) }
     }
 
     fn formats(&self) -> Vec<Format> {
@@ -142,11 +142,6 @@ impl Arguments {
         };
         if self.format.is_empty() { Format::DEFAULT.to_vec() } else { self.format.iter().map(format).collect() }
     }
-}
-
-/// The look of the figures of a sweep as every run draws them.
-pub fn look(results: &Results<'_>) -> Look {
-    Look { note: format!("Sweep {}", results.sweep().name()), ..Look::default() }
 }
 
 pub fn plot(arguments: &Arguments) -> Result<Exit> {

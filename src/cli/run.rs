@@ -5,8 +5,8 @@ use super::planning::Planning;
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
-use super::{output, plot, reduce, signals, time};
-use crate::figure::{Format, draw_all};
+use super::{output, reduce, signals, time};
+use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::ReduceError;
 use crate::results::Results;
@@ -174,7 +174,7 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
         }
         summary => summary?,
     };
-    let figures = draw_all(layout, &plot::look(&results), &Format::DEFAULT)?;
+    let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
     if !arguments.json {
         output::pairs(&reduce::summary_lines(&summary, layout))?;
         for path in figures {

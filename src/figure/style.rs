@@ -110,6 +110,12 @@ pub struct Look {
 }
 
 impl Look {
+    /// The usual look of the figures of a sweep with this name.
+    #[must_use]
+    pub fn of_sweep(name: &str) -> Self {
+        Self { note: format!("Sweep {name}"), ..Self::default() }
+    }
+
     /// The same look with more small print.
     #[must_use]
     pub fn with_note(&self, more: &str) -> Self {
