@@ -47,7 +47,7 @@ def document(results: Path) -> str:
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
             " is not smooth ([`statistics.py`](../python/stickslip_analysis/statistics.py)).",
             "Differences between sets are taken seed by seed, since equal seeds have the same contacts.",
-            "Where the paper gives no number, the criterion is a choice.",
+            "Claims are the paper's; where it gives no number, the criterion is a choice.",
             "*Random loads* are slips that come at a random load among those that exceed all before: without any locking"
             " they are bunched in φ for η > 1, and their intervals near multiples of T.",
         ),

@@ -19,7 +19,7 @@ class Check:
     def row(self) -> dict:
         """Its row of a table."""
         agrees = "yes" if self.agrees else "**no**"
-        return {"the paper says": self.claim, "agrees if": self.criterion, "measured": self.measured, "agrees": agrees}
+        return {"claim": self.claim, "criterion": self.criterion, "measured": self.measured, "agrees": agrees}
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Section:
             rows = [check.row() for check in self.checks]
             for before, check, row in zip(self.checks, self.checks[1:], rows[1:], strict=False):
                 if check.criterion == before.criterion:
-                    row["agrees if"] = "the same"
+                    row["criterion"] = "the same"
             parts.append(table(rows))
         if self.rows:
             parts.append(table(self.rows))
@@ -92,5 +92,8 @@ def paragraph(*sentences: str, width: int = WIDTH) -> str:
 
 def table(rows: list[dict]) -> str:
     """A table; each row holds its cells by the heads of their columns."""
-    lines = [rows[0], ["---"] * len(rows[0]), *(row.values() for row in rows)]
-    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+    head, *lines = (
+        "| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |"
+        for line in (rows[0], *(row.values() for row in rows))
+    )
+    return "\n".join([head, "|" + "---|" * len(rows[0]), *lines])
