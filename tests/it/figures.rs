@@ -3,6 +3,7 @@
 use crate::program::Folder;
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::Path;
 
 /// Always there under modulation.
 const MODULATED: [&str; 2] = ["phi-eta", "tau-T"];
@@ -97,11 +98,15 @@ fn figures_come_in_the_formats_that_are_asked_for_and_are_the_same_each_time() {
     folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
     let contents = folder.contents("r/figures");
     for (format, start) in [("svg", &b"<svg"[..]), ("png", b"\x89PNG"), ("pdf", b"%PDF-1.")] {
-        let bytes = contents[std::path::Path::new(&format!("tau_mean-V0.{format}"))].as_ref().unwrap();
+        let bytes = contents[Path::new(&format!("tau_mean-V0.{format}"))].as_ref().unwrap();
         assert!(bytes.starts_with(start), "{format}");
     }
     let standing = folder.ends(0, "plot r --format pdf --style print").stdout;
-    assert!(standing.lines().count() > 1 && standing.lines().all(|line| line.ends_with(".pdf")), "{standing}");
+    assert!(
+        standing.lines().count() > 1
+            && standing.lines().all(|line| Path::new(line).extension().is_some_and(|end| end == "pdf")),
+        "{standing}"
+    );
     let before = folder.contents("r/figures");
     folder.ends(0, "plot r --x V0 --y tau_mean --log xy --format svg,png,pdf");
     folder.ends(0, "plot r --format pdf --style print");
