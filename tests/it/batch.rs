@@ -220,7 +220,8 @@ fn a_signal_or_the_walltime_ends_planning_and_nothing_is_left_behind() {
 #[test]
 fn a_worker_that_is_warned_before_it_has_finished_a_job_has_failed() {
     let folder = Folder::new();
-    folder.write("long.toml", &SMALL.replace("slips = 2", "slips = 10000000"));
+    // Nor does a job end where the slider slides.
+    folder.write("long.toml", &SMALL.replace("slips = 2", "slips = 10000000\ngive_up_after = 1e9"));
     let mut child = folder.start("run long.toml --no-reduce --out r --worker");
     let has_begun = || folder.path("r/run/log").read_dir().is_ok_and(|mut logs| logs.next().is_some());
     while !has_begun() && child.try_wait().unwrap().is_none() {

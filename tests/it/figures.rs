@@ -79,7 +79,7 @@ fn each_option_of_a_figure_changes_what_it_says() {
         ("--colour Delta", ">Δ = 1e-6 m<"),
         ("--colour V0", ">V0 (m/s)<"),
         ("--panels Delta", ">(b)<"),
-        ("--xlim 1e-5:1e-4", "not shown: 8 of 16 sets"),
+        ("--xlim 1e-5:1e-4", "not shown: 10 of 16 sets"),
         ("--xlabel speed", ">speed<"),
         ("--ylabel τ", ">τ<"),
         ("--style print", r#"width="86.00mm""#),
