@@ -17,6 +17,7 @@ __all__ = [
     "Table",
     "VERSION",
     "keys",
+    "main",
     "minimum_phase",
     "read",
     "reduce",
