@@ -131,33 +131,41 @@ impl Results<'_> {
     /// # Errors
     /// When the folder cannot be listed.
     pub fn spilled_parts(&self) -> Result<HashSet<(usize, u64)>, StorageError> {
-        let names = self.layout().storage.list(&self.layout().spill().join(tables::JOBS))?;
+        self.spilled_in(tables::JOBS)
+    }
+
+    fn spilled_in(&self, table: &str) -> Result<HashSet<(usize, u64)>, StorageError> {
+        let names = self.layout().storage.list(&self.layout().spill().join(table))?;
         let files = names.iter().filter_map(|name| TableFile::of_path(name.as_ref()));
         Ok(files.map(|file| (file.extension, file.first)).collect())
     }
 
-    /// Positions of the jobs of a part that are spilled. None if a file is damaged or gone: they then run again.
+    /// Positions of the jobs of a part that are spilled: none if a file is damaged or gone, and they then run again; `None` if
+    /// this host does not see a file yet that the folder lists, as on a network disk.
     ///
     /// # Errors
     /// When a file cannot be read.
-    pub fn spilled(&self, part: &Part) -> Result<BTreeSet<usize>, ResultsError> {
+    pub fn spilled(&self, part: &Part) -> Result<Option<BTreeSet<usize>>, ResultsError> {
         let mut ids = HashSet::new();
         for table in self.tables() {
-            let files = Dataset::new(self.layout().storage, vec![self.spilled_file(table, part)]);
+            let file = self.spilled_file(table, part);
+            let files = Dataset::new(self.layout().storage, vec![file.clone()]);
             for batch in files.rows::<RowOfJob>() {
                 match batch {
                     Ok(rows) if table == tables::JOBS => ids.extend(rows.into_iter().map(|row| row.job_id)),
                     Ok(_) => (),
-                    Err(DatasetError::Damaged { .. }) => return Ok(BTreeSet::new()),
-                    // Another worker has just committed the part.
+                    Err(DatasetError::Damaged { .. }) => return Ok(Some(BTreeSet::new())),
                     Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
-                        return Ok(BTreeSet::new());
+                        // Not listed: another worker has just committed the part. A link may lead nowhere.
+                        let is_listed = self.spilled_in(table)?.contains(&(part.extension, part.index));
+                        let will_be_seen = is_listed && !self.layout().storage.is_link(&file)?;
+                        return Ok((!will_be_seen).then(BTreeSet::new));
                     }
                     Err(error) => return Err(error.into()),
                 }
             }
         }
-        Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(part, position))).collect())
+        Ok(Some((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(part, position))).collect()))
     }
 
     fn spilled_file(&self, table: &str, part: &Outline) -> PathBuf {
@@ -200,10 +208,30 @@ impl Results<'_> {
         let keeps = outcomes.len() < part.jobs.len();
         let from = if spilled.is_empty() { Place::Tables } else { Place::Spill };
         self.write(staging, part, outcomes, |_| true, keeps.then_some(from), Place::Tables)?;
-        if !spilled.is_empty() {
-            // Jobs first: what is spilled without them is nothing.
-            for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
-                self.layout().storage.remove(&self.spilled_file(table, part))?;
+        if spilled.is_empty() { Ok(()) } else { Ok(self.remove_spilled(part)?) }
+    }
+
+    /// Removes what is spilled of those of these parts that are done, as who committed them may have died at that.
+    ///
+    /// # Errors
+    /// When the files cannot be listed or removed.
+    pub fn tidy_spill(&self, parts: &[Outline]) -> Result<(), StorageError> {
+        let spilled = self.spilled_parts()?;
+        if spilled.is_empty() {
+            return Ok(());
+        }
+        let done = self.done_parts()?;
+        let is_over = |part: &&Outline| spilled.contains(&(part.extension, part.index)) && done.has(part);
+        parts.iter().filter(is_over).try_for_each(|part| self.remove_spilled(part))
+    }
+
+    fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
+        // Jobs first: what is spilled without them is nothing.
+        for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
+            match self.layout().storage.remove(&self.spilled_file(table, part)) {
+                // Another worker was first.
+                Err(error) if error.kind() == ErrorKind::NotFound => (),
+                removed => removed?,
             }
         }
         Ok(())

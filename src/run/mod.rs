@@ -165,6 +165,7 @@ impl Joined<'_> {
                 (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());
             }
         }
+        results.tidy_spill(parts)?;
         if report.jobs_left == 0 && member.others()?.is_empty() {
             let overview = Share::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
             report.jobs_failed = overview.jobs_failed;

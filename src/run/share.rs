@@ -106,10 +106,10 @@ impl<'a> Share<'a> {
         }))
     }
 
-    /// Positions of the jobs of a part that are spilled, if it is one of which some are.
-    pub fn spilled(&self, part: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
+    /// Positions of the jobs of a part that are spilled, if it is one of which some are; `None` if that cannot be seen yet.
+    pub fn spilled(&self, part: &Outline) -> Result<Option<BTreeSet<usize>>, ResultsError> {
         let is_spilled = self.spilled.borrow().contains(&(part.extension, part.index));
-        if is_spilled { self.results.spilled(&self.part(part)) } else { Ok(BTreeSet::new()) }
+        if is_spilled { self.results.spilled(&self.part(part)) } else { Ok(Some(BTreeSet::new())) }
     }
 
     /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
@@ -260,7 +260,8 @@ impl<'a> Work<'a> {
 
     /// Takes the jobs of a part that is not done, but for those that are spilled.
     fn take_missing(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        let spilled = self.share.spilled(outline)?;
+        // A later look decides on what cannot be seen yet.
+        let Some(spilled) = self.share.spilled(outline)? else { return Ok(false) };
         let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
         let jobs = left.map(|position| (position, false)).collect();
         self.take(self.share.part(outline), spilled, jobs, generation)

@@ -87,7 +87,7 @@ impl Share<'_> {
         let mut overview = Overview::default();
         for part in self.parts {
             if !self.done.has(part) {
-                let spilled = self.spilled(part)?;
+                let spilled = self.spilled(part)?.unwrap_or_default();
                 let jobs = if spilled.is_empty() { Vec::new() } else { self.part(part).jobs };
                 let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
                 overview.parts_missing += 1;

@@ -461,6 +461,19 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
 
 #[test]
 fn a_damaged_spill_is_run_again() {
+    assert_damage_is_run_again(|file| fs::write(file, "half a file").unwrap());
+}
+
+#[test]
+fn a_spill_that_leads_nowhere_is_run_again() {
+    assert_damage_is_run_again(|file| {
+        fs::remove_file(file).unwrap();
+        std::os::unix::fs::symlink("nowhere", file).unwrap();
+    });
+}
+
+/// Damages what a stopped run has spilled, and expects the next one to end all the same.
+fn assert_damage_is_run_again(damage: impl Fn(&Path)) {
     let root = tempfile::tempdir().unwrap();
     let (runs, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let kernel = |job: &Job, _: &AtomicBool| {
@@ -471,10 +484,36 @@ fn a_damaged_spill_is_run_again() {
         run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
     assert!(stopped.jobs_spilled > 0, "{stopped:?}");
     for entry in fs::read_dir(root.path().join("run/spill/slips")).unwrap() {
-        fs::write(entry.unwrap().path(), "half a file").unwrap();
+        damage(&entry.unwrap().path());
     }
     run_all(root.path(), &sweep(SEEDS, ""), &fine);
     assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
+fn a_spill_whose_part_is_done_goes_with_the_next_run() {
+    let (root, kept) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (runs, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let kernel = |job: &Job, _: &AtomicBool| {
+        stop.fetch_or(runs.fetch_add(1, Ordering::Relaxed) == 1, Ordering::Relaxed);
+        Ok(measure(&job.parameters))
+    };
+    run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
+    let spill = |table| root.path().join("run/spill").join(table);
+    let files = |table| fs::read_dir(spill(table)).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
+    let names = files("jobs");
+    assert!(!names.is_empty());
+    for name in &names {
+        fs::copy(spill("jobs").join(name), kept.path().join(name)).unwrap();
+    }
+    for _ in 0..2 {
+        run_all(root.path(), &sweep(SEEDS, ""), &fine);
+        assert!(files("jobs").is_empty() && tables_of(root.path()) == expected_tables());
+        // As a worker leaves it that dies before it removes the last of it.
+        for name in &names {
+            fs::copy(kept.path().join(name), spill("jobs").join(name)).unwrap();
+        }
+    }
 }
 
 #[test]
