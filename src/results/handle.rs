@@ -12,7 +12,11 @@ use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::io::ErrorKind;
 use std::path::Path;
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
+
+/// How long to wait for what a host of a network disk does not see yet, and between two looks.
+const LATE: Duration = if cfg!(test) { Duration::from_millis(300) } else { Duration::from_mins(1) };
+const LATE_PAUSE: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(200) };
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
@@ -36,12 +40,13 @@ impl<'a> Results<'a> {
         }
         layout.storage.ensure_folder(layout.root())?;
         let _alone = alone(layout, manifest::WRITER)?;
-        // Another run may have written the manifest before the lock was ours.
+        // In this order: another run may have written the manifest before the lock was ours, and who is at work has.
+        let other = layout.living(SystemTime::now())?.into_values().next();
         let found = Found::look(layout, sweep)?;
         let is_as_before = (&found.manifest, &found.done) == (&before.manifest, &before.done);
         let results = if is_as_before { results } else { Self::new(layout, found.extensions(sweep)) };
         if !found.is_of(sweep) {
-            if let Some(other) = layout.living(SystemTime::now())?.into_values().next() {
+            if let Some(other) = other {
                 let problem = format!(
                     "{}, for another sweep file; wait for it or stop it, or choose another directory with --out",
                     other.doing()
@@ -186,9 +191,15 @@ struct Found {
 impl Found {
     /// Looks into a directory.
     fn look(layout: &Layout<'_>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        let begin = Instant::now();
         // In this order: another run may write the manifest in between, and none removes it.
-        let is_fresh = is_fresh(layout)?;
-        let Some((manifest, extensions)) = manifest::read_with_sweeps(layout)? else {
+        let mut seen = (is_fresh(layout)?, manifest::read_with_sweeps(layout)?);
+        while begin.elapsed() < LATE && is_late(layout, seen.1.as_ref().map(|(manifest, _)| manifest), sweep)? {
+            std::thread::sleep(LATE_PAUSE);
+            seen = (is_fresh(layout)?, manifest::read_with_sweeps(layout)?);
+        }
+        let (is_fresh, found) = seen;
+        let Some((manifest, extensions)) = found else {
             if is_fresh {
                 return Ok(Self { manifest: None, extensions: Vec::new(), done: DoneParts::default() });
             }
@@ -225,6 +236,19 @@ impl Found {
         extensions.push(Extension::new(sweep, &extensions));
         extensions
     }
+}
+
+/// Whether a host of a network disk sees an older manifest than its listing has. The copies of sweep files come first, so
+/// one that the manifest does not have says so, or was left by a run that was killed between the two.
+fn is_late(layout: &Layout<'_>, manifest: Option<&Manifest>, sweep: &Sweep) -> Result<bool, StorageError> {
+    if manifest.is_none() && layout.lists_manifest()? {
+        return Ok(true);
+    }
+    let known = manifest.map_or(0, |manifest| manifest.extensions.len());
+    let Some(copy) = layout.sweeps()?.into_iter().nth(known) else { return Ok(false) };
+    // If nobody is at work, to write the same again mends it.
+    let is_ours = layout.storage.read(&copy).is_ok_and(|text| text == sweep.text().as_bytes());
+    Ok(!is_ours || !layout.living(SystemTime::now())?.is_empty())
 }
 
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.
