@@ -216,7 +216,9 @@ impl Results<'_> {
     /// # Errors
     /// When the files cannot be listed or removed.
     pub fn tidy_spill(&self, parts: &[Outline]) -> Result<(), StorageError> {
-        let spilled = self.spilled_parts()?;
+        // All tables: who removed them may have been killed at that, too.
+        let tables = self.tables().map(|table| self.spilled_in(table)).collect::<Result<Vec<_>, _>>()?;
+        let spilled: HashSet<_> = tables.into_iter().flatten().collect();
         if spilled.is_empty() {
             return Ok(());
         }

@@ -501,17 +501,17 @@ fn a_spill_whose_part_is_done_goes_with_the_next_run() {
     run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options(&stop, 1), &kernel, &mut |_| ()).unwrap();
     let spill = |table| root.path().join("run/spill").join(table);
     let files = |table| fs::read_dir(spill(table)).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
-    let names = files("jobs");
+    let names = files("slips");
     assert!(!names.is_empty());
     for name in &names {
-        fs::copy(spill("jobs").join(name), kept.path().join(name)).unwrap();
+        fs::copy(spill("slips").join(name), kept.path().join(name)).unwrap();
     }
     for _ in 0..2 {
         run_all(root.path(), &sweep(SEEDS, ""), &fine);
-        assert!(files("jobs").is_empty() && tables_of(root.path()) == expected_tables());
-        // As a worker leaves it that dies before it removes the last of it.
+        assert!(files("slips").is_empty() && files("jobs").is_empty() && tables_of(root.path()) == expected_tables());
+        // As a worker leaves it that dies while it removes it: jobs go first.
         for name in &names {
-            fs::copy(kept.path().join(name), spill("jobs").join(name)).unwrap();
+            fs::copy(kept.path().join(name), spill("slips").join(name)).unwrap();
         }
     }
 }
