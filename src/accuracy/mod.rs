@@ -3,7 +3,7 @@
 //! ```text
 //! breaks.rs     before chaos: break times, contact by contact
 //! distance.rs   after chaos: distances of distributions and biases, with intervals
-//! study.rs      every solver under every drive, timed on one thread
+//! study.rs      every solver at every set of parameters, timed on one thread
 //! scaling.rs    what a slip costs as the slider grows
 //! hard_cases.rs parameters that break a naive code, each audited
 //! cost.rs       what a computation costs
@@ -27,7 +27,7 @@ pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 
 use crate::figure::FigureError;
-use crate::model::Parameters;
+use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Measurements, Recording, measure};
 use crate::run::cpu;
 use crate::solver::{Ledger, Limits, Observer, Resolve, SimulationError, Solver, simulate, simulate_audited};
@@ -49,6 +49,12 @@ pub enum AccuracyError {
         solver: String,
         /// The cause.
         source: SimulationError,
+    },
+    /// Slips are compared, and there are none.
+    #[error("{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide")]
+    NoSlips {
+        /// Its parameters, in words.
+        case: String,
     },
     /// A figure cannot be drawn.
     #[error(transparent)]
@@ -82,14 +88,29 @@ pub fn solver_in_words(solver: Solver) -> String {
     }
 }
 
-/// Velocity and modulation of a drive in words.
+/// The drive of a set in words, and what else differs from the defaults.
 #[must_use]
-pub fn drive_in_words(parameters: &Parameters) -> String {
+pub fn set_in_words(parameters: &Parameters) -> String {
     let modulation = parameters.modulation_period.map_or_else(
         || "Delta = 0".to_owned(),
-        |period| format!("Delta = {:e} m, 1/T = {} Hz", parameters.modulation_amplitude, (1.0 / period).round()),
+        |period| {
+            let frequency = (1e4 / period).round() / 1e4;
+            format!("Delta = {:e} m, 1/T = {frequency} Hz", parameters.modulation_amplitude)
+        },
     );
-    format!("V0 = {:e} m/s, {modulation}", parameters.drive_velocity)
+    let others = other_settings(parameters).map(|(key, value)| format!(", {key} = {value}"));
+    format!("V0 = {:e} m/s, {modulation}{}", parameters.drive_velocity, others.collect::<String>())
+}
+
+/// Keys and values of what differs from the defaults, but for the drive and the seed.
+fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
+    let of_drive = |symbol: &Symbol| matches!(symbol, Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed);
+    let defaults = Parameters::default();
+    let settings = Symbol::ALL.into_iter().filter(move |symbol| !of_drive(symbol)).map(move |symbol| {
+        let value = parameters.get(symbol);
+        (value != defaults.get(symbol)).then(|| (symbol.key(), value))
+    });
+    settings.flatten()
 }
 
 /// One realisation of a study with one solver.

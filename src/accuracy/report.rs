@@ -3,9 +3,9 @@
 use super::distance::Distance;
 use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{Findings, MethodRow, Quantity, Study};
-use super::{AccuracyError, Stability, cost, method_in_words};
+use super::{AccuracyError, Stability, cost, method_in_words, other_settings};
 use crate::figure::{ErrorPanel, Growth, Line, Look, MethodLine, Picture, WorkPrecision, scaling, work_precision};
-use crate::model::Symbol;
+use crate::model::{Parameters, Symbol};
 use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::table::arrow;
@@ -18,22 +18,28 @@ use std::path::{Path, PathBuf};
 /// Version of the JSON.
 const FORMAT: u32 = 4;
 
-/// The findings of a study, with a figure for each velocity.
+/// The findings of a study, with a figure for the sets that differ in the modulation alone.
 ///
 /// # Errors
 /// When a figure cannot be drawn.
 pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>, AccuracyError> {
     let settings = json!({
         "seeds": study.seeds,
-        "first_drive_multiple": study.first_drive_multiple,
+        "first_set_multiple": study.first_set_multiple,
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
     });
     let mut report =
         Report::new("accuracy", settings).table("methods", &findings.methods).table("distances", &findings.distances);
-    for &velocity in &study.velocities {
-        report.pictures.push((format!("work-precision-V0-{velocity:e}"), work_precision_figure(velocity, findings)?));
+    let mut drawn = Vec::new();
+    for set in study.sets.iter().map(unmodulated) {
+        if !drawn.contains(&set) {
+            let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
+            let name = format!("work-precision-V0-{:e}{}", set.drive_velocity, others.collect::<String>());
+            report.pictures.push((name, work_precision_figure(&set, findings)?));
+            drawn.push(set);
+        }
     }
     Ok(report)
 }
@@ -127,21 +133,21 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The figure at one velocity: cost against the error of break times, and against distances of distributions from those
+/// The figure of the sets that are this one without modulation: cost against the error of break times, and against distances of distributions from those
 /// of the reference, in units of the distance that chance alone stays under.
-fn work_precision_figure(velocity: f64, findings: &Findings) -> Result<Picture, AccuracyError> {
+fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s)";
     const NOTE: &str = "W₁: first Wasserstein distance between a method's distribution and that of the reference, over what \
                         equal distributions stay under in 95 of 100 samples; bars: 95 %. \
                         Errors of break times: median, bars up to the largest. * Cost extrapolated from that of a step.";
-    let breaks = lines(&findings.methods, velocity, |row| {
+    let breaks = lines(&findings.methods, set, |row| {
         let (error, largest) = (row.break_times.median?, row.break_times.largest?);
         Some(WorkPrecision { error, uncertainty: Some((error, largest)), work: row.cost.per_slip })
     });
     let label = "Error of break times (s)".to_owned();
     let mut panels = vec![ErrorPanel { label, by_chance: None, lines: breaks }];
     for (quantity, name) in [(Quantity::Interval, "τ"), (Quantity::FrontSpeed, "front speed")] {
-        let lines = lines(&findings.methods, velocity, |row| {
+        let lines = lines(&findings.methods, set, |row| {
             let Distance { value, low, high, floor } = findings.distances_of(row, quantity)?.wasserstein;
             let uncertainty = Some((low / floor, high / floor));
             Some(WorkPrecision { error: value / floor, uncertainty, work: row.cost.per_slip })
@@ -149,21 +155,38 @@ fn work_precision_figure(velocity: f64, findings: &Findings) -> Result<Picture, 
         panels.push(ErrorPanel { label: format!("W₁ of {name} / chance level"), by_chance: Some(1.0), lines });
     }
     panels.retain(|panel| !panel.lines.is_empty());
-    let look = Look { note: format!("V0 = {velocity:e} m/s. {NOTE}"), ..Look::default() };
+    let others = other_settings(set).map(|(key, value)| format!(", {key} = {value}"));
+    let look = Look {
+        note: format!("V0 = {:e} m/s{}. {NOTE}", set.drive_velocity, others.collect::<String>()),
+        ..Look::default()
+    };
     Ok(work_precision(WORK, &panels, &look)?)
 }
 
-/// A line per method and drive at this velocity.
-fn lines(rows: &[MethodRow], velocity: f64, point: impl Fn(&MethodRow) -> Option<WorkPrecision>) -> Vec<MethodLine> {
+/// A set without modulation.
+fn unmodulated(set: &Parameters) -> Parameters {
+    let Parameters { modulation_amplitude, modulation_period, .. } = Parameters::default();
+    Parameters { modulation_amplitude, modulation_period, ..set.clone() }
+}
+
+/// A line per method and modulation of the sets that are this one without.
+fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Option<WorkPrecision>) -> Vec<MethodLine> {
+    let rows: Vec<&MethodRow> = rows.iter().filter(|row| unmodulated(&row.parameters) == *set).collect();
+    let modulations = || rows.iter().filter(|row| row.parameters.modulation_amplitude > 0.0);
+    let is_one = modulations().all(|row| modulations().next().is_some_and(|first| first.parameters == row.parameters));
     let mut lines: Vec<MethodLine> = Vec::new();
-    for row in rows.iter().filter(|row| row.parameters.drive_velocity == velocity) {
+    for row in rows.iter() {
         let Some(point) = point(row) else { continue };
-        let drive = if row.parameters.modulation_amplitude > 0.0 { "Δ > 0" } else { "Δ = 0" };
+        let drive = match row.parameters.modulation_period {
+            None => "Δ = 0".to_owned(),
+            Some(_) if is_one => "Δ > 0".to_owned(),
+            Some(period) => format!("Δ = {:e} m, {:.4} Hz", row.parameters.modulation_amplitude, 1.0 / period),
+        };
         let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
         let method = format!("{}{mark}", method_in_words(row.solver));
         match lines.iter_mut().find(|line| line.method == method && line.drive == drive) {
             Some(line) => line.points.push(point),
-            None => lines.push(MethodLine { method, drive: drive.to_owned(), points: vec![point] }),
+            None => lines.push(MethodLine { method, drive, points: vec![point] }),
         }
     }
     lines
@@ -194,7 +217,6 @@ mod tests {
     use super::super::distance::distances as measured;
     use super::super::study::DistanceRow;
     use super::*;
-    use crate::model::Parameters;
     use crate::solver::Solver;
     use crate::table::file::Dataset;
     use crate::table::selected::Selected;
@@ -219,6 +241,7 @@ mod tests {
         };
         let method = MethodRow {
             parameters: Selected::new(parameters.clone()),
+            case: "defaults".to_owned(),
             solver,
             cost,
             timings: 2,
@@ -230,6 +253,7 @@ mod tests {
         let untested = MethodRow { break_times: BreakErrors::default(), ledger_residual: None, ..method.clone() };
         let distance = DistanceRow {
             parameters: Selected::new(parameters),
+            case: "defaults".to_owned(),
             solver,
             quantity: Quantity::Interval,
             slips: 3,
@@ -258,7 +282,7 @@ mod tests {
     #[test]
     fn a_study_is_written_as_tables_json_and_figures() {
         let folder = tempfile::tempdir().unwrap();
-        let study = Study { velocities: vec![1e-4], ..Study::quick() };
+        let study = Study { sets: vec![Parameters::default()], ..Study::quick() };
         let findings = findings();
         let files = study_report(&study, &findings).unwrap().write(folder.path()).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
@@ -287,7 +311,7 @@ mod tests {
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
         let (study, findings, scaling) = (
-            Study { velocities: vec![1e-4], ..Study::quick() },
+            Study { sets: vec![Parameters::default()], ..Study::quick() },
             findings(),
             ScalingFindings { sizes: sizes_of_two(), ..ScalingFindings::default() },
         );

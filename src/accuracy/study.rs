@@ -1,16 +1,16 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! The event-driven solver counts as two methods, by how it resolves motion. Under each drive: the first breaks against
+//! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first breaks against
 //! the tightest tolerance there is; the energy ledger, of all but the grid; and an ensemble of slips that is timed and
-//! whose distributions are held against a reference ensemble of other seeds. Under the first
-//! drive more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
+//! whose distributions are held against a reference ensemble of other seeds. At the first
+//! set more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
 //! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip
 //! follows from the steps in one.
 
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
-use super::{AccuracyError, Realisation, drive_in_words};
+use super::{AccuracyError, Realisation, set_in_words};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
@@ -35,14 +35,14 @@ const REFERENCE_SHARE: u64 = 2;
 /// What to run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
-    /// Drive velocities, in m/s.
-    pub velocities: Vec<f64>,
+    /// Sets of parameters, with seed 0.
+    pub sets: Vec<Parameters>,
     /// Solvers and their settings.
     pub solvers: Vec<Solver>,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
-    /// Multiple of these realisations under the first drive; those beyond them are not timed.
-    pub first_drive_multiple: u64,
+    /// Multiple of these realisations at the first set; those beyond them are not timed.
+    pub first_set_multiple: u64,
     /// Slips of each realisation, past start-up.
     pub slips: u64,
     /// Number K of first breaks whose times are compared: few enough that the coarsest fixed step has not gone its own
@@ -63,14 +63,14 @@ impl Study {
     #[must_use]
     pub fn full() -> Self {
         Self {
-            velocities: vec![1e-4, 1e-5, 1e-6],
+            sets: [1e-4, 1e-5, 1e-6].into_iter().flat_map(plain_and_modulated).collect(),
             solvers: solvers(
                 &[4e-6, 2e-6, 1e-6, 5e-7],
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
             seeds: 8,
-            first_drive_multiple: 8,
+            first_set_multiple: 8,
             slips: 100,
             breaks: 100,
             followed_breaks: 30_000,
@@ -85,7 +85,7 @@ impl Study {
     pub fn quick() -> Self {
         Self {
             seeds: 4,
-            first_drive_multiple: 1,
+            first_set_multiple: 1,
             slips: 6,
             followed_breaks: 10_000,
             fixed_step_breaks_from: 1e-4,
@@ -94,17 +94,23 @@ impl Study {
         }
     }
 
-    /// The drives under which every solver runs, with seed 0.
-    fn drives(&self) -> Vec<Parameters> {
-        let (amplitude, frequency) = MODULATION;
-        let plain = |&drive_velocity: &f64| Parameters { drive_velocity, ..Parameters::default() };
-        let modulated = |parameters: &Parameters| Parameters {
-            modulation_amplitude: amplitude,
-            modulation_period: Some(1.0 / frequency),
-            ..parameters.clone()
-        };
-        self.velocities.iter().map(plain).flat_map(|parameters| [parameters.clone(), modulated(&parameters)]).collect()
+    /// The same at other sets, and with this solver and tolerances of the event-driven one instead.
+    #[must_use]
+    pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
+        let mut all = vec![solver];
+        all.extend(solvers(&[], &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6], &[1e-3, 1e-4, 1e-6, 1e-8]));
+        let solvers = all.iter().enumerate().filter(|(place, solver)| !all[..*place].contains(solver));
+        Self { sets, solvers: solvers.map(|(_, &solver)| solver).collect(), first_set_multiple: 1, ..self }
     }
+}
+
+/// The defaults at a drive velocity in m/s, without and with modulation.
+fn plain_and_modulated(drive_velocity: f64) -> [Parameters; 2] {
+    let (amplitude, frequency) = MODULATION;
+    let plain = Parameters { drive_velocity, ..Parameters::default() };
+    let modulated =
+        Parameters { modulation_amplitude: amplitude, modulation_period: Some(1.0 / frequency), ..plain.clone() };
+    [plain, modulated]
 }
 
 fn solvers(time_steps: &[f64], on_the_grid: &[f64], in_taylor_steps: &[f64]) -> Vec<Solver> {
@@ -117,7 +123,7 @@ const fn taylor(tolerance: f64) -> Solver {
     Solver::EventDriven { tolerance, resolve: Resolve::Taylor }
 }
 
-/// The drive under which solvers run.
+/// The drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveAlone;
 
@@ -126,12 +132,13 @@ impl Selection for DriveAlone {
 }
 
 columns! {
-    /// One solver under one drive. Costs are those of its cheapest realisation per step: other work on the machine can only
+    /// One solver at one set of parameters. Costs are those of its cheapest realisation per step: other work on the machine can only
     /// add to them. Errors of break times and the ledger are left out where they would take too long, and the ledger
     /// along the grid, where none is kept.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MethodRow {
         parameters: Selected<DriveAlone>;
+        case: String = "", "the drive, and what else differs from the defaults";
         solver: Solver;
         cost: Cost;
         timings: u64 = "", "timings, one of each realisation; the costs are by the cheapest per step";
@@ -144,7 +151,7 @@ columns! {
 
 impl Table for MethodRow {
     const NAME: &'static str = "methods";
-    const MEANING: &'static str = "One row per drive and solver setting";
+    const MEANING: &'static str = "One row per set of parameters and solver setting";
 }
 
 /// A quantity of slips.
@@ -197,10 +204,11 @@ fields! {
 }
 
 columns! {
-    /// A distribution of one solver under one drive against that of the reference ensemble.
+    /// A distribution of one solver at one set of parameters against that of the reference ensemble.
     #[derive(Clone, Debug, PartialEq)]
     pub struct DistanceRow {
         parameters: Selected<DriveAlone>;
+        case: String = "", "the drive, and what else differs from the defaults";
         solver: Solver;
         quantity: Quantity = "", "interval, phase, drop, peak_force, duration or front_speed";
         slips: u64 = "", "size of the sample";
@@ -216,20 +224,20 @@ columns! {
 impl Table for DistanceRow {
     const NAME: &'static str = "distances";
     const MEANING: &'static str =
-        "One row per drive, solver setting and quantity, in the unit of its column in `slips`";
+        "One row per set of parameters, solver setting and quantity, in the unit of its column in `slips`";
 }
 
 /// All that a study finds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
-    /// Drive by drive, solver by solver.
+    /// Set by set, solver by solver.
     pub methods: Vec<MethodRow>,
     /// Likewise, quantity by quantity.
     pub distances: Vec<DistanceRow>,
 }
 
 impl Findings {
-    /// How far a distribution is from the reference, for the solver and drive of a row.
+    /// How far a distribution is from the reference, for the solver and set of a row.
     #[must_use]
     pub fn distances_of(&self, row: &MethodRow, quantity: Quantity) -> Option<&Distances> {
         let same = |other: &&DistanceRow| {
@@ -281,8 +289,8 @@ impl Study {
     /// When a simulation cannot continue.
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
         let mut findings = Findings::default();
-        for (drive, parameters) in self.drives().iter().enumerate() {
-            report(&format!("{}: first breaks and energy ledgers", drive_in_words(parameters)));
+        for (set, parameters) in self.sets.iter().enumerate() {
+            report(&format!("{}: first breaks and energy ledgers", set_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = taylor(*TOLERANCES.start());
             realisation(parameters, tightest).simulate(&mut first_breaks)?;
@@ -293,7 +301,7 @@ impl Study {
             }
             report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
-            let seeds = self.seeds * if drive == 0 { self.first_drive_multiple } else { 1 };
+            let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
             report("reference ensemble, and the realisations of the others that are not timed");
             let reference = taylor(ENSEMBLE_TOLERANCE);
             let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
@@ -303,13 +311,17 @@ impl Study {
                     ensemble.slips.extend(self.slips_of(parameters, solver, self.seeds..seeds)?);
                 }
             }
+            if reference.is_empty() {
+                return Err(AccuracyError::NoSlips { case: set_in_words(parameters) });
+            }
             let mean_interval = mean(&Quantity::Interval.sample(&reference));
             let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
-                let parameters = parameters.clone();
+                let (case, parameters) = (set_in_words(parameters), parameters.clone());
                 let [cost, median, dearest] = ensemble.costs(mean_interval);
                 findings.methods.push(MethodRow {
-                    parameters: Selected::new(parameters.clone()),
+                    parameters: Selected::new(parameters),
+                    case,
                     solver,
                     cost,
                     timings: self.seeds,
@@ -320,7 +332,7 @@ impl Study {
                 });
             }
             let compared = pairs.into_par_iter().enumerate().flat_map_iter(|(row, (solver, ensemble))| {
-                let key = drive * self.solvers.len() + row;
+                let key = set * self.solvers.len() + row;
                 distance_rows(parameters, solver, &ensemble.slips, &reference, key as u64)
             });
             findings.distances.extend(compared.collect::<Vec<_>>());
@@ -388,7 +400,7 @@ impl Study {
 }
 
 fn realisation(parameters: &Parameters, solver: Solver) -> Realisation<'_> {
-    Realisation { parameters, solver, in_words: drive_in_words }
+    Realisation { parameters, solver, in_words: set_in_words }
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.
@@ -404,6 +416,7 @@ fn distance_rows(
         let key = key * Quantity::ALL.len() as u64 + place;
         Some(DistanceRow {
             parameters: Selected::new(parameters.clone()),
+            case: set_in_words(parameters),
             solver,
             quantity,
             slips: sample.len() as u64,
@@ -425,10 +438,10 @@ mod tests {
     #[test]
     fn a_small_study_distinguishes_a_coarse_step_from_the_grid_and_that_from_a_tight_tolerance() {
         let study = Study {
-            velocities: vec![1e-4],
+            sets: plain_and_modulated(1e-4).into(),
             solvers: solvers(&[4e-6], &[1e-4], &[1e-8]),
             seeds: 1,
-            first_drive_multiple: 3,
+            first_set_multiple: 3,
             slips: 4,
             breaks: 50,
             followed_breaks: 400,
@@ -459,7 +472,7 @@ mod tests {
     #[test]
     fn the_slips_of_a_stretch_are_no_sample() {
         let study = Study {
-            velocities: vec![1e-4],
+            sets: plain_and_modulated(1e-4).into(),
             solvers: vec![Solver::FixedStep { time_step: 4e-6 }],
             seeds: 1,
             slips: 4,

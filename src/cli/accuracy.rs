@@ -2,14 +2,20 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
+use super::sweep::settings_as_sweep;
 use crate::accuracy::{
-    self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, drive_in_words,
-    hard_cases, scaling_report, solver_in_words, stability_report, study_report,
+    self, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study, hard_cases,
+    scaling_report, set_in_words, solver_in_words, stability_report, study_report,
 };
+use crate::model::Parameters;
+use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
+
+/// A study of more sets than this would take long, and nobody could read it.
+const MAX_SETS: usize = 12;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -20,13 +26,24 @@ energy ledger. The event-driven solver counts as two methods, on the grid and in
 one thread, that of the cheapest realisation; keep the machine free of other work: the spread over realisations,
 which are timed in turn with those of the other solvers, shows how free it was.
 
+The study of the paper's parameters is the default. With a sweep file or --set it is about those: which tolerance of
+the event-driven solver biases what, by how much, and what a slip costs.
+
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
   stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
+  stickslip accuracy --set Kd=1e8 --set V0=1e-5
+  stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver
   stickslip accuracy --scaling               what a slip costs with N and Ns, in two minutes; --quick: in seconds
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
+    /// Sweep file whose sets and solver to study, in the place of the paper's
+    #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "scaling", "hard_cases"])]
+    sweep: Option<PathBuf>,
+    /// Set a parameter of the model, and study this one set; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["scaling", "hard_cases"])]
+    settings: Vec<String>,
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
@@ -59,6 +76,15 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         return run_scaling(arguments);
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
+    let sweep = match &arguments.sweep {
+        Some(path) => Some(Sweep::from_file(path)?),
+        None if arguments.settings.is_empty() => None,
+        None => Some(settings_as_sweep(&arguments.settings)?),
+    };
+    if let Some(sweep) = sweep {
+        output::warn(&sweep.warnings());
+        study = study.at(sets_of(&sweep)?, sweep.solver());
+    }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
     for (flag, count) in [("--seeds", study.seeds), ("--slips", study.slips)] {
@@ -102,61 +128,84 @@ fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
 }
 
-/// The table of docs/numerics.md, and how far the distributions of slips are from those of the reference.
-fn study_text(study: &Study, findings: &Findings) -> String {
-    let mut lines = vec![format!("{}; one thread; first {} breaks", accuracy::cost::processor(), study.breaks)];
-    for is_modulated in [false, true] {
-        let such = |row: &&MethodRow| row.parameters.modulation_period.is_some() == is_modulated;
-        let rows: Vec<&MethodRow> = findings.methods.iter().filter(such).collect();
-        lines.extend(cost_table(study, &rows));
+/// The sets of a sweep, with seed 0.
+fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
+    let mut sets: Vec<Parameters> = Vec::new();
+    for job in sweep.jobs() {
+        let set = Parameters { seed: 0, ..job.parameters };
+        if !sets.contains(&set) {
+            sets.push(set);
+        }
+        if sets.len() > MAX_SETS {
+            let problem = format!(
+                "sweep {} has more than {MAX_SETS} sets; keep the values that matter in a copy, or name one set with --set",
+                sweep.name()
+            );
+            return Err(UsageError(problem).into());
+        }
     }
-    lines.push("* extrapolated from the cost of a step; > together as far as the reference reaches".to_owned());
-    lines.extend(distance_table(findings));
+    if sets.is_empty() {
+        return Err(UsageError(format!("sweep {} has no jobs: its conditions drop all points", sweep.name())).into());
+    }
+    Ok(sets)
+}
+
+/// What each solver costs at each set, how far its first breaks are off, and by how much it biases the means of slips.
+fn study_text(study: &Study, findings: &Findings) -> String {
+    let mut lines = vec![format!(
+        "{}; one thread; CPU time per slip by the cheapest of {} realisations, timed in turn, then that of the median and \
+         of the dearest over it; errors of the first {} breaks: median (largest)",
+        accuracy::cost::processor(),
+        study.seeds,
+        study.breaks
+    )];
+    for set in &study.sets {
+        let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
+        lines.extend(cost_table(set, &rows));
+        lines.extend(bias_table(findings, &rows));
+    }
+    lines.push("\n* extrapolated from the cost of a step; > together as far as the reference reaches".to_owned());
+    lines.push("! zero lies outside of the 95 % interval, as by chance in one of 20".to_owned());
+    let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
+    lines.push(format!(
+        "of {}, {} biases show, {} W1 and {} KS distances exceed what 95 % of equal distributions stay under",
+        findings.distances.len(),
+        exceed(is_biased),
+        exceed(|found| found.wasserstein.value > found.wasserstein.floor),
+        exceed(|found| found.kolmogorov.value > found.kolmogorov.floor)
+    ));
     lines.push(String::new());
     lines.join("\n")
 }
 
-/// Texts side by side.
-fn cells(texts: impl Iterator<Item = String>) -> String {
-    texts.map(|text| format!("{text:>13}")).collect::<Vec<_>>().concat()
+fn is_biased(found: &Distances) -> bool {
+    found.mean.low > 0.0 || found.mean.high < 0.0
 }
 
-/// Costs at every velocity; errors at the first, where every solver has them.
-fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
-    let Some(first) = rows.first() else { return Vec::new() };
-    let at = |velocity: f64| move |row: &&&MethodRow| row.parameters.drive_velocity == velocity;
-    let costs = cells(study.velocities.iter().map(|velocity| format!("{velocity:e} m/s")));
+/// Costs and errors of the solvers at a set.
+fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
     let mut lines = vec![
+        format!("\n{}", set_in_words(set)),
         format!(
-            "\nCPU time per slip in ms, by the cheapest of {} realisations, timed in turn; the rest, with the CPU time of the \
-             median and of the dearest over that, at {}",
-            first.timings,
-            drive_in_words(&first.parameters)
-        ),
-        format!(
-            "{:30}{costs} {:>8} {:>7} {:>7} {:>18} {:>24} {:>9}",
-            "solver", "ns/step", "median", "dearest", "break times (s)", "together", "ledger"
+            "{:30}{:>9} {:>7} {:>7} {:>8} {:>18} {:>24} {:>9}",
+            "solver", "ms/slip", "median", "dearest", "ns/step", "break times (s)", "together", "ledger"
         ),
     ];
-    for row in rows.iter().filter(at(first.parameters.drive_velocity)) {
-        let same = |velocity: &f64| rows.iter().filter(at(*velocity)).find(|other| other.solver == row.solver);
-        let cost = |row: &&MethodRow| {
-            let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
-            format!("{:.2}{mark}", 1e3 * row.cost.per_slip)
-        };
-        let costs = cells(study.velocities.iter().filter_map(same).map(cost));
+    for row in rows {
         let errors = row.break_times;
         let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
         let together = errors.together.zip(errors.together_seconds).map(|(breaks, seconds)| {
             let mark = if errors.together_throughout { ">" } else { "" };
             format!("{mark}{breaks} breaks, {seconds:.3} s")
         });
+        let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
         lines.push(format!(
-            "{:30}{costs} {:>8.0} {:>7.2} {:>7.2} {:>18} {:>24} {:>9}",
+            "{:30}{:>9} {:>7.2} {:>7.2} {:>8.0} {:>18} {:>24} {:>9}",
             solver_in_words(row.solver),
-            1e9 * row.cost.per_step,
+            format!("{:.3}{mark}", 1e3 * row.cost.per_slip),
             row.median_per_slip / row.cost.per_slip,
             row.largest_per_slip / row.cost.per_slip,
+            1e9 * row.cost.per_step,
             times.unwrap_or_else(|| "-".to_owned()),
             together.unwrap_or_else(|| "-".to_owned()),
             or_dash(row.ledger_residual.map(f64::abs)),
@@ -165,34 +214,40 @@ fn cost_table(study: &Study, rows: &[&MethodRow]) -> Vec<String> {
     lines
 }
 
-/// Wasserstein-1 distances over their bounds by chance, drive by drive.
-fn distance_table(findings: &Findings) -> Vec<String> {
-    let mut lines = vec!["\nW1 of distributions over the 95 % bound by chance".to_owned()];
-    let mut drive = None;
-    let heading = cells(Quantity::ALL.iter().map(|quantity| quantity.name().to_owned()));
-    for row in &findings.methods {
-        let found: Vec<Option<&Distances>> =
-            Quantity::ALL.iter().map(|&quantity| findings.distances_of(row, quantity)).collect();
-        if found.iter().all(Option::is_none) {
-            continue;
-        }
-        if drive != Some(&row.parameters) {
-            drive = Some(&row.parameters);
-            let slips = findings.distances.iter().find(|other| other.parameters == row.parameters);
-            let slips = slips.map_or(0, |row| row.slips);
-            lines.push(format!("\n{}, about {slips} slips\n{:30}{heading}", drive_in_words(&row.parameters), "solver"));
-        }
-        let ratio = |found: Option<&Distances>| {
-            let ratio = found.map(|found| found.wasserstein.value / found.wasserstein.floor);
-            ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2}"))
+/// Biases of the means of slips at a set.
+fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
+    let of = |row: &MethodRow, quantity: Quantity| {
+        findings.distances.iter().find(|other| {
+            other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
+        })
+    };
+    let found = |quantity: &Quantity| rows.iter().find_map(|row| of(row, *quantity));
+    let quantities: Vec<Quantity> = Quantity::ALL.into_iter().filter(|quantity| found(quantity).is_some()).collect();
+    let Some(slips) = quantities.first().and_then(found) else { return Vec::new() };
+    let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<String>();
+    let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
+    let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.name(), unit(quantity))).collect();
+    let mut lines = vec![
+        format!("bias of the mean of {} slips or so, against {} of the reference", slips.slips, slips.reference_slips),
+        format!("{:30}{}", "", cells(heading)),
+    ];
+    for row in rows {
+        let bias = |&quantity: &Quantity| {
+            of(row, quantity).map_or_else(
+                || "-".to_owned(),
+                |row| {
+                    let scale = if unit(quantity) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
+                    let (bias, mark) = (row.distances.mean, if is_biased(&row.distances) { "!" } else { " " });
+                    let half = 0.5 * scale * (bias.high - bias.low);
+                    format!("{:+.3} ± {half:.3}{mark}", scale * bias.value)
+                },
+            )
         };
-        lines.push(format!("{:30}{}", solver_in_words(row.solver), cells(found.into_iter().map(ratio))));
+        let biases: Vec<String> = quantities.iter().map(bias).collect();
+        if biases.iter().any(|bias| bias != "-") {
+            lines.push(format!("{:30}{}", solver_in_words(row.solver), cells(biases)));
+        }
     }
-    let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
-    let (rows, wasserstein) =
-        (findings.distances.len(), exceed(|found| found.wasserstein.value > found.wasserstein.floor));
-    let kolmogorov = exceed(|found| found.kolmogorov.value > found.kolmogorov.floor);
-    lines.push(format!("\nof {rows}, {wasserstein} W1 and {kolmogorov} KS distances exceed their bounds"));
     lines
 }
 

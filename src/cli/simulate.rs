@@ -8,12 +8,13 @@ mod outputs;
 use self::outputs::{check_outputs, write_pictures, write_records, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
+use super::sweep::{as_flags, number, real, written_settings};
 use crate::model::{Description, Parameters, Symbol, Value};
 use crate::observe::{Measurements, Recording, RecordingKey, Regime};
 use crate::results::tables;
 use crate::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
 use crate::simulate::{self as single, Request};
-use crate::sweep::{Sweep, SweepError};
+use crate::sweep::Sweep;
 use crate::table::file::Footer;
 use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, FromArgMatches, ValueEnum};
@@ -201,18 +202,6 @@ struct Report {
     wall_seconds: f64,
 }
 
-fn real(text: &str) -> Result<f64, &'static str> {
-    text.parse().map_err(|_| "must be a number")
-}
-
-/// A number in the form that a sweep file takes.
-fn number(text: &str) -> Result<String, &'static str> {
-    if let Ok(whole) = text.parse::<i128>() {
-        return Ok(whole.to_string());
-    }
-    real(text).map(|real| if real.is_nan() { "nan".to_owned() } else { format!("{real:?}") })
-}
-
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let sweep = match &arguments.sweep {
         Some(path) => Sweep::from_file(path)?,
@@ -241,22 +230,6 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 
 /// The flags as the text of a sweep with one point.
 fn as_sweep(arguments: &Arguments) -> Result<String> {
-    let mut model = single::Written::new();
-    for setting in &arguments.settings {
-        let (key, value) = setting
-            .split_once('=')
-            .ok_or_else(|| UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")))?;
-        let (key, value) = (key.trim(), value.trim());
-        if model.iter().any(|(earlier, _)| earlier == key) {
-            return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")).into());
-        }
-        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5")).into());
-        }
-        // A word such as tension needs quotes in a sweep file.
-        let written = number(value).unwrap_or_else(|_| format!("{value:?}"));
-        model.push((key.to_owned(), written));
-    }
     let solver = match (arguments.solver, &arguments.dt) {
         (Method::EventDriven, None) => {
             let resolve = arguments.resolve.as_ref().map(|word| format!("{word:?}"));
@@ -281,15 +254,7 @@ fn as_sweep(arguments: &Arguments) -> Result<String> {
         }
     };
     let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
-    Ok(single::sweep_text(&model, &arguments.recording.0, &solver))
-}
-
-/// A message about the sweep text, as one about the flags.
-fn as_flags(error: SweepError) -> anyhow::Error {
-    match error {
-        SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
-        unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
-    }
+    Ok(single::sweep_text(&written_settings(&arguments.settings)?, &arguments.recording.0, &solver))
 }
 
 /// The parameters as JSON, under their keys.

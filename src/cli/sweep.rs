@@ -1,8 +1,12 @@
 //! The sweep that a command is about: a file, or a preset, one of the files of the folder `sweeps/`.
 
+use super::exit::UsageError;
+use crate::simulate as single;
 use crate::sweep::{Sweep, SweepError};
+use anyhow::Result;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A sweep file that the program holds.
@@ -70,6 +74,53 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>) -> Result<Sweep, SweepE
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => unreachable!("the command line asks for one of them"),
+    }
+}
+
+/// The values of `--set`, as a sweep file has them.
+pub fn written_settings(settings: &[String]) -> Result<single::Written, UsageError> {
+    let mut written = single::Written::new();
+    for setting in settings {
+        let no_setting = || UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5"));
+        let (key, value) = setting.split_once('=').ok_or_else(no_setting)?;
+        let (key, value) = (key.trim(), value.trim());
+        if written.iter().any(|(earlier, _)| earlier == key) {
+            return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")));
+        }
+        if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            return Err(no_setting());
+        }
+        // A word such as tension needs quotes in a sweep file.
+        let value = number(value).unwrap_or_else(|_| format!("{value:?}"));
+        written.push((key.to_owned(), value));
+    }
+    Ok(written)
+}
+
+/// A number in the form that a sweep file takes.
+pub fn number(text: &str) -> Result<String, &'static str> {
+    if let Ok(whole) = text.parse::<i128>() {
+        return Ok(whole.to_string());
+    }
+    real(text).map(|real| if real.is_nan() { "nan".to_owned() } else { format!("{real:?}") })
+}
+
+/// A real number.
+pub fn real(text: &str) -> Result<f64, &'static str> {
+    text.parse().map_err(|_| "must be a number")
+}
+
+/// A sweep with one set, of the values of `--set`.
+pub fn settings_as_sweep(settings: &[String]) -> Result<Sweep> {
+    let text = single::sweep_text(&written_settings(settings)?, &BTreeMap::new(), &single::Written::new());
+    Sweep::parse(&text, Path::new("flags")).map_err(as_flags)
+}
+
+/// A message about the text that flags were made into, as one about the flags.
+pub fn as_flags(error: SweepError) -> anyhow::Error {
+    match error {
+        SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
+        unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     }
 }
 

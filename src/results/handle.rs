@@ -41,12 +41,13 @@ impl<'a> Results<'a> {
         layout.storage.ensure_folder(layout.root())?;
         let _alone = alone(layout, manifest::WRITER)?;
         // In this order: another run may have written the manifest before the lock was ours, and who is at work has.
-        let other = layout.living(SystemTime::now())?.into_values().next();
+        let at_work = layout.living(SystemTime::now())?;
         let found = Found::look(layout, sweep)?;
         let is_as_before = (&found.manifest, &found.done) == (&before.manifest, &before.done);
         let results = if is_as_before { results } else { Self::new(layout, found.extensions(sweep)) };
         if !found.is_of(sweep) {
-            if let Some(other) = other {
+            let mut living = layout.living(SystemTime::now())?.into_iter();
+            if let Some((_, other)) = living.find(|(name, _)| at_work.contains_key(name)) {
                 let problem = format!(
                     "{}, for another sweep file; wait for it or stop it, or choose another directory with --out",
                     other.doing()

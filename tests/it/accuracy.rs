@@ -1,4 +1,4 @@
-//! Scaling on the command line: tables, JSON and figure agree.
+//! Accuracy on the command line: scaling, and studies at parameters of one's own.
 
 use crate::program::{Folder, json};
 
@@ -42,4 +42,72 @@ fn scaling_takes_no_option_of_the_study() {
         let ended = folder.ends(2, &format!("accuracy --scaling {option}"));
         assert!(ended.stderr.contains("cannot be used with"), "{}", ended.stderr);
     }
+}
+
+/// Two sets of a fast slider, with seeds, which make no further sets.
+const SWEEP: &str = "name = 'mine'\n[model]\nN = 9\nNs = 5\nM = 0.006\nK = 7e7\nKd = 1e8\n\
+                     [axes]\nV0 = [1e-4, 2e-4]\nseed = { from = 0, to = 4 }\n[solver]\ntolerance = 1e-5\n";
+
+#[test]
+fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("mine.toml"), SWEEP).unwrap();
+    let printed = json(&folder.ends(0, "accuracy mine.toml --quick --seeds 1 --slips 3 --out mine --json").stdout);
+    let methods = printed["methods"].as_array().unwrap();
+    let solvers: Vec<_> =
+        methods.iter().map(|row| (row["method"].as_str().unwrap(), row["setting"].as_f64())).collect();
+    assert_eq!(solvers[0], ("event-driven", Some(1e-5)), "that of the sweep is the first");
+    assert!(solvers.contains(&("grid", Some(1e-3))) && solvers.contains(&("taylor", Some(1e-8))), "{solvers:?}");
+    assert!(solvers.iter().all(|&(method, _)| method != "fixed-step"));
+    let table = folder.file("mine/methods.parquet");
+    let velocities: std::collections::BTreeSet<u64> = table.reals("V0").into_iter().map(f64::to_bits).collect();
+    assert_eq!(velocities, [1e-4_f64, 2e-4].map(f64::to_bits).into());
+    assert!(table.texts("case")[0].contains(", N = 9, Ns = 5"), "{:?}", table.texts("case")[0]);
+    for name in ["V0-1e-4", "V0-2e-4"] {
+        let others = "-N-9-Ns-5-M-0.006-K-70000000-Kd-100000000";
+        assert!(
+            folder.path(&format!("mine/work-precision-{name}{others}.png")).is_file(),
+            "{:?}",
+            folder.contents("mine")
+        );
+    }
+    // The same seed without modulation: the bias of a solver is against other seeds, and has an interval.
+    for row in printed["distances"].as_array().unwrap() {
+        let [low, bias, high] = ["mean_bias_low", "mean_bias", "mean_bias_high"].map(|key| row[key].as_f64().unwrap());
+        assert!(low <= bias && bias <= high, "{row}");
+    }
+}
+
+#[test]
+fn a_set_of_flags_is_studied_as_text() {
+    let folder = Folder::new();
+    let flags = "--set N=9 --set Ns=5 --set M=0.006 --set K=7e7 --set Kd=1e8 --set Delta=1e-6 --set frequency=58";
+    let text = folder.ends(0, &format!("accuracy --quick --seeds 1 --slips 3 --out mine {flags}")).stdout;
+    assert!(text.contains("\nV0 = 1e-4 m/s, Delta = 1e-6 m, 1/T = 58 Hz, N = 9, Ns = 5"), "{text}");
+    assert!(
+        text.contains("phase (rad)") && text.contains("front_speed (%)") && text.contains(" biases show"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_cannot_be_studied_is_refused() {
+    let folder = Folder::new();
+    let many = SWEEP.replace("[1e-4, 2e-4]", "{ log = [1e-5, 1e-4], points = 13 }");
+    std::fs::write(folder.path("many.toml"), many).unwrap();
+    std::fs::write(folder.path("none.toml"), format!("where = ['V0 > 1']\n{SWEEP}")).unwrap();
+    for (arguments, problem) in [
+        ("many.toml", "more than 12 sets"),
+        ("none.toml", "drop all points"),
+        ("--set Foo=3", "unknown key"),
+        ("--set V0", "must be KEY=VALUE"),
+        ("many.toml --set V0=1e-5", "cannot be used with"),
+        ("--set V0=1e-5 --hard-cases", "cannot be used with"),
+    ] {
+        let ended = folder.ends(2, &format!("accuracy {arguments}"));
+        assert!(ended.stderr.contains(problem), "{arguments}: {}", ended.stderr);
+    }
+    let sliding = folder.ends(1, "accuracy --set V0=1e-3 --quick --seeds 1 --slips 3 --out mine");
+    assert!(sliding.stderr.contains("no slips"), "{}", sliding.stderr);
+    assert!(!folder.path("mine").exists() && !folder.path("results").exists());
 }
