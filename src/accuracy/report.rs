@@ -175,7 +175,7 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
     let modulations = || rows.iter().filter(|row| row.parameters.modulation_amplitude > 0.0);
     let is_one = modulations().all(|row| modulations().next().is_some_and(|first| first.parameters == row.parameters));
     let mut lines: Vec<MethodLine> = Vec::new();
-    for row in rows.iter() {
+    for row in &rows {
         let Some(point) = point(row) else { continue };
         let drive = match row.parameters.modulation_period {
             None => "Δ = 0".to_owned(),

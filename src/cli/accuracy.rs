@@ -224,7 +224,7 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let found = |quantity: &Quantity| rows.iter().find_map(|row| of(row, *quantity));
     let quantities: Vec<Quantity> = Quantity::ALL.into_iter().filter(|quantity| found(quantity).is_some()).collect();
     let Some(slips) = quantities.first().and_then(found) else { return Vec::new() };
-    let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<String>();
+    let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<Vec<_>>().concat();
     let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
     let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.name(), unit(quantity))).collect();
     let mut lines = vec![

@@ -46,7 +46,7 @@ fn scaling_takes_no_option_of_the_study() {
 
 /// Two sets of a fast slider, with seeds, which make no further sets.
 const SWEEP: &str = "name = 'mine'\n[model]\nN = 9\nNs = 5\nM = 0.006\nK = 7e7\nKd = 1e8\n\
-                     [axes]\nV0 = [1e-4, 2e-4]\nseed = { from = 0, to = 4 }\n[solver]\ntolerance = 1e-5\n";
+                     [axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 4 }\n[solver]\ntolerance = 1e-5\n";
 
 #[test]
 fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
@@ -64,7 +64,7 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
     assert_eq!(velocities, [1e-4_f64, 2e-4].map(f64::to_bits).into());
     assert!(table.texts("case")[0].contains(", N = 9, Ns = 5"), "{:?}", table.texts("case")[0]);
     for name in ["V0-1e-4", "V0-2e-4"] {
-        let others = "-N-9-Ns-5-M-0.006-K-70000000-Kd-100000000";
+        let others = "-N-9-Ns-5-M-0.006-K-7e7-Kd-1e8";
         assert!(
             folder.path(&format!("mine/work-precision-{name}{others}.png")).is_file(),
             "{:?}",
@@ -98,7 +98,7 @@ fn what_cannot_be_studied_is_refused() {
     std::fs::write(folder.path("none.toml"), format!("where = ['V0 > 1']\n{SWEEP}")).unwrap();
     for (arguments, problem) in [
         ("many.toml", "more than 12 sets"),
-        ("none.toml", "drop all points"),
+        ("none.toml", "drops every point"),
         ("--set Foo=3", "unknown key"),
         ("--set V0", "must be KEY=VALUE"),
         ("many.toml --set V0=1e-5", "cannot be used with"),
