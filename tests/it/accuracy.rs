@@ -107,7 +107,7 @@ fn what_cannot_be_studied_is_refused() {
         let ended = folder.ends(2, &format!("accuracy {arguments}"));
         assert!(ended.stderr.contains(problem), "{arguments}: {}", ended.stderr);
     }
-    let sliding = folder.ends(1, "accuracy --set V0=1e-3 --quick --seeds 1 --slips 3 --out mine");
+    let sliding = folder.ends(3, "accuracy --set V0=1e-3 --quick --seeds 1 --slips 3 --out mine");
     assert!(sliding.stderr.contains("no slips"), "{}", sliding.stderr);
     assert!(!folder.path("mine").exists() && !folder.path("results").exists());
 }
