@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,30 @@ def test_three_hosts_share_a_sweep_and_run_each_part_once(guest, local_run, vers
     results = guest.fetch(name)
     assert_each_part_ran_once(results, workers=len(HOSTS))
     assert_same(results, local_run(SLIPS, TRIVIAL))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_three_hosts_that_know_a_directory_extend_it_at_once(guest, program, version):
+    name, few = f"extended-{version}", 400
+    whole = write_sweep(guest.folder / "shared.toml", TRIVIAL, few).read_text()
+    half = whole.replace("count = 64", "count = 32")
+    assert half != whole
+    (guest.folder / "half.toml").write_text(half)
+    # Each host remembers the manifest with one sweep, and that there was no other.
+    for host in HOSTS:
+        guest.run(host, f"/run/sandbox/stickslip run /run/sandbox/half.toml --out /mnt/{version}/{name} --no-reduce")
+    try:
+        for command in [start(guest, host, version, name) for host in HOSTS]:
+            command.wait(300)
+    finally:
+        write_sweep(guest.folder / "shared.toml", TRIVIAL, SLIPS)
+    results = guest.fetch(name)
+    assert_each_part_ran_once(results, workers=2)
+    local = guest.folder / f"local-{version}"
+    for sweep in [half, whole]:
+        (guest.folder / "local.toml").write_text(sweep)
+        subprocess.run([program, "run", guest.folder / "local.toml", "--out", local], check=True, capture_output=True)
+    assert_same(results, local)
 
 
 def test_the_parts_of_a_killed_process_are_taken_over_by_another_host(guest, local_run):
