@@ -26,10 +26,10 @@ STATEMENTS = (
     friction.edge,
 )
 QUESTIONS = (
-    *beyond.DRAGS,
+    beyond.drag,
     beyond.locking_map,
     beyond.staircase,
-    *beyond.DEPENDENCES,
+    beyond.dependences,
     phase.stiff_drive,
     beyond.choices,
     beyond.energies,
@@ -46,10 +46,9 @@ def document(results: Path) -> str:
             "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
             " is not smooth ([`statistics.py`](../python/stickslip/statistics.py)).",
-            "Differences between sets are taken seed by seed, since equal seeds have the same contacts.",
-            "Claims are the paper's; where it gives no number, the criterion is a choice.",
-            "*Random loads* are slips that come at a random load among those that exceed all before: without any locking"
-            " they are bunched in φ for η > 1, and their intervals near multiples of T.",
+            "Where the paper gives no number, the criterion is a choice.",
+            "*Random loads* are slips without any [locking](model.md#phase-and-locking): for η > 1 even these are bunched"
+            " in φ, and their intervals near multiples of T.",
         ),
         table(summary),
         "## The paper's statements",

@@ -9,17 +9,18 @@ WIDTH = 120
 
 @dataclass(frozen=True)
 class Check:
-    """One number against one sentence of the paper."""
+    """Measured numbers against one sentence of the paper."""
 
     claim: str
     criterion: str
     measured: str
-    agrees: bool
+    #: Whether each of them meets the criterion.
+    agrees: tuple[bool, ...]
 
     def row(self) -> dict:
         """Its row of a table."""
-        agrees = "yes" if self.agrees else "**no**"
-        return {"claim": self.claim, "criterion": self.criterion, "measured": self.measured, "agrees": agrees}
+        agrees = "yes" if all(self.agrees) else "in part" if any(self.agrees) else "**no**"
+        return {"claim: criterion": f"{self.claim}: {self.criterion}", "measured": self.measured, "agrees": agrees}
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,8 @@ class Section:
     title: str
     #: The sweep files that it is measured with.
     source: str
-    #: A picture in results/, by the stem of its name.
-    picture: str | None = None
+    #: Pictures in results/, by the stems of their names.
+    pictures: tuple[str, ...] = ()
     checks: list[Check] = field(default_factory=list)
     #: Of a table: the cells of each row by the heads of their columns.
     rows: list[dict] = field(default_factory=list)
@@ -48,18 +49,13 @@ class Section:
 
     def summary(self) -> dict:
         """Its row of the table of verdicts."""
-        agree = sum(check.agrees for check in self.checks)
-        verdict = self.verdict or Verdict("holds" if agree == len(self.checks) else "does not hold")
-        return {
-            "statement": self.title,
-            "verdict": verdict.word,
-            "why": verdict.reason,
-            "checks": f"{agree}/{len(self.checks)}",
-        }
+        agrees = all(all(check.agrees) for check in self.checks)
+        verdict = self.verdict or Verdict("holds" if agrees else "does not hold")
+        return {"statement": self.title, "verdict": verdict.word, "why": verdict.reason}
 
-    def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
+    def check(self, claim: str, criterion: str, measured: str, *agrees: bool) -> None:
         """Adds a check."""
-        self.checks.append(Check(claim, criterion, measured, bool(agrees)))
+        self.checks.append(Check(claim, criterion, measured, tuple(map(bool, agrees))))
 
     def remark(self, *sentences: str) -> None:
         """Adds a paragraph."""
@@ -72,14 +68,9 @@ class Section:
     def markdown(self) -> str:
         """The section, with the checks before the table."""
         parts = [f"### {self.title}", f"From {self.source}."]
-        if self.picture:
-            parts.append(f"![{self.picture}](../results/{self.picture}.png)")
+        parts += [f"![{picture}](../results/{picture}.png)" for picture in self.pictures]
         if self.checks:
-            rows = [check.row() for check in self.checks]
-            for before, check, row in zip(self.checks, self.checks[1:], rows[1:], strict=False):
-                if check.criterion == before.criterion:
-                    row["criterion"] = "the same"
-            parts.append(table(rows))
+            parts.append(table([check.row() for check in self.checks]))
         if self.rows:
             parts.append(table(self.rows))
         return "\n\n".join(parts + self.remarks)
