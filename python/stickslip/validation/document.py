@@ -1,5 +1,6 @@
 """The parts of the validation document, and how they are written as Markdown."""
 
+import re
 import textwrap
 from dataclasses import dataclass, field
 
@@ -11,16 +12,18 @@ WIDTH = 120
 class Check:
     """Measured numbers against one sentence of the paper."""
 
+    #: Empty where the criterion says it.
     claim: str
     criterion: str
     measured: str
     #: Whether each of them meets the criterion.
     agrees: tuple[bool, ...]
 
-    def row(self) -> dict:
-        """Its row of a table."""
+    def row(self, number: str) -> dict:
+        """Its row of a table, with the number of its statement if it has one."""
         agrees = "yes" if all(self.agrees) else "in part" if any(self.agrees) else "**no**"
-        return {"claim: criterion": f"{self.claim}: {self.criterion}", "measured": self.measured, "agrees": agrees}
+        claim = number + ": ".join(filter(None, (self.claim, self.criterion)))
+        return {"claim: criterion": claim, "measured": self.measured, "agrees": agrees}
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,9 @@ class Verdict:
 class Section:
     """A statement of the paper, or a question beyond it."""
 
+    #: Begins with the number of a statement.
     title: str
-    #: The sweep files that it is measured with.
+    #: The sweep files that it is measured with, and what is to be said of them.
     source: str
     #: Pictures in results/, by the stems of their names.
     pictures: tuple[str, ...] = ()
@@ -65,15 +69,23 @@ class Section:
         """Adds an item of a list."""
         self.remarks.append("- " + textwrap.indent(paragraph(*sentences, width=WIDTH - 2), "  ").lstrip())
 
+    def number(self) -> str:
+        """The number of the statement, as in "12. "."""
+        return next(iter(re.findall(r"^\d+\. ", self.title)), "")
+
     def markdown(self) -> str:
-        """The section, with the checks before the table."""
-        parts = [f"### {self.title}", f"From {self.source}."]
-        parts += [f"![{picture}](../results/{picture}.png)" for picture in self.pictures]
-        if self.checks:
-            parts.append(table([check.row() for check in self.checks]))
-        if self.rows:
-            parts.append(table(self.rows))
-        return "\n\n".join(parts + self.remarks)
+        """The section alone."""
+        return figure(self.title, [self])
+
+
+def figure(title: str, sections: list[Section]) -> str:
+    """Statements on the same figure: pictures, a table of all checks, further tables, remarks."""
+    sources = "; ".join(dict.fromkeys(section.source for section in sections))
+    parts = [f"### {title}", paragraph(f"From {sources}.")]
+    parts += [f"![{picture}](../results/{picture}.png)" for section in sections for picture in section.pictures]
+    checks = [check.row(section.number()) for section in sections for check in section.checks]
+    parts += [table(rows) for rows in (checks, *(section.rows for section in sections)) if rows]
+    return "\n\n".join([*parts, *(remark for section in sections for remark in section.remarks)])
 
 
 def paragraph(*sentences: str, width: int = WIDTH) -> str:

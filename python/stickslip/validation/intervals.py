@@ -58,12 +58,12 @@ def count_by_slip(slips: pandas.DataFrame, precursors: pandas.DataFrame, size: i
 
 def stick_slip(results: Path) -> Section:
     """Statement 1."""
-    section = Section("1. Stick-slip is regular but stochastic", "`sweeps/fig2.toml`, Δ = 0 (Fig. 1d, 2d)", ("fig2",))
+    section = Section("1. Stick-slip is regular but stochastic", "`sweeps/fig2.toml`", ("fig2",))
     sweep = Sweep(results / "fig2")
     slips = without_modulation(sweep.slips())
     spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), slips)
     section.check(
-        "intervals are stochastic",
+        "unmodulated intervals are stochastic",
         "s.d. over mean from 0.05 to 0.3",
         spread.text(),
         spread.low > 0.05 and spread.high < 0.3,
@@ -97,7 +97,7 @@ def stick_slip(results: Path) -> Section:
     peak = slips["peak_force"].mean()
     seen = share(slips["largest_drop_before"] >= VISIBLE * peak, slips["seed"])
     section.check(
-        "... as drops of F_S (Fig. 1d)",
+        "also as drops of F_S",
         f"more than half have two or three that a plot shows, of {100 * VISIBLE:.0f} % of the peak force",
         f"{seen.text(2)} have any, of {VISIBLE * peak:.1f} N",
         seen.low > 0.5,
@@ -110,7 +110,7 @@ def stick_slip(results: Path) -> Section:
     most = [size for size, found in two_or_three.items() if found.low > 0.5]
     drops = share(slips["drops_before"].isin([2, 3]), slips["seed"])
     section.remark(
-        "The number depends on what counts: more than half of the slips have two or three precursors of at least"
+        "The number of precursors depends on what counts: more than half of the slips have two or three of at least"
         f" {' or '.join(map(str, most))} breaks, and {drops.text(2)} have two or three drops of 0.5 N.",
     )
     return section
@@ -118,14 +118,14 @@ def stick_slip(results: Path) -> Section:
 
 def identical_contacts(results: Path) -> Section:
     """Statement 2."""
-    section = Section("2. Identical contacts keep the distribution broad", "`sweeps/fig2.toml`, Δ = 0 (Fig. 2d, red)")
+    section = Section("2. Identical contacts keep the distribution broad", "`sweeps/fig2.toml`")
     slips = Sweep(results / "fig2").slips()
     identical, disordered = (
         jackknife(lambda rows: 1e3 * rows["interval"].std(), rows)
         for rows in (select(slips, Delta=0.0, dfs=0.0), without_modulation(slips))
     )
     section.check(
-        "identical contacts keep τ broad",
+        "",
         "s.d. of τ at least half of that with disorder",
         f"{identical.text(1)} ms; with disorder {disordered.text(1)} ms",
         identical.low > 0.5 * disordered.high,
@@ -135,7 +135,7 @@ def identical_contacts(results: Path) -> Section:
 
 def integer_multiples(results: Path) -> Section:
     """Statement 3."""
-    section = Section("3. Intervals are integer multiples of the period", "`sweeps/fig2.toml`, Δ = 1 µm (Fig. 2e, f)")
+    section = Section("3. Intervals are integer multiples of the period", "`sweeps/fig2.toml`")
     sweep = Sweep(results / "fig2")
     slips, precursors = sweep.slips(), sweep.table("precursors")
     still = without_modulation(slips)
@@ -163,7 +163,7 @@ def integer_multiples(results: Path) -> Section:
             *(index.low > max(chance.high, 0.5) for index, chance in zip(found, chances, strict=True)),
         )
     section.remark(
-        "Shorter intervals belong to bursts of small precursors, which occur with or without modulation.",
+        "Shorter intervals between precursors belong to bursts of small ones, with or without modulation.",
     )
     return section
 
@@ -189,7 +189,7 @@ def lead_times(sweep: Sweep) -> pandas.DataFrame:
 
 def many_periods(results: Path) -> Section:
     """Statement 4."""
-    section = Section("4. τ = nT over a broad range of loading", "`sweeps/fig3.toml` (Fig. 3c)", ("fig3-tau-T",))
+    section = Section("4. τ = nT over a broad range of loading", "`sweeps/fig3.toml`", ("fig3-tau-T",))
     sweep = Sweep(results / "fig3")
     slips = sweep.slips().merge(sweep.reduced("sets")[["set_id", "locked"]], on="set_id")
     slips = slips[(slips["eta"] >= 1) & slips["interval"].notna()]
@@ -197,13 +197,13 @@ def many_periods(results: Path) -> Section:
     slips = slips.assign(near=near_whole(slips["periods"]), expected=slips["eta"].map(expected))
     whole, locked = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["locked"]]))
     section.check(
-        "data fall on lines τ = nT",
+        "",
         "more than the 0.2 of chance within 0.1 T of nT, for η > 1",
         whole.text(),
         whole.low > 0.2,
     )
     section.check(
-        "... once locked", "more than 0.5 in locked sets", locked.text(), locked.low > 0.5
+        "once locked", "more than 0.5", locked.text(), locked.low > 0.5
     )
     for low, high in pairwise((1, 2, 4, 10, 1001)):
         mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
@@ -263,7 +263,7 @@ def stress_drops(results: Path) -> Section:
         chances.append(jackknife(left, free))
         spreads.append(f"{rows['drop'].std():.1f}")
     section.check(
-        "partial synchronisation",
+        "",
         "at given τ (s.d. about a line for each n) drops vary less than unmodulated",
         f"{at_frequencies(locked, 1, ' N')}; unmodulated {', '.join(one.text(1) for one in chances)} N;"
         f" s.d. of all {', '.join(spreads)} N",
@@ -284,7 +284,7 @@ def stochasticity(results: Path) -> Section:
     """Identical contacts on sliders of different stiffness."""
     section = Section(
         "10. Stochasticity needs many more than √(K_int/K_s) blocks",
-        "`sweeps/stochasticity.toml`, identical contacts, N = 35 to 140, K = 3e7 to 1e10 N/m",
+        "`sweeps/stochasticity.toml` (identical contacts, N = 35 to 140, K = 3e7 to 1e10 N/m)",
     )
     slips = Sweep(results / "stochasticity").slips().dropna(subset="interval")
 
@@ -303,7 +303,7 @@ def stochasticity(results: Path) -> Section:
         for low, high in ((0, 1 / 8), (1 / 8, 1 / 2), (1 / 2, numpy.inf))
     )
     section.check(
-        "stochasticity only for N ≫ √(K_int/K_s)",
+        "",
         "interquartile range of τ over its median above 0.05 for √(K_int/K_s) < N/8, below 0.02 for > N/2",
         f"{min(long):.3f} to {max(long):.3f}; {min(stiff):.3f} to {max(stiff):.3f};"
         f" between N/8 and N/2 {min(middle):.3f} to {max(middle):.3f}",
