@@ -53,11 +53,13 @@ def test_every_column_of_a_simulation_is_documented(stickslip, tmp_path):
     files = {flag: tmp_path / f"{flag}.parquet" for flag in ("trace", "map", "contacts")}
     flags = [argument for flag, file in files.items() for argument in (f"--{flag}", file)]
     stickslip("simulate", "--set", "N=9", "--time", 0.01, *flags)
-    text = (ROOT / "docs" / "commands.md").read_text()
+    commands, tables = ((ROOT / "docs" / page).read_text() for page in ("commands.md", "tables.md"))
     for flag, file in files.items():
-        row = next(line for line in text.splitlines() if line.startswith(f"| `--{flag}` |"))
+        row = next(line for line in commands.splitlines() if line.startswith(f"| `--{flag}` |"))
+        assert f"(tables.md#{flag})" in row
+        section = tables.split(f"\n## {flag}\n")[1].split("\n## ")[0]
         for field in pq.read_schema(file):
-            assert f"`{field.name}`" in row, f"{flag}.{field.name}"
+            assert f"| `{field.name}` |" in section, f"{flag}.{field.name}"
 
 
 def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):

@@ -9,27 +9,26 @@ from pathlib import Path
 
 from ..tables import MissingResult
 from . import beyond, friction, intervals, phase
-from .document import paragraph, table
+from .document import figure, paragraph, table
 
-STATEMENTS = (
-    intervals.stick_slip,
-    intervals.identical_contacts,
-    intervals.integer_multiples,
-    intervals.many_periods,
-    phase.phase,
-    friction.friction,
-    friction.slow_fronts,
-    friction.loading_profile,
-    intervals.stress_drops,
-    intervals.stochasticity,
-    phase.below_one,
-    friction.edge,
-)
+#: The paper's statements by the figures that show them.
+STATEMENTS = {
+    "Fig. 1 and 2: intervals, precursors, stress drops": (
+        intervals.stick_slip,
+        intervals.identical_contacts,
+        intervals.integer_multiples,
+        intervals.stress_drops,
+    ),
+    "Fig. 3: intervals and phases against the modulation": (intervals.many_periods, phase.phase, phase.below_one),
+    "Mean friction": (friction.friction,),
+    "Fig. 4: slow fronts": (friction.slow_fronts,),
+    "Eq. 1 and the length of the slider": (friction.loading_profile, intervals.stochasticity, friction.edge),
+}
 QUESTIONS = (
-    *beyond.DRAGS,
+    beyond.drag,
     beyond.locking_map,
     beyond.staircase,
-    *beyond.DEPENDENCES,
+    beyond.dependences,
     phase.stiff_drive,
     beyond.choices,
     beyond.energies,
@@ -38,7 +37,9 @@ QUESTIONS = (
 
 def document(results: Path) -> str:
     """The document in Markdown."""
-    statements, questions = ([section(results) for section in sections] for sections in (STATEMENTS, QUESTIONS))
+    figures = {title: [section(results) for section in sections] for title, sections in STATEMENTS.items()}
+    questions = [section(results) for section in QUESTIONS]
+    statements = sorted(sum(figures.values(), []), key=lambda section: float(section.number()))
     summary = [section.summary() for section in statements + questions if section.checks]
     parts = [
         "# Validation",
@@ -46,14 +47,13 @@ def document(results: Path) -> str:
             "`scripts/reproduce` writes this page from measured results; no measured number is typed by hand.",
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
             " is not smooth ([`statistics.py`](../python/stickslip/statistics.py)).",
-            "Differences between sets are taken seed by seed, since equal seeds have the same contacts.",
-            "Claims are the paper's; where it gives no number, the criterion is a choice.",
-            "*Random loads* are slips that come at a random load among those that exceed all before: without any locking"
-            " they are bunched in φ for η > 1, and their intervals near multiples of T.",
+            "Where the paper gives no number, the criterion is a choice.",
+            "*Random loads* are slips without any [locking](model.md#phase-and-locking): for η > 1 even these are bunched"
+            " in φ, and their intervals near multiples of T.",
         ),
         table(summary),
         "## The paper's statements",
-        *(section.markdown() for section in statements),
+        *(figure(title, sections) for title, sections in figures.items()),
         "## Beyond the paper",
         *(section.markdown() for section in questions),
     ]

@@ -1,6 +1,5 @@
 """Questions that the paper leaves open: each a sweep, a figure and a finding, with its statistical error."""
 
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,8 +12,6 @@ from .document import Section
 from .intervals import SIZES, count_by_slip, of_same_jobs, without_modulation
 from .kinematics import locked_by_chance, locked_in_load
 
-#: Locking index from which a set is called strongly locked here.
-STRONG = 0.8
 #: Periods in s up to which the locking index shows locking: near T = τ it is large for any narrow distribution of τ.
 SHORT = 0.04
 #: Frequencies in Hz of the sweeps of size, contacts and disorder.
@@ -23,43 +20,42 @@ FREQUENCIES = (29, 58, 116)
 WHOLE_WINDOW = 1.014
 
 
-def drag(results: Path, *, sweep: str, amplitude: str) -> Section:
+def drag(results: Path) -> Section:
     """Whether intervals follow a period that changes slowly, and whether they remember where it came from."""
-    title = f"Drag: T changed slowly within one run, Δ = {amplitude}"
-    section = Section(title, f"`sweeps/{sweep}.toml`", sweep)
-    slips = Sweep(results / sweep).slips()
-    slips = slips[slips["interval"].notna() & (slips["onset"] < 2 * slips["ramp_time"])]
-    edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 13)
-    slips = slips.assign(is_up=slips["onset"] < slips["ramp_time"], bin=numpy.digitize(slips["T_onset"], edges[1:-1]))
-    near = share(near_whole(slips["interval"] / slips["T_onset"]), slips["seed"])
+    section = Section(
+        "Drag: T changed slowly within one run",
+        "`sweeps/drag.toml` (Δ = 1 µm) and `sweeps/drag-strong.toml` (3 µm)",
+        ("drag", "drag-strong"),
+    )
+    followed, texts, memories = [], [], []
+    for sweep, amplitude in (("drag", "1 µm"), ("drag-strong", "3 µm")):
+        slips = Sweep(results / sweep).slips()
+        slips = slips[slips["interval"].notna() & (slips["onset"] < 2 * slips["ramp_time"])]
+        near = share(near_whole(slips["interval"] / slips["T_onset"]), slips["seed"])
+        followed.append(near.low > 0.5)
+        texts.append(f"{near.text()} at {amplitude}")
+        edges = numpy.linspace(slips["T_onset"].min(), slips["T_onset"].max(), 13)
+        slips = slips.assign(
+            is_up=slips["onset"] < slips["ramp_time"], bin=numpy.digitize(slips["T_onset"], edges[1:-1])
+        )
+        means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
+        whole = mean((means[False] - means[True]).groupby("seed").mean())
+        memory = "a small memory" if whole.excludes_zero() else "no memory"
+        memories.append(f"{whole.text(3)} at {amplitude}, {memory}")
     section.check(
         "T drags τ with it (page 3)",
         "more than 0.5 of the intervals within 0.1 T of nT while T changes",
-        near.text(),
-        near.low > 0.5,
+        ", ".join(texts),
+        *followed,
     )
-    differences = []
-    for _, mine in slips.groupby("bin"):
-        differences.append(difference(mine[~mine["is_up"]], mine[mine["is_up"]], "n"))
-    means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
-    whole = mean((means[False] - means[True]).groupby("seed").mean())
-    section.remark(
-        f"Hysteresis: n while T falls minus n while T rises is {whole.text(3)} in the mean, and beyond its interval in"
-        f" {sum(one.excludes_zero() for one in differences)} of {len(differences)} bins of T"
-        f" (by chance {0.05 * len(differences):.1f}): {'a small memory' if whole.excludes_zero() else 'no memory is seen'}.",
-    )
+    section.remark(f"Hysteresis, the mean n while T falls less that while T rises: {'; '.join(memories)}.")
     return section
-
-
-DRAGS = (
-    partial(drag, sweep="drag", amplitude="1 µm"),
-    partial(drag, sweep="drag-strong", amplitude="3 µm"),
-)
 
 
 def locking_map(results: Path) -> Section:
     """Where slips lock, over period and amplitude."""
-    section = Section("Arnold tongues: locking over period and amplitude", "`sweeps/locking-map.toml`", "locking-map")
+    title = "Arnold tongues: locking over period and amplitude"
+    section = Section(title, "`sweeps/locking-map.toml`", ("locking-map",))
     sweep = Sweep(results / "locking-map")
     sets = sweep.reduced("sets")
     chance = [locked_by_chance(*one, 200) for one in zip(sets["eta"], sets["slips"], strict=True)]
@@ -73,24 +69,21 @@ def locking_map(results: Path) -> Section:
         section.rows.append(
             {
                 "η": f"{low:g} to {high:g}",
-                "sets": len(mine),
                 "locked by φ": mean(mine["locked"].astype(float)).text(2),
                 "random loads": f"{mine['chance'].mean():.2f}",
-                f"locking index, T < {1e3 * SHORT:.0f} ms": mean(short).text(2) if len(short) > 1 else "",
-                "beyond random loads": mean(short - expected).text(2) if len(short) > 1 else "",
-                f"above {STRONG}": f"{(short > STRONG).mean():.2f}" if len(short) else "",
+                f"locking index beyond these, T < {1e3 * SHORT:.0f} ms": (
+                    mean(short - expected).text(2) if len(short) > 1 else ""
+                ),
             }
         )
     natural = without_modulation(Sweep(results / "fig2").slips())["interval"]
     under = sets[sets["eta"] < 1]
     slips = sweep.slips()
     in_load = locked_in_load(under, slips[slips["eta"] < 1].dropna(subset="phase"))
-    over = sets[(sets["eta"] > 1) & (sets["eta"] < 2)]
     section.remark(
         f"{len(sets)} parameter sets, {sets['intervals'].sum()} intervals.",
-        f"For η from 1 to 2 {over['locked'].mean():.2f} are locked by φ, random loads {over['chance'].mean():.2f}; below 1"
-        f" {under['locked'].sum()} of {len(under)}, random loads {under['chance'].sum():.0f}, and by the load phase"
-        f" {in_load.sum()}.",
+        f"Below η = 1 {under['locked'].sum()} of {len(under)} are locked by φ, random loads {under['chance'].sum():.0f};"
+        f" by the load phase {in_load.sum()}.",
         "Not all beyond random loads is locking, as τ varies little: unmodulated, its locking index is"
         f" {locking_index(29 * natural):.2f} at 29 Hz.",
     )
@@ -103,9 +96,8 @@ def locking_map(results: Path) -> Section:
     ]
     matters = max(one.low for one in quarters) > min(one.high for one in quarters)
     section.remark(
-        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the unmodulated interval,"
-        f" {natural.mean():.4f} s, lies between multiples of T: in the four quarters of a period the locking index is"
-        f" {', '.join(one.text(2) for one in quarters)}."
+        f"For η from 1 to 3 it {'matters' if matters else 'matters little'} where the unmodulated interval lies between"
+        f" multiples of T: by quarters of T the locking index is {', '.join(f'{one.value:.2f}' for one in quarters)}."
     )
     return section
 
@@ -126,70 +118,62 @@ def median_periods(slips: pandas.DataFrame) -> tuple[pandas.Series, pandas.Serie
 
 def staircase(results: Path) -> Section:
     """How wide the steps of τ = nT are."""
-    section = Section(
-        "Devil's staircase: intervals in periods against the period", "`sweeps/staircase.toml`", "staircase"
-    )
+    title = "Devil's staircase: intervals in periods against the period"
+    section = Section(title, "`sweeps/staircase.toml`", ("staircase",))
     slips = Sweep(results / "staircase").slips().dropna(subset="interval")
-    shares, rises = {}, []
+    shares = {}
     for amplitude, mine in slips.groupby("Delta"):
         medians, on_step = median_periods(mine)
         shares[amplitude] = jackknife(lambda rows: median_periods(rows)[1].mean(), mine)
-        rises.append(f"{(medians[on_step].round().diff() > 0).sum()} times at {1e6 * amplitude:.1f} µm")
-        stated = "on a step"
-        steps = {f"n = {n}: T (ms)": stretches(on_step & (medians.round() == n)) for n in range(1, 7)}
-        section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", stated: shares[amplitude].text(2)} | steps)
-    weakest, strongest = min(shares), max(shares)
-    widens = shares[strongest].low > shares[weakest].high
+        steps = {f"n = {n}: T (ms)": stretches(on_step & (medians.round() == n)) for n in range(1, 4)}
+        section.rows.append({"Δ (µm)": f"{1e6 * amplitude:.1f}", "on a step": shares[amplitude].text(2)} | steps)
+    widens = shares[max(shares)].low > shares[min(shares)].high
     section.remark(
-        f"A period T is on a step if the median τ is within 0.05 T of nT: 0.1 are by chance, of {slips['T'].nunique()}.",
+        "A period is on a step if the median τ is within 0.05 T of nT, by chance 0.1 of them.",
         f"The steps {'widen' if widens else 'do not widen beyond their errors'} with the amplitude.",
-        f"As T grows n should fall from step to step; it rises {', '.join(rises)}: steps of neighbouring n overlap.",
     )
     return section
 
 
-def dependence(results: Path, *, sweep: str, column: str, what: str, symbol: str, digits: int = 0) -> Section:
-    """How interval and locking depend on a parameter of the interface."""
-    section = Section(f"Locking against {what}", f"`sweeps/{sweep}.toml`, Δ = 1 µm", sweep)
-    slips = Sweep(results / sweep).slips()
-    slips = slips.assign(disorder=slips["dfs"] / slips["fs"])
-    weakest = []
-    for value, mine in slips.groupby(column):
-        still = select(mine, Delta=0.0)
-        tau = jackknife(lambda rows: 1e3 * rows["interval"].mean(), still)
-        spread = jackknife(lambda rows: rows["interval"].std() / rows["interval"].mean(), still)
-        lengths = (
-            jackknife(lambda rows: resultant_length(rows["phase"]), select(mine, Delta=1e-6, frequency=frequency))
-            for frequency in FREQUENCIES
-        )
-        weakest.append(min(lengths, key=lambda length: length.value))
+def dependences(results: Path) -> Section:
+    """How interval and locking depend on the parameters of the interface."""
+    title = "Locking against blocks, contacts and disorder"
+    section = Section(
+        title,
+        "`sweeps/size.toml`, `sweeps/contacts.toml` and `sweeps/disorder.toml`, Δ = 1 µm",
+        ("size", "contacts", "disorder"),
+    )
+    are_locked = []
+    for sweep, column, symbol in (("size", "N", "N"), ("contacts", "Ns", "N_s"), ("disorder", "disorder", "Δf_s/f_s")):
+        slips = Sweep(results / sweep).slips()
+        slips = slips.assign(disorder=(slips["dfs"] / slips["fs"]).round(3))
+        still = select(slips, Delta=0.0).groupby(column)["interval"]
+        tau, spread = 1e3 * still.mean(), still.std() / still.mean()
+        modulated = select(slips, Delta=1e-6)
+        lengths = [
+            jackknife(lambda rows: resultant_length(rows["phase"]), rows)
+            for _, rows in modulated[modulated["frequency"].isin(FREQUENCIES)].groupby([column, "frequency"])
+        ]
+        are_locked += [length.low > 0.5 for length in lengths]
         section.rows.append(
             {
-                symbol: f"{value:.{digits}f}",
-                "τ unmodulated (ms)": tau.text(1),
-                "s.d. over mean": spread.text(2),
-                "least resultant of φ": weakest[-1].text(2),
+                "varied": f"{symbol} from {slips[column].min():g} to {slips[column].max():g}",
+                "τ unmodulated (ms)": f"{tau.min():.1f} to {tau.max():.1f}",
+                "s.d. over mean": f"{spread.min():.2f} to {spread.max():.2f}",
+                "least resultant of φ": min(lengths, key=lambda length: length.value).text(2),
             }
         )
-    locked = [row[symbol] for row, length in zip(section.rows, weakest, strict=True) if length.low > 0.5]
-    where = "everywhere" if len(locked) == len(weakest) else f"at {', '.join(locked)}" if locked else "nowhere"
     section.remark(
-        f"At {', '.join(map(str, FREQUENCIES))} Hz phases are locked {where} (resultant and interval above 0.5)."
+        f"At {', '.join(map(str, FREQUENCIES))} Hz phases are locked (resultant and its interval above 0.5) in"
+        f" {sum(are_locked)} of {len(are_locked)} cases."
     )
     return section
-
-
-DEPENDENCES = (
-    partial(dependence, sweep="size", column="N", what="the number of blocks", symbol="N"),
-    partial(dependence, sweep="contacts", column="Ns", what="the contacts per block", symbol="N_s"),
-    partial(dependence, sweep="disorder", column="disorder", what="the disorder", symbol="Δf_s/f_s", digits=3),
-)
 
 
 def choices(results: Path) -> Section:
     """What would change if the model's choices were others."""
     source = "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`"
-    section = Section("What the model's choices change", source, "choices")
+    section = Section("What the model's choices change", source, ("choices",))
     sweep = Sweep(results / "choices")
     slips = sweep.slips()
     changes = []
@@ -205,7 +189,7 @@ def choices(results: Path) -> Section:
         same = (pairs["interval"] == pairs["interval_other"]).mean()
         changes.append(f"{change.text(3)} ms {name} ({100 * same:.0f} %)")
     section.item(
-        '`break_on = "tension"` changes mean τ, and leaves a share of the intervals as they are to the last bit:'
+        '`break_on = "tension"` changes mean τ, and leaves some intervals the same to the last bit:'
         f" {'; '.join(changes)}."
     )
     still = select(slips, Delta=0.0, break_on="magnitude")
@@ -246,6 +230,6 @@ def energies(results: Path) -> Section:
             }
         )
     section.remark(
-        "The rest is lost in damping, which the paper introduces to avoid artificial vibrations of the blocks.",
+        "The rest is lost in damping.",
     )
     return section

@@ -1,5 +1,6 @@
 """The parts of the validation document, and how they are written as Markdown."""
 
+import re
 import textwrap
 from dataclasses import dataclass, field
 
@@ -9,17 +10,20 @@ WIDTH = 120
 
 @dataclass(frozen=True)
 class Check:
-    """One number against one sentence of the paper."""
+    """Measured numbers against one sentence of the paper."""
 
+    #: Empty where the criterion says it.
     claim: str
     criterion: str
     measured: str
-    agrees: bool
+    #: Whether each of them meets the criterion.
+    agrees: tuple[bool, ...]
 
-    def row(self) -> dict:
-        """Its row of a table."""
-        agrees = "yes" if self.agrees else "**no**"
-        return {"claim": self.claim, "criterion": self.criterion, "measured": self.measured, "agrees": agrees}
+    def row(self, number: str) -> dict:
+        """Its row of a table, with the number of its statement if it has one."""
+        agrees = "yes" if all(self.agrees) else "in part" if any(self.agrees) else "**no**"
+        claim = number + ": ".join(filter(None, (self.claim, self.criterion)))
+        return {"claim: criterion": claim, "measured": self.measured, "agrees": agrees}
 
 
 @dataclass(frozen=True)
@@ -34,11 +38,12 @@ class Verdict:
 class Section:
     """A statement of the paper, or a question beyond it."""
 
+    #: Begins with the number of a statement.
     title: str
-    #: The sweep files that it is measured with.
+    #: The sweep files that it is measured with, and what is to be said of them.
     source: str
-    #: A picture in results/, by the stem of its name.
-    picture: str | None = None
+    #: Pictures in results/, by the stems of their names.
+    pictures: tuple[str, ...] = ()
     checks: list[Check] = field(default_factory=list)
     #: Of a table: the cells of each row by the heads of their columns.
     rows: list[dict] = field(default_factory=list)
@@ -48,18 +53,13 @@ class Section:
 
     def summary(self) -> dict:
         """Its row of the table of verdicts."""
-        agree = sum(check.agrees for check in self.checks)
-        verdict = self.verdict or Verdict("holds" if agree == len(self.checks) else "does not hold")
-        return {
-            "statement": self.title,
-            "verdict": verdict.word,
-            "why": verdict.reason,
-            "checks": f"{agree}/{len(self.checks)}",
-        }
+        agrees = all(all(check.agrees) for check in self.checks)
+        verdict = self.verdict or Verdict("holds" if agrees else "does not hold")
+        return {"statement": self.title, "verdict": verdict.word, "why": verdict.reason}
 
-    def check(self, claim: str, criterion: str, measured: str, agrees: bool) -> None:
+    def check(self, claim: str, criterion: str, measured: str, *agrees: bool) -> None:
         """Adds a check."""
-        self.checks.append(Check(claim, criterion, measured, bool(agrees)))
+        self.checks.append(Check(claim, criterion, measured, tuple(map(bool, agrees))))
 
     def remark(self, *sentences: str) -> None:
         """Adds a paragraph."""
@@ -69,20 +69,23 @@ class Section:
         """Adds an item of a list."""
         self.remarks.append("- " + textwrap.indent(paragraph(*sentences, width=WIDTH - 2), "  ").lstrip())
 
+    def number(self) -> str:
+        """The number of the statement, as in "12. "."""
+        return next(iter(re.findall(r"^\d+\. ", self.title)), "")
+
     def markdown(self) -> str:
-        """The section, with the checks before the table."""
-        parts = [f"### {self.title}", f"From {self.source}."]
-        if self.picture:
-            parts.append(f"![{self.picture}](../results/{self.picture}.png)")
-        if self.checks:
-            rows = [check.row() for check in self.checks]
-            for before, check, row in zip(self.checks, self.checks[1:], rows[1:], strict=False):
-                if check.criterion == before.criterion:
-                    row["criterion"] = "the same"
-            parts.append(table(rows))
-        if self.rows:
-            parts.append(table(self.rows))
-        return "\n\n".join(parts + self.remarks)
+        """The section alone."""
+        return figure(self.title, [self])
+
+
+def figure(title: str, sections: list[Section]) -> str:
+    """Statements on the same figure: pictures, a table of all checks, further tables, remarks."""
+    sources = "; ".join(dict.fromkeys(section.source for section in sections))
+    parts = [f"### {title}", paragraph(f"From {sources}.")]
+    parts += [f"![{picture}](../results/{picture}.png)" for section in sections for picture in section.pictures]
+    checks = [check.row(section.number()) for section in sections for check in section.checks]
+    parts += [table(rows) for rows in (checks, *(section.rows for section in sections)) if rows]
+    return "\n\n".join([*parts, *(remark for section in sections for remark in section.remarks)])
 
 
 def paragraph(*sentences: str, width: int = WIDTH) -> str:
