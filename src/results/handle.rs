@@ -242,7 +242,12 @@ impl Found {
 /// Whether a host of a network disk sees an older manifest than its listing has. The copies of sweep files come first, so
 /// one that the manifest does not have says so, or was left by a run that was killed between the two.
 fn is_late(layout: &Layout<'_>, manifest: Option<&Manifest>, sweep: &Sweep) -> Result<bool, StorageError> {
-    if manifest.is_none() && layout.lists_manifest()? {
+    let names = match layout.storage.list(&layout.run()) {
+        // A file at this place is somebody else's.
+        Err(error) if error.kind() == ErrorKind::NotADirectory => return Ok(false),
+        names => names?,
+    };
+    if manifest.is_none() && names.iter().any(|name| Some(name.as_os_str()) == layout.manifest().file_name()) {
         return Ok(true);
     }
     let known = manifest.map_or(0, |manifest| manifest.extensions.len());

@@ -187,14 +187,6 @@ impl<'a> Layout<'a> {
         self.run().join(MANIFEST)
     }
 
-    /// Whether the manifest is listed. On a network disk it may be so before it can be opened.
-    ///
-    /// # Errors
-    /// When the folder cannot be listed.
-    pub fn lists_manifest(&self) -> Result<bool, StorageError> {
-        Ok(self.storage.list(&self.run())?.iter().any(|name| name == MANIFEST))
-    }
-
     /// Copy of the sweep file of an extension.
     #[must_use]
     pub fn sweep(&self, extension: usize) -> PathBuf {
