@@ -94,13 +94,22 @@ impl Study {
         }
     }
 
-    /// The same at other sets, and with this solver and tolerances of the event-driven one instead.
+    /// The same at other sets, with tolerances of the event-driven solver and this one instead.
     #[must_use]
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
-        let mut all = vec![solver];
-        all.extend(solvers(&[], &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6], &[1e-3, 1e-4, 1e-6, 1e-8]));
-        let solvers = all.iter().enumerate().filter(|(place, solver)| !all[..*place].contains(solver));
-        Self { sets, solvers: solvers.map(|(_, &solver)| solver).collect(), first_set_multiple: 1, ..self }
+        let (mut time_steps, mut on_the_grid, mut in_taylor_steps) =
+            (Vec::new(), vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6], vec![1e-3, 1e-4, 1e-6, 1e-8]);
+        let (settings, setting) = match solver {
+            Solver::FixedStep { time_step } => (&mut time_steps, time_step),
+            Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
+                (&mut on_the_grid, tolerance)
+            }
+            Solver::EventDriven { tolerance, .. } => (&mut in_taylor_steps, tolerance),
+        };
+        settings.push(setting);
+        settings.sort_by(|a, b| b.total_cmp(a));
+        settings.dedup();
+        Self { sets, solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps), first_set_multiple: 1, ..self }
     }
 }
 

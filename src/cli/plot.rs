@@ -2,6 +2,7 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
+use super::run::no_standing_figure;
 use crate::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
 use crate::results::Results;
 use crate::results::layout::Layout;
@@ -161,6 +162,9 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             vec![file.clone()]
         }
     };
+    if files.is_empty() {
+        output::report(&no_standing_figure(layout));
+    }
     for path in files {
         output::print(&format!("{}\n", shown(&path)))?;
     }

@@ -177,11 +177,23 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
     let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
     if !arguments.json {
         output::pairs(&reduce::summary_lines(&summary, layout))?;
-        for path in figures {
-            output::print(&format!("figure  {}\n", shown(&path)))?;
+        for path in &figures {
+            output::print(&format!("figure  {}\n", shown(path)))?;
+        }
+        if figures.is_empty() {
+            output::report(&no_standing_figure(layout));
         }
     }
     if arguments.shard.is_some() { reduce::report_missing(&results) } else { Ok(()) }
+}
+
+/// What to do where no standing figure has its data.
+pub fn no_standing_figure(layout: &Layout<'_>) -> String {
+    let root = output::quoted_path(layout.root());
+    format!(
+        "no standing figure has its data here; for one of your own: stickslip plot {root} --x V0 --y tau_mean \
+         (--list names all columns)"
+    )
 }
 
 /// What to do after a run that stopped early.
@@ -202,7 +214,7 @@ fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
     let mut pairs = vec![
-        ("jobs run", format!("{}, {} failed", report.jobs_run, report.jobs_failed)),
+        ("jobs run", format!("{}, {} failed", report.jobs_run + report.jobs_spilled, report.jobs_failed)),
         ("parts committed", report.parts_committed.to_string()),
     ];
     if report.jobs_run > 0 {

@@ -309,11 +309,11 @@ fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Resul
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
     let outcome = report.outcome;
-    let share = |share: f64| format!("{:.3} % of the time within slips", 100.0 * share);
-    let regime = report
-        .regime
-        .zip(report.slip_share)
-        .map_or("none".to_owned(), |(regime, of)| format!("{regime}, {}", share(of)));
+    let regime = match report.regime.zip(report.slip_share) {
+        None => "none".to_owned(),
+        Some((regime, _)) if slips.is_empty() => regime.to_owned(),
+        Some((regime, share)) => format!("{regime}, {:.3} % of the time within slips", 100.0 * share),
+    };
     output::pairs(&[
         ("job", report.job_id),
         ("simulated time", format!("{:.6} s", report.simulated_seconds)),

@@ -72,7 +72,7 @@ pub enum FigureError {
         reason: String,
     },
     /// A figure does not fit the size that is asked for.
-    #[error("--size: figure {figure} needs at least {:.0}mmx{:.0}mm with its legend and small print", size.width.ceil(), size.height.ceil())]
+    #[error("--size: figure {figure} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print", size.width.ceil(), size.height.ceil())]
     TooSmall {
         /// Name of the figure.
         figure: String,

@@ -79,6 +79,8 @@ pub(super) struct Collector<'a, 'e> {
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
     open: BTreeMap<(usize, u64), OpenPart>,
+    /// Number and predicted cost of the jobs of the parts that it has committed, spilled ones included.
+    own: (u64, f64),
 }
 
 impl<'a, 'e> Collector<'a, 'e> {
@@ -91,7 +93,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { share, member, walltime, threads, stop, events, report, open: BTreeMap::new() }
+        Self { share, member, walltime, threads, stop, events, report, open: BTreeMap::new(), own: (0, 0.0) }
     }
 
     /// Runs jobs of the share until none is left for this worker, the flag turns true, the
@@ -158,8 +160,8 @@ impl<'a, 'e> Collector<'a, 'e> {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
                 last_look = Instant::now();
                 let (jobs, cost) = self.share.done_since()?;
-                let jobs = jobs.saturating_sub(self.report.jobs_run);
-                let predicted_cost = (cost - self.report.predicted_cost).max(0.0);
+                let jobs = jobs.saturating_sub(self.own.0);
+                let predicted_cost = (cost - self.own.1).max(0.0);
                 self.events.send(&RunEvent::OthersDone { jobs, predicted_cost })?;
             }
             if last_tick.elapsed() >= TICK {
@@ -258,6 +260,9 @@ impl<'a, 'e> Collector<'a, 'e> {
         let Taken { part, spilled, .. } = &*whole.of;
         self.share.results.commit(&self.member.staging(), part, &whole.outcomes, spilled)?;
         self.walltime.committed(begin.elapsed().as_secs_f64());
+        if !whole.of.again {
+            self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
+        }
         let (part, jobs) = (part_name(part), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
         let OpenPart { predicted_cost, measured: JobTime { cpu: measured_cost, wall }, .. } = *whole;

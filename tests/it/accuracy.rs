@@ -46,7 +46,7 @@ fn scaling_takes_no_option_of_the_study() {
 
 /// Two sets of a fast slider, with seeds, which make no further sets.
 const SWEEP: &str = "name = 'mine'\n[model]\nN = 9\nNs = 5\nM = 0.006\nK = 7e7\nKd = 1e8\n\
-                     [axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 4 }\n[solver]\ntolerance = 1e-5\n";
+                     [axes]\nV0 = [1e-4, 2e-4]\nseed = { count = 4 }\n[solver]\ntolerance = 2e-5\n";
 
 #[test]
 fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
@@ -56,7 +56,7 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
     let methods = printed["methods"].as_array().unwrap();
     let solvers: Vec<_> =
         methods.iter().map(|row| (row["method"].as_str().unwrap(), row["setting"].as_f64())).collect();
-    assert_eq!(solvers[0], ("event-driven", Some(1e-5)), "that of the sweep is the first");
+    assert!(solvers.contains(&("grid", Some(2e-5))), "that of the sweep");
     assert!(solvers.contains(&("grid", Some(1e-3))) && solvers.contains(&("taylor", Some(1e-8))), "{solvers:?}");
     assert!(solvers.iter().all(|&(method, _)| method != "fixed-step"));
     let table = folder.file("mine/methods.parquet");
