@@ -192,6 +192,26 @@ fn faulty(job: &Job, faults: bool) -> Result<Measurements, SimulationError> {
 }
 
 #[test]
+fn a_retry_that_is_killed_before_its_last_rename_leaves_nothing_that_looks_damaged() {
+    let (root, kept) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    run_all(root.path(), &sweep(SEEDS, ""), &|job, _| faulty(job, true));
+    let jobs = root.path().join("tables/jobs");
+    let copy = |from: &Path, to: &Path| {
+        for file in fs::read_dir(from).unwrap().map(|file| file.unwrap().path()) {
+            fs::copy(&file, to.join(file.file_name().unwrap())).unwrap();
+        }
+    };
+    copy(&jobs, kept.path());
+    retry(root.path(), &sweep(SEEDS, ""), &fine);
+    // The jobs come last.
+    copy(kept.path(), &jobs);
+    let verification = Results::verify(&Layout::new(&Disk, root.path())).unwrap();
+    assert!(verification.problems.is_empty(), "{:?}", verification.problems);
+    retry(root.path(), &sweep(SEEDS, ""), &fine);
+    assert!(tables_of(root.path()) == expected_tables());
+}
+
+#[test]
 fn failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them() {
     let root = tempfile::tempdir().unwrap();
     let report = run_all(root.path(), &sweep(SEEDS, ""), &|job, _| faulty(job, true));
