@@ -191,7 +191,7 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
 pub fn no_standing_figure(layout: &Layout<'_>) -> String {
     let root = output::quoted_path(layout.root());
     format!(
-        "no standing figure has its data here; for one of your own: stickslip plot {root} --x V0 --y tau_mean \
+        "no standing figure has its data here; for one of your own: stickslip plot {root} --x V0 --y mean_friction \
          (--list names all columns)"
     )
 }

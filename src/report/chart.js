@@ -63,8 +63,12 @@ class Chart {
     const { [name]: axis, layers } = this.content;
     let [low, high] = [Infinity, -Infinity];
     for (const layer of layers) {
-      if (layer.type !== "points" && layer.type !== "bars") continue;
-      const lists = layer.type === "points" ? [layer[name]] : name === "x" ? [layer.low, layer.high] : [layer.y, [0]];
+      const lists = {
+        points: [layer[name]],
+        bars: name === "x" ? [layer.low, layer.high] : [layer.y, [0]],
+        intervals: name === "x" ? [layer.x] : [layer.low, layer.high],
+      }[layer.type];
+      if (!lists || layer.mayLeave) continue;
       for (const list of lists) {
         for (let k = 0; k < list.length; k++) {
           const value = list[k];

@@ -224,12 +224,19 @@ class Explorer {
       colour: red,
     });
     const bins = byName(report.backbone);
-    const [centre, locked, low, high] = [
-      "eta_centre",
+    const [from, to, locked, low, high] = [
+      "eta_low",
+      "eta_high",
       "locked_phase_mean",
       "locked_phase_mean_low",
       "locked_phase_mean_high",
     ].map((name) => bins.get(name).values);
+    // At the mean of their sets, as in the figure.
+    const centre = from.map((least, bin) => {
+      const isIn = (eta, set) => report.values("locked")[set] && eta >= least && eta < to[bin];
+      const logs = report.values("eta").filter(isIn).map(Math.log);
+      return Math.exp(logs.reduce((sum, log) => sum + log, 0) / logs.length);
+    });
     const binTip = (k) => [
       make("strong", {}, `${counted(bins.get("locked_sets").values[k], "locked set")} at η = ${number(centre[k])}`),
       `mean φ = ${number(locked[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
@@ -239,14 +246,14 @@ class Explorer {
       y: { label: "φ (rad)" },
       layers: [
         ...this.slipLayers(eta, phase),
-        curve(1),
-        { ...curve(2), dash: [5, 4] },
-        { type: "intervals", x: centre, low, high, colour: mean },
+        { ...curve(1), dash: [5, 4] },
+        curve(2),
+        { type: "intervals", x: centre, low, high, colour: mean, mayLeave: true },
         { type: "points", x: centre, y: locked, colours: [mean], size: 4, tip: binTip },
       ],
       key: [
         [mean, "mean of locked sets, 95 %"],
-        [red, "φ_min, Eq. 2; dashed: −2√(π/η)", "stroke"],
+        [red, "−2√(π/η); dashed: φ_min, Eq. 2", "stroke"],
       ],
       empty: "no slip under modulation",
     });
