@@ -153,8 +153,8 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
 /// What each solver costs at each set, how far its first breaks are off, and by how much it biases the means of slips.
 fn study_text(study: &Study, findings: &Findings) -> String {
     let mut lines = vec![format!(
-        "{}; one thread; CPU time per slip by the cheapest of {} realisations, timed in turn, then that of the median and \
-         of the dearest over it; errors of the first {} breaks: median (largest)",
+        "{}; one thread; CPU time per slip by the cheapest of {} realisations, and the median and dearest as multiples of \
+         it; errors of the first {} breaks: median (largest)",
         accuracy::cost::processor(),
         study.seeds,
         study.breaks
@@ -252,7 +252,7 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let halves = rows.iter().filter_map(|row| of(row, Quantity::Interval)).map(half);
     if let Some(hidden) = halves.max_by(f64::total_cmp) {
         lines.push(format!(
-            "a bias of intervals below {hidden:.1} % does not show in this number; more --seeds show smaller ones"
+            "with this many slips a bias of the interval below {hidden:.1} % may not show; take more --seeds to see smaller ones"
         ));
     }
     lines
