@@ -2,6 +2,7 @@
 //! of τ, start-up, and a sample of slips for scatter figures.
 
 mod backbone;
+mod chosen;
 pub mod circular;
 mod confidence;
 mod histogram;
@@ -16,6 +17,7 @@ mod slip_stats;
 mod startup;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
+pub use chosen::{ChosenSet, reduce_chosen};
 pub use confidence::{CONFIDENCE, Interval};
 pub use histogram::{BINS_PER_MEAN, HistogramBin};
 pub use moments::{Moments, quantile};

@@ -162,9 +162,16 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
 }
 
 columns! {
-    /// What a reduction takes from the jobs table beside the parameters.
-    struct JobOfSet {
+    /// The set of a job, and the job.
+    pub(super) struct JobOfSet {
         set_id: String;
+        facts: JobFacts;
+    }
+}
+
+columns! {
+    /// What a reduction takes from the jobs table beside set and parameters.
+    pub(super) struct JobFacts {
         outcome: JobOutcome;
         slips: Option<u64>;
         mean_friction: Option<f64>;
@@ -181,6 +188,26 @@ columns! {
     }
 }
 
+impl SetJobs {
+    /// A job of the set has ended.
+    pub(super) fn push(&mut self, job: &JobFacts) {
+        if job.outcome == JobOutcome::Failed {
+            self.failed += 1;
+            return;
+        }
+        self.finished += 1;
+        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
+        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
+        self.friction.extend(job.mean_friction);
+        self.attached_fraction.extend(job.attached_fraction);
+        self.slip_share.extend(job.slip_share);
+        self.regime = match (self.regime, job.regime) {
+            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
+            (regime, other) => other.or(regime),
+        };
+    }
+}
+
 /// The sets of all jobs, in the order of their parameters.
 fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
@@ -188,20 +215,7 @@ fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
         for (job, parameters) in batch? {
             let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters.parameters);
             let set = sets.entry(job.set_id).or_insert_with_key(new);
-            if job.outcome == JobOutcome::Failed {
-                set.failed += 1;
-            } else {
-                set.finished += 1;
-                set.slips = set.slips.saturating_add(job.slips.unwrap_or(0));
-                set.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-                set.friction.extend(job.mean_friction);
-                set.attached_fraction.extend(job.attached_fraction);
-                set.slip_share.extend(job.slip_share);
-                set.regime = match (set.regime, job.regime) {
-                    (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
-                    (regime, other) => other.or(regime),
-                };
-            }
+            set.push(&job.facts);
         }
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
@@ -257,11 +271,7 @@ fn gather(slips: Dataset<'_>, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Ga
             let parameters = &set.parameters;
             let is_ramped = parameters.ramp_time > 0.0;
             let eta = slip.modulation.eta(parameters.drive_velocity);
-            if is_ramped {
-                slips.push(&slip, &PhaseLimits::at(eta));
-            } else {
-                slips.push(&slip, &limits[index]);
-            }
+            slips.push_of(parameters, &slip, &limits[index]);
             if here % spacing == 0 {
                 let point = Point {
                     drive_velocity: parameters.drive_velocity,

@@ -182,15 +182,15 @@ impl<'a> Results<'a> {
 }
 
 /// What a directory holds that a sweep can be run in: its extensions, and which parts are done; none if it is fresh.
-struct Found {
+pub(super) struct Found {
     manifest: Option<Manifest>,
-    extensions: Vec<Extension>,
-    done: DoneParts,
+    pub extensions: Vec<Extension>,
+    pub done: DoneParts,
 }
 
 impl Found {
     /// Looks into a directory.
-    fn look(layout: &Layout<'_>, sweep: &Sweep) -> Result<Self, ResultsError> {
+    pub fn look(layout: &Layout<'_>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let begin = Instant::now();
         // In this order: another run may write the manifest in between, and none removes it.
         let mut seen = (is_fresh(layout)?, manifest::read_with_sweeps(layout)?);
@@ -219,7 +219,7 @@ impl Found {
     }
 
     /// Whether this sweep was the one asked for last.
-    fn is_of(&self, sweep: &Sweep) -> bool {
+    pub fn is_of(&self, sweep: &Sweep) -> bool {
         self.extensions.last().is_some_and(|last| last.sweep.text() == sweep.text())
     }
 

@@ -21,7 +21,7 @@ use std::vec::IntoIter;
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
 /// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
-const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
+pub(super) const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
 const LOOK_BUSY: Duration = Duration::from_secs(5);
 
 /// Parts that are a worker's to take, and which of them were done when that was looked up.
