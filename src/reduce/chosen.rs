@@ -91,6 +91,27 @@ columns! {
     }
 }
 
+/// The row of a set of these jobs.
+#[cfg(test)]
+pub(crate) fn row_of(parameters: &Parameters, jobs: &[crate::observe::Measurements]) -> SetRow {
+    use crate::results::tables::JobOutcome;
+    let limits = PhaseLimits::at(parameters.eta());
+    let (mut set, mut slips) = (SetJobs::new(String::new(), parameters.clone()), SetSlips::default());
+    for job in jobs {
+        let averages = job.averages;
+        set.push(&JobFacts {
+            outcome: JobOutcome::of(job),
+            slips: Some(job.slips.len() as u64),
+            mean_friction: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
+            regime: job.regime(),
+        });
+        job.slips.iter().for_each(|slip| slips.push_of(parameters, slip, &limits));
+    }
+    slips.finish(set).row
+}
+
 /// Reduces these sets.
 fn reduce_sets(files: Dataset<'_>, sets: Vec<Jobs>) -> Result<Vec<ChosenSet>, DatasetError> {
     let mut slips: HashMap<String, BTreeMap<u64, Vec<Slip>>> = HashMap::new();

@@ -11,12 +11,16 @@ mod point;
 mod rank;
 mod read;
 mod reduction;
+mod rounds;
 mod sequence;
 mod set;
 mod slip_stats;
 mod startup;
+mod statistic;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
+#[cfg(test)]
+pub(crate) use chosen::row_of;
 pub use chosen::{ChosenSet, reduce_chosen};
 pub use confidence::{CONFIDENCE, Interval};
 pub use histogram::{BINS_PER_MEAN, HistogramBin};
@@ -25,8 +29,10 @@ pub use point::{MAX_POINTS, Point, RampStage};
 pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
+pub use rounds::RoundOfSet;
 pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
+pub use statistic::StatisticValue;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
@@ -74,6 +80,7 @@ mod tests {
     fn documented_reduced_tables_are_those_written() {
         let tables = [
             markdown::<SetRow>(),
+            markdown::<RoundOfSet>(),
             markdown::<HistogramBin>(),
             markdown::<StartupRow>(),
             markdown::<BackboneBin>(),

@@ -8,6 +8,7 @@ use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin};
 use super::histogram::{HistogramBin, histogram};
 use super::point::{Point, RampStage, spacing};
+use super::rounds::SetWriter;
 use super::set::{SetJobs, SetRow, SetSlips};
 use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
@@ -117,7 +118,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
     let footer = &results.footer(results.extensions().len() - 1);
-    let mut set_writer = TableWriter::<SetRow>::new(stage(SetRow::NAME)?, footer)?;
+    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
     let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;

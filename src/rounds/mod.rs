@@ -8,6 +8,8 @@
 //! function of the sweep and of the committed rows of the jobs that its earlier rounds chose: the same for any threads,
 //! workers, kills and order, and for a directory that has had other sweeps.
 
+#[cfg(test)]
+mod coverage;
 mod precision;
 mod refinement;
 
@@ -16,7 +18,6 @@ pub use precision::MIN_SEEDS;
 use crate::reduce::{ChosenSet, SetRow, reduce_chosen};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Round, Standing, Sweep, merged};
-use crate::table::columns::{Cell, Row};
 use precision::Need;
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -80,69 +81,4 @@ fn decide(sweep: &Sweep, sets: &[ChosenSet]) -> Round {
         points.extend(division.sets.into_iter().flat_map(|set| sweep.points_of_set(set, 0..seeds)));
     }
     Round { points: merged(points), standing }
-}
-
-/// What a column of a set holds.
-#[derive(Clone, Debug, PartialEq)]
-enum Value {
-    Number(f64),
-    Class(String),
-    Nothing,
-}
-
-impl Value {
-    /// Of a column of the table of sets.
-    fn of(row: &SetRow, column: &str) -> Self {
-        let wanted = SetRow::columns().iter().position(|known| known.name == column);
-        let (mut position, mut value) = (0, Self::Nothing);
-        row.cells(&mut |cell| {
-            if Some(position) == wanted {
-                value = match cell {
-                    Cell::Null => Self::Nothing,
-                    Cell::Real(number) => Self::Number(number),
-                    Cell::Count(count) => Self::Number(count as f64),
-                    Cell::Flag(flag) => Self::Class(flag.to_string()),
-                    Cell::Text(text) => Self::Class(text.to_owned()),
-                };
-            }
-            position += 1;
-        });
-        value
-    }
-
-    const fn number(&self) -> Option<f64> {
-        if let Self::Number(number) = self { Some(*number) } else { None }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sweep::{STATISTICS, StatisticKind};
-    use crate::table::columns::Kind;
-
-    #[test]
-    fn the_statistics_that_a_sweep_file_may_name_are_the_columns_of_a_set() {
-        let columns = SetRow::columns();
-        let is_end = |name: &str| name.ends_with("_low") || name.ends_with("_high");
-        for column in &columns {
-            let has_interval = columns.iter().any(|other| other.name == format!("{}_low", column.name));
-            let known = STATISTICS.iter().find(|statistic| statistic.key == column.name);
-            // Parameters, and what is expected whatever happens, tell nothing of a set.
-            let is_given = column.name.starts_with("expected_") || column.name == "eta";
-            let is_parameter = crate::model::Symbol::from_key(&column.name).is_some();
-            let is_statistic = match column.kind {
-                Kind::Real => !is_end(&column.name) && !is_given && !is_parameter,
-                Kind::Flag => true,
-                Kind::Text => column.name == "regime",
-                Kind::Count => false,
-            };
-            assert_eq!(known.is_some(), is_statistic, "{}", column.name);
-            let Some(known) = known else { continue };
-            assert_eq!(known.has_interval(), has_interval, "{}", column.name);
-            assert_eq!(known.unit, column.unit, "{}", column.name);
-            assert_eq!(known.kind == StatisticKind::Class, column.kind != Kind::Real, "{}", column.name);
-        }
-        assert!(STATISTICS.iter().all(|known| columns.iter().any(|column| column.name == known.key)));
-    }
 }

@@ -8,9 +8,8 @@
 //! value less often than 95 of 100 times. The shorter the first looks, the more so: no set ends with fewer than
 //! [`MIN_SEEDS`] seeds. What that does to coverage is measured in `docs/rounds.md`.
 
-use super::Value;
 use crate::reduce::SetRow;
-use crate::sweep::{Precision, Target};
+use crate::sweep::Precision;
 
 /// Seeds of a set below which its interval is not trusted, unless it may have no more.
 pub const MIN_SEEDS: u64 = 12;
@@ -29,22 +28,8 @@ pub(super) enum Need {
 /// What a set with these seeds and statistics needs.
 pub(super) fn need(precision: &Precision, seeds: u64, row: &SetRow) -> Need {
     let most = *precision.seeds.end();
-    let errors = precision.statistics.iter().filter_map(|statistic| {
-        let value = Value::of(row, statistic.key).number()?;
-        let ends = ["low", "high"].map(|end| Value::of(row, &format!("{}_{end}", statistic.key)).number());
-        let half = match ends {
-            [Some(low), Some(high)] => 0.5 * (high - low),
-            _ => f64::INFINITY,
-        };
-        let target = match precision.target {
-            Target::Relative(share) => share * value.abs(),
-            Target::Absolute(target) => target,
-        };
-        // Nothing is known better than exactly.
-        Some(if half == 0.0 { 0.0 } else { half / target })
-    });
-    let Some(worst) = errors.reduce(f64::max) else { return Need::Nothing };
-    match seeds_for(seeds, worst, most) {
+    let Some(worst) = row.error_over_target(precision) else { return Need::Nothing };
+    match seeds_for(seeds, worst, MIN_SEEDS, most) {
         None => Need::Nothing,
         Some(_) if seeds >= most => Need::TooMuch,
         Some(more) => Need::Seeds(more),
@@ -52,8 +37,9 @@ pub(super) fn need(precision: &Precision, seeds: u64, row: &SetRow) -> Need {
 }
 
 /// The seeds that a set with some gets next, if its half-width is `error` times the target; `None` if it needs no more.
-fn seeds_for(seeds: u64, error: f64, most: u64) -> Option<u64> {
-    let least = MIN_SEEDS.min(most);
+/// It ends with `least` at least, and with `most` at most.
+pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option<u64> {
+    let least = least.min(most);
     if error <= 1.0 && seeds >= least {
         return None;
     }
@@ -77,7 +63,7 @@ fn seeds_for(seeds: u64, error: f64, most: u64) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::reduce::Interval;
-    use crate::sweep::{STATISTICS, Statistic};
+    use crate::sweep::{STATISTICS, Statistic, Target};
     use proptest::prelude::*;
 
     fn statistic(key: &str) -> Statistic {
@@ -131,7 +117,7 @@ mod tests {
             seeds in 2_u64..1000, error in prop_oneof![0.0..4.0, Just(f64::INFINITY), Just(f64::NAN)], most in 2_u64..2000
         ) {
             let seeds = seeds.min(most);
-            match seeds_for(seeds, error, most) {
+            match seeds_for(seeds, error, MIN_SEEDS, most) {
                 None => prop_assert!(error <= 1.0 && seeds >= MIN_SEEDS.min(most)),
                 Some(next) if seeds == most => prop_assert_eq!(next, most),
                 Some(next) => {

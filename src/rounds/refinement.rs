@@ -7,8 +7,7 @@
 //! Cells are not recorded: those that count as divided are those whose new sets are all there. Coarse cells go first, then
 //! grid order, as long as the sweep has room for their sets.
 
-use super::Value;
-use crate::reduce::SetRow;
+use crate::reduce::{SetRow, StatisticValue};
 use crate::sweep::{Contrast, RefinedAxis, Refinement, Sweep};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -39,7 +38,7 @@ pub(super) fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u6
         if row.finished_jobs == 0 {
             continue;
         }
-        let (class, number) = class(Value::of(row, refinement.by.key), refinement.contrast);
+        let (class, number) = class(row.statistic(refinement.by.key), refinement.contrast);
         for cell in grid.touching(rows) {
             if let Some(seen) = seen.get_mut(&cell) {
                 seen.add(&class, number);
@@ -92,12 +91,12 @@ impl Seen {
 }
 
 /// The class of a value, and the number that may vary within it. A statistic without value is a class of its own.
-fn class(value: Value, contrast: Contrast) -> (String, Option<f64>) {
+fn class(value: StatisticValue, contrast: Contrast) -> (String, Option<f64>) {
     match (value, contrast) {
-        (Value::Class(class), _) => (class, None),
-        (Value::Nothing, _) => (String::new(), None),
-        (Value::Number(number), Contrast::Threshold(threshold)) => ((number > threshold).to_string(), None),
-        (Value::Number(number), _) => ("number".to_owned(), Some(number)),
+        (StatisticValue::Class(class), _) => (class, None),
+        (StatisticValue::Nothing, _) => (String::new(), None),
+        (StatisticValue::Number(number), Contrast::Threshold(threshold)) => ((number > threshold).to_string(), None),
+        (StatisticValue::Number(number), _) => ("number".to_owned(), Some(number)),
     }
 }
 

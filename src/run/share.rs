@@ -206,11 +206,20 @@ impl<'a> Work<'a> {
         let last_look = *self.last_look.get_or_insert_with(Instant::now);
         if self.walltime.refused().is_some() {
             self.has_ended = true;
-        } else if last_look.elapsed() >= if is_busy { LOOK_BUSY } else { LOOK } {
+        } else if last_look.elapsed() >= self.pause(is_busy) {
             self.last_look = Some(Instant::now());
             self.has_ended = self.take_abandoned()?;
         }
         Ok(())
+    }
+
+    /// Time between two looks at workers who may have died; none for one that was alone and has nothing else to do.
+    fn pause(&self, is_busy: bool) -> Duration {
+        match (is_busy, self.others.is_empty()) {
+            (true, _) => LOOK_BUSY,
+            (false, true) => Duration::ZERO,
+            (false, false) => LOOK,
+        }
     }
 
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and

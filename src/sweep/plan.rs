@@ -15,6 +15,8 @@ use std::ops::{Deref, Range, RangeInclusive};
 pub const PART_COST: f64 = 5.0;
 /// Least number of parts of a sweep with jobs of equal cost, if it has as many jobs: enough for some dozens of workers.
 const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
+/// Least predicted CPU time of a part of a round, in s: of many rounds, most have few jobs, and a commit takes some 20 ms.
+const ROUND_PART_COST: f64 = if cfg!(test) { 0.0 } else { 0.25 };
 /// A sweep has hardly more parts than twice this: names in a folder stay few.
 const MANY_PARTS: f64 = 20_000.0;
 /// What rounding may add to the sum of costs.
@@ -104,7 +106,8 @@ impl Extension {
     fn in_round(sweep: &Sweep, earlier: &[Self], round: Option<Round>) -> Self {
         let mut own = Self { sweep: sweep.clone(), part_cost: 0.0, kept: None, round };
         let total: f64 = own_jobs(&own, earlier, &sweep.points()).map(|job| job.cost).sum();
-        own.part_cost = PART_COST.max(total / MANY_PARTS).min(total / MIN_PARTS) * (1.0 + ROUNDING);
+        let least = if own.round.is_some() { ROUND_PART_COST } else { 0.0 };
+        own.part_cost = PART_COST.max(total / MANY_PARTS).min(least.max(total / MIN_PARTS)) * (1.0 + ROUNDING);
         own
     }
 

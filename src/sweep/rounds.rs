@@ -6,9 +6,9 @@
 
 use super::axes::Axis;
 use super::grid::Sweep;
-use super::quantity::Quantity;
+use super::quantity::{Point, Quantity};
 use super::statistic::Statistic;
-use crate::model::Symbol;
+use crate::model::{Parameters, Symbol};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -210,6 +210,16 @@ impl Sweep {
     pub fn set_of(&self, point: u64) -> u64 {
         let stride = self.seed_stride();
         point - point / stride % self.seed_count() * stride
+    }
+
+    /// The set of a job with these canonical parameters, whatever its seed.
+    #[must_use]
+    pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
+        let mut point = Point { parameters: parameters.clone(), fixes_period: None };
+        if let Some(axis) = self.seed_axis() {
+            self.axes[axis].apply(0, &mut point);
+        }
+        self.find(&point.parameters).map(|point| self.set_of(point))
     }
 
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
