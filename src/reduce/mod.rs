@@ -2,6 +2,7 @@
 //! of τ, start-up, and a sample of slips for scatter figures.
 
 mod backbone;
+mod cells;
 mod chosen;
 pub mod circular;
 mod confidence;
@@ -19,6 +20,7 @@ mod startup;
 mod statistic;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
+pub use cells::{CellOfGrid, CellRow, Cells, Division, divide};
 #[cfg(test)]
 pub(crate) use chosen::row_of;
 pub use chosen::{ChosenSet, reduce_chosen};
@@ -81,6 +83,7 @@ mod tests {
         let tables = [
             markdown::<SetRow>(),
             markdown::<RoundOfSet>(),
+            markdown::<CellRow>(),
             markdown::<HistogramBin>(),
             markdown::<StartupRow>(),
             markdown::<BackboneBin>(),

@@ -6,6 +6,7 @@
 
 use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin};
+use super::cells::{CellRow, cell_rows};
 use super::histogram::{HistogramBin, histogram};
 use super::point::{Point, RampStage, spacing};
 use super::rounds::SetWriter;
@@ -89,6 +90,12 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
     let _alone = alone(layout, WRITER)?;
     let (commit, summary) = layout.read_tables(|| stage(results, max_slips))??;
     results.publish(commit)?;
+    let cells = layout.reduced_file(CellRow::NAME);
+    let is_refined = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
+    if !is_refined && layout.storage.exists(&cells)? {
+        // Of a sweep before.
+        layout.storage.remove(&cells)?;
+    }
     Ok(summary)
 }
 
@@ -119,6 +126,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
     let footer = &results.footer(results.extensions().len() - 1);
     let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
+    let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
+    let mut refined_sets = BTreeMap::new();
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
     let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
@@ -131,6 +140,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             let set = slips.finish(jobs);
             let row = &set.row;
             set_writer.push(row)?;
+            if refinement.is_some() {
+                refined_sets.extend(set_writer.chosen(row).map(|number| (number, row.clone())));
+            }
             for bin in histogram(row, &set.intervals) {
                 histogram_writer.push(&bin)?;
             }
@@ -153,6 +165,12 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     summary.backbone = pooled.finish();
     for bin in &summary.backbone {
         backbone_writer.push(bin)?;
+    }
+    if let Some(refinement) = refinement {
+        let mut cell_writer = TableWriter::new(stage(CellRow::NAME)?, footer)?;
+        let known = refined_sets.iter().map(|(&number, row)| (number, row)).collect();
+        cell_rows(results.sweep(), refinement, &known).iter().try_for_each(|cell| cell_writer.push(cell))?;
+        cell_writer.finish()?;
     }
     set_writer.finish()?;
     histogram_writer.finish()?;

@@ -76,6 +76,13 @@ impl<'a> SetWriter<'a> {
         }
     }
 
+    /// The number of a set that the rounds have chosen.
+    pub(super) fn chosen(&self, row: &SetRow) -> Option<u64> {
+        let Self::InRounds(_, rounds) = self else { return None };
+        let set = rounds.results.sweep().set_with(&row.parameters.parameters);
+        set.filter(|set| rounds.of_sets.contains_key(set))
+    }
+
     pub(super) fn finish(self) -> Result<(), DatasetError> {
         match self {
             Self::Plain(writer) => writer.finish().map(drop),

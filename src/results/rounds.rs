@@ -59,7 +59,7 @@ impl Results<'_> {
         let layout = self.layout();
         let _alone = alone(layout, manifest::WRITER)?;
         self.check_place()?;
-        let found = Found::look(layout, self.sweep())?;
+        let found = Found::look(layout, self.sweep(), 1)?;
         if !found.is_of(self.sweep()) {
             let problem = "another sweep file was begun here meanwhile; choose another directory with --out";
             return Err(ResultsError::refused(layout.root(), problem));

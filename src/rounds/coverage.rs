@@ -15,7 +15,7 @@ use std::sync::atomic::AtomicBool;
 const FROM: u64 = 4;
 const MOST: u64 = 128;
 /// Repetitions with the model.
-const REPETITIONS: u64 = 400;
+const REPETITIONS: u64 = 200;
 
 /// What a number of repetitions came to.
 #[derive(Debug)]
@@ -93,6 +93,9 @@ fn sets_that_end_when_they_are_precise_hold_the_true_value_as_often_as_they_say(
         // 2000 repetitions give coverage to 0.5 (standard error).
         let found = of_draws(2000, MIN_SEEDS, target, false);
         assert!((93.0..97.0).contains(&found.coverage) && found.met > 99.9, "{target}: {found:?}");
+        // Of skewed values, intervals of a fixed number of seeds hold the true one in 94 to 95 %.
+        let found = of_draws(2000, MIN_SEEDS, target, true);
+        assert!((92.0..97.0).contains(&found.coverage), "{target}, skewed: {found:?}");
     }
 }
 
@@ -108,8 +111,8 @@ fn without_the_least_number_of_seeds_they_would_not() {
 fn coverage_is_measured_with_draws_and_with_the_model() {
     for is_skewed in [false, true] {
         for target in TARGETS {
-            for least in [2, 4, 8, 12, 16] {
-                let Found { coverage, seeds, .. } = of_draws(20_000, least, target, is_skewed);
+            for least in [2, 4, 8, 16, MIN_SEEDS] {
+                let Found { coverage, seeds, .. } = of_draws(4000, least, target, is_skewed);
                 println!(
                     "draws, skewed {is_skewed}, target {target}, least {least}: {coverage:.1} %, {seeds:.1} seeds"
                 );
@@ -136,7 +139,7 @@ fn coverage_is_measured_with_draws_and_with_the_model() {
             // Of one seed, in standard deviations of its mean.
             let deviation = 0.5 * (interval.high - interval.low) / 1.96 * ((REPETITIONS * MOST) as f64).sqrt();
             for target in [0.7, 0.55, 0.4] {
-                for least in [2, 4, 8, 12, 16] {
+                for least in [2, 4, 8, 16, MIN_SEEDS] {
                     let row = |repetition: u64, seeds: u64| {
                         let begin = usize::try_from(repetition * MOST).unwrap();
                         row_of(&parameters, &jobs[begin..begin + usize::try_from(seeds).unwrap()])

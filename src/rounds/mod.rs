@@ -1,7 +1,7 @@
 //! Rounds: what a sweep that decides for itself runs next.
 //!
 //! ```text
-//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), else finer cells (refinement.rs)
+//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), else finer cells (reduce/cells.rs)
 //! ```
 //!
 //! Sets get seeds first; cells are divided when every set is as precise as it will be. Contract: a round is a pure
@@ -11,11 +11,12 @@
 #[cfg(test)]
 mod coverage;
 mod precision;
-mod refinement;
+#[cfg(test)]
+mod tests;
 
 pub use precision::MIN_SEEDS;
 
-use crate::reduce::{ChosenSet, SetRow, reduce_chosen};
+use crate::reduce::{ChosenSet, SetRow, divide, reduce_chosen};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Round, Standing, Sweep, merged};
 use precision::Need;
@@ -74,7 +75,7 @@ fn decide(sweep: &Sweep, sets: &[ChosenSet]) -> Round {
         && let Some(refinement) = &rounds.refinement
     {
         let known: BTreeMap<u64, &SetRow> = sets.iter().map(|set| (set.number, &set.row)).collect();
-        let division = refinement::divide(sweep, refinement, &known);
+        let division = divide(sweep, refinement, &known);
         standing.sets_open = division.sets.len() as u64;
         standing.cells_capped = division.cells_left;
         let seeds = rounds.seeds_at_first(sweep.seed_count());

@@ -4,7 +4,7 @@
 //! [precision]
 //! of       = "tau_mean"             a statistic with an interval, or a list of them
 //! relative = 0.01                   largest half-width of its 95 % interval; or absolute = .., in its unit
-//! seeds    = { from = 8, to = 256 } seeds of a set: at first, and at most
+//! seeds    = { from = 24, to = 256 } seeds of a set: at first, and at most
 //! [refine]
 //! axes = ["frequency", "Delta"]     ranges of [axes]
 //! by   = "locked"                   a flag, a word, or a number with threshold = .. or step = ..
@@ -42,7 +42,7 @@ pub(super) const PRECISION: &Keys = &[
     (
         "seeds",
         "Seeds of a set, 0, 1, ...: `from` at first, `to` at most",
-        "`{ from = 8, to = 256 }`; whole, 2 <= from <= to",
+        "`{ from = 24, to = 256 }`; whole, 2 <= from <= to",
     ),
 ];
 
@@ -86,9 +86,9 @@ pub(super) fn read_precision(section: &Section<'_>, places: &mut Places<'_>) -> 
         if statistics.is_empty() { Err(of.refuse("at least one statistic")) } else { Ok(statistics) }
     });
     let target = read_target(section, statistics.as_deref().unwrap_or_default());
-    let seeds = section.required("seeds", "write seeds = { from = 8, to = 256 }").and_then(|entry| {
+    let seeds = section.required("seeds", "write seeds = { from = 24, to = 256 }").and_then(|entry| {
         places.set(Quantity::Parameter(Symbol::Seed), entry.at, false);
-        let form = "seeds of a set at first and at most, such as { from = 8, to = 256 }";
+        let form = "seeds of a set at first and at most, such as { from = 24, to = 256 }";
         let table = entry.section("seeds of [precision]").ok_or_else(|| entry.must_be(form))?;
         table.only(&["from", "to"])?;
         let from = table.required("from", form)?.count(2, MAX_ROWS)?;

@@ -205,6 +205,20 @@ impl Sweep {
         self.axes.iter().map(Axis::len).collect()
     }
 
+    /// Key and value of an axis of one quantity at a row; `None` of a word, or of several quantities.
+    #[must_use]
+    pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
+        let mut point = Point { parameters: self.base.clone(), fixes_period: None };
+        self.axes[axis].apply(row, &mut point);
+        let [quantity] = self.axes[axis].quantities()[..] else { return None };
+        let value = match (quantity, point.fixes_period) {
+            (_, Some((_, value))) => value,
+            (Quantity::Parameter(symbol), None) => point.parameters.get(symbol).number()?,
+            _ => return None,
+        };
+        Some((quantity.key(), value))
+    }
+
     /// The set of a point.
     #[must_use]
     pub fn set_of(&self, point: u64) -> u64 {

@@ -244,7 +244,20 @@ fn refine() -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_documented;
+    use crate::documented::{assert_documented, assert_rows_documented};
+
+    #[test]
+    fn documented_keys_are_those_of_precision_and_refinement() {
+        for (heading, keys) in [("## [precision]", PRECISION), ("## [refine]", REFINE)] {
+            let row = |(key, meaning, allowed): &(&str, &str, &str)| format!("| `{key}` | {meaning} | {allowed} |\n");
+            let rows: String = keys.iter().map(row).collect();
+            assert_rows_documented(
+                "rounds.md",
+                heading,
+                &format!("| key | meaning | allowed |\n|---|---|---|\n{rows}"),
+            );
+        }
+    }
 
     #[test]
     fn the_documented_schema_is_the_one_printed() {

@@ -2,13 +2,14 @@
 //! sweeps, and they end.
 
 use crate::program::{Folder, json, wait};
+use std::collections::BTreeSet;
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Some seconds of CPU time, in a dozen of rounds: seeds to a precision, then finer cells.
 const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = { linear = [10, 60], points = 3 }\n\
                    Delta = { log = [1e-7, 4e-6], points = 3 }\n[record]\nslips = 10\n\
-                   [precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 4, to = 24 }\n\
+                   [precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 4, to = 30 }\n\
                    [refine]\naxes = [\"frequency\", \"Delta\"]\nby = \"locked\"\nto = { frequency = 7, Delta = 1 }\nsets = 60\n";
 
 fn manifest(folder: &Folder, out: &str) -> Vec<u8> {
@@ -19,9 +20,7 @@ fn manifest(folder: &Folder, out: &str) -> Vec<u8> {
 fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
     let folder = Folder::new();
     folder.write("map.toml", MAP);
-    let begin = Instant::now();
     let whole = json(&folder.ends(0, "run map.toml --out whole --json").stdout);
-    let longest = begin.elapsed();
     assert!(whole["rounds"]["round"].as_u64() > Some(4) && whole["rounds"]["is_over"] == true, "{whole}");
     folder.ends(0, "verify whole");
 
@@ -29,15 +28,26 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
     let ended: Vec<_> = shared.into_iter().map(wait).collect();
     assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");
 
-    // Kills at instants spread over the run, rounds and decisions alike.
-    let mut kills = 0;
-    for part in 1..=20_u32 {
+    // Kills at instants spread over the run, rounds and decisions alike; begun again whenever one has come to the end.
+    let (mut kills, mut rounds_at_kills) = (0, BTreeSet::new());
+    for run in 0.. {
         let mut child = folder.start("run map.toml --out killed --no-reduce");
-        std::thread::sleep(longest * (part % 7 + 1) / 40);
+        std::thread::sleep(Duration::from_millis(50 + 60 * (run % 7)));
         child.kill().unwrap();
-        kills += u32::from(wait(child).0.is_none());
+        if wait(child).0.is_none() {
+            kills += 1;
+            let is_there = |round: &usize| folder.path(&format!("killed/run/sweep-{round:03}.toml")).exists();
+            let rounds = (0..).take_while(is_there).count();
+            rounds_at_kills.insert(rounds);
+        } else {
+            // One that had ended.
+            fs::remove_dir_all(folder.path("killed")).unwrap();
+        }
+        if kills >= 20 && rounds_at_kills.len() >= 3 {
+            break;
+        }
+        assert!(run < 200, "{kills} kills at these numbers of rounds: {rounds_at_kills:?}");
     }
-    assert!(kills >= 8, "{kills} kills");
     folder.ends(0, "run map.toml --out killed");
 
     for out in ["shared", "killed"] {

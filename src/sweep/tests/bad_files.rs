@@ -300,7 +300,7 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
             &["absolute = 1", "different units"],
         ),
         (precision("of = \"tau_mean\"\nrelative = 0.1"), 2, &["seeds is missing"]),
-        (precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = 8"), 5, &["seeds = 8", "{ from = 8, to = 256 }"]),
+        (precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = 8"), 5, &["seeds = 8", "{ from = 24, to = 256 }"]),
         (
             precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 8, to = 4 }"),
             5,

@@ -1,4 +1,4 @@
-//! Which cells of the grid are divided next.
+//! The cells of a refined grid: which are divided next, and where the edges lie.
 //!
 //! A cell is a box of the refined axes, at fixed rows of the others; the first are those between neighbours of the sweep
 //! file. A cell is divided into halves along all axes that are not yet as fine as is wanted; along one axis that is
@@ -7,13 +7,15 @@
 //! Cells are not recorded: those that count as divided are those whose new sets are all there. Coarse cells go first, then
 //! grid order, as long as the sweep has room for their sets.
 
-use crate::reduce::{SetRow, StatisticValue};
+use super::set::SetRow;
+use super::statistic::StatisticValue;
 use crate::sweep::{Contrast, RefinedAxis, Refinement, Sweep};
+use crate::table::columns::{Table, columns};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What is to be divided.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Division {
+pub struct Division {
     /// The new sets, in order.
     pub sets: BTreeSet<u64>,
     /// Cells that would be divided, had the sweep room for their sets.
@@ -22,36 +24,85 @@ pub(super) struct Division {
 
 /// A cell: how often it was halved, and the rows of its first corner.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct CellOfGrid {
+pub struct CellOfGrid {
+    /// How often it was halved.
     pub level: u32,
+    /// Rows of the corner with the lowest; that of the seeds is the first.
     pub origin: Vec<u64>,
 }
 
-/// Divides the cells whose sets differ, for as long as there is room.
-pub(super) fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &SetRow>) -> Division {
-    let grid = Cells { sweep, refinement, known };
-    let (leaves, nodes) = grid.leaves();
-    let mut seen: HashMap<&CellOfGrid, Seen> = leaves.iter().map(|leaf| (leaf, Seen::default())).collect();
-    for (rows, set) in &nodes {
-        let Some(row) = set.and_then(|set| known.get(&set)) else { continue };
-        // Of jobs that all failed, nothing is known.
-        if row.finished_jobs == 0 {
-            continue;
-        }
-        let (class, number) = class(row.statistic(refinement.by.key), refinement.contrast);
-        for cell in grid.touching(rows) {
-            if let Some(seen) = seen.get_mut(&cell) {
-                seen.add(&class, number);
-            }
-        }
+columns! {
+    /// A cell of a refined grid.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct CellRow {
+        set_id: Option<String> = "", "set at the corner with the lowest values; null if a condition drops it";
+        level: u64 = "", "how often the cell was halved";
+        x: String = "", "the first of the refined axes";
+        x_low: f64 = "", "its lower end, in the unit of that parameter";
+        x_high: f64 = "", "its upper end";
+        y: Option<String> = "", "the second, if there is one";
+        y_low: Option<f64> = "", "its lower end";
+        y_high: Option<f64> = "", "its upper end";
+        by: String = "", "the statistic that tells sets apart";
+        differs: bool = "", "whether the sets that touch the cell differ: the edge lies in it";
+        share: Option<f64> = "", "share of these sets that are locked, or lie above the threshold; null of other statistics";
     }
-    let differs = |leaf: &&CellOfGrid| leaf.level < grid.levels() && seen[leaf].differ(refinement.contrast);
+}
+
+impl Table for CellRow {
+    const NAME: &'static str = "cells";
+    const MEANING: &'static str = "One row per undivided cell, if the sweep has `[refine]` with one axis or two";
+}
+
+/// The undivided cells, coarse ones first; none of grids that are refined along more than two axes.
+pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &SetRow>) -> Vec<CellRow> {
+    let (first, second) = match refinement.axes.as_slice() {
+        [first] => (first, None),
+        [first, second] => (first, Some(second)),
+        _ => return Vec::new(),
+    };
+    let grid = Cells { sweep, refinement, known };
+    let ends = |cell: &CellOfGrid, axis: &RefinedAxis| {
+        let row = cell.origin[axis.axis];
+        let (key, low) = sweep.value_at(axis.axis, row)?;
+        let (_, high) = sweep.value_at(axis.axis, row + Cells::length(axis, cell.level))?;
+        Some((key.to_owned(), low, high))
+    };
+    let row = |(cell, seen): (CellOfGrid, Seen)| {
+        let (x, x_low, x_high) = ends(&cell, first)?;
+        let (y, y_low, y_high) = second
+            .and_then(|axis| ends(&cell, axis))
+            .map_or((None, None, None), |(key, low, high)| (Some(key), Some(low), Some(high)));
+        let set = sweep.set_at(&cell.origin).and_then(|set| known.get(&set));
+        Some(CellRow {
+            set_id: set.map(|row| row.set_id.clone()),
+            level: u64::from(cell.level),
+            x,
+            x_low,
+            x_high,
+            y,
+            y_low,
+            y_high,
+            by: refinement.by.key.to_owned(),
+            differs: seen.differ(refinement.contrast),
+            share: seen.share(),
+        })
+    };
+    grid.seen().into_iter().filter_map(row).collect()
+}
+
+/// Divides the cells whose sets differ, for as long as there is room.
+pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &SetRow>) -> Division {
+    let grid = Cells { sweep, refinement, known };
     let mut division = Division::default();
     let mut room = refinement.max_sets.saturating_sub(known.len() as u64);
-    for leaf in leaves.iter().filter(differs) {
+    for (leaf, seen) in grid.seen() {
+        if leaf.level == grid.levels() || !seen.differ(refinement.contrast) {
+            continue;
+        }
         let is_new = |set: &u64| !known.contains_key(set) && !division.sets.contains(set);
         let new: BTreeSet<u64> =
-            grid.lattice(leaf, true).iter().filter_map(|rows| sweep.set_at(rows)).filter(is_new).collect();
+            grid.lattice(&leaf, true).iter().filter_map(|rows| sweep.set_at(rows)).filter(is_new).collect();
         // All that would be new is dropped by a condition.
         if new.is_empty() {
             continue;
@@ -69,19 +120,28 @@ pub(super) fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u6
 /// What the sets that touch a cell have.
 #[derive(Clone, Debug, Default)]
 struct Seen {
-    classes: BTreeSet<String>,
+    /// How many sets there are of each class.
+    classes: BTreeMap<String, u64>,
     range: Option<(f64, f64)>,
 }
 
 impl Seen {
     fn add(&mut self, class: &str, number: Option<f64>) {
-        if !self.classes.contains(class) {
-            self.classes.insert(class.to_owned());
+        match self.classes.get_mut(class) {
+            Some(count) => *count += 1,
+            None => drop(self.classes.insert(class.to_owned(), 1)),
         }
         if let Some(number) = number {
             let (low, high) = self.range.unwrap_or((number, number));
             self.range = Some((low.min(number), high.max(number)));
         }
+    }
+
+    /// The share of sets whose class is `true`, if it is that of a flag or a threshold.
+    fn share(&self) -> Option<f64> {
+        let count = |class: &str| self.classes.get(class).copied().unwrap_or_default() as f64;
+        let (yes, no) = (count("true"), count("false"));
+        (yes + no > 0.0).then(|| yes / (yes + no))
     }
 
     fn differ(&self, contrast: Contrast) -> bool {
@@ -101,19 +161,43 @@ fn class(value: StatisticValue, contrast: Contrast) -> (String, Option<f64>) {
 }
 
 /// The cells of a sweep.
-pub(super) struct Cells<'a> {
+pub struct Cells<'a> {
+    /// The sweep.
     pub sweep: &'a Sweep,
+    /// How it is refined.
     pub refinement: &'a Refinement,
+    /// The sets that its rounds have run.
     pub known: &'a BTreeMap<u64, &'a SetRow>,
 }
 
 /// Points of the grid by their rows, each with its set if it is a job.
-pub(super) type Nodes = BTreeMap<Vec<u64>, Option<u64>>;
+type Nodes = BTreeMap<Vec<u64>, Option<u64>>;
 
 impl Cells<'_> {
     /// How often cells can be halved.
     pub fn levels(&self) -> u32 {
         self.refinement.axes.iter().map(|axis| axis.levels).max().unwrap_or_default()
+    }
+
+    /// The cells that are not divided, in the order of [`Cells::leaves`], with what the sets that touch them have.
+    fn seen(&self) -> Vec<(CellOfGrid, Seen)> {
+        let (leaves, nodes) = self.leaves();
+        let mut seen: HashMap<&CellOfGrid, Seen> = leaves.iter().map(|leaf| (leaf, Seen::default())).collect();
+        for (rows, set) in &nodes {
+            let Some(row) = set.and_then(|set| self.known.get(&set)) else { continue };
+            // Of jobs that all failed, nothing is known.
+            if row.finished_jobs == 0 {
+                continue;
+            }
+            let (class, number) = class(row.statistic(self.refinement.by.key), self.refinement.contrast);
+            for cell in self.touching(rows) {
+                if let Some(seen) = seen.get_mut(&cell) {
+                    seen.add(&class, number);
+                }
+            }
+        }
+        let all: Vec<Seen> = leaves.iter().map(|leaf| seen.remove(leaf).unwrap_or_default()).collect();
+        leaves.into_iter().zip(all).collect()
     }
 
     /// The cells that are not divided, coarse ones first, then in grid order; and the corners of all that there were.
@@ -227,122 +311,5 @@ impl Cells<'_> {
             origins.into_iter().map(move |origin| CellOfGrid { level, origin })
         };
         (0..=self.levels()).flat_map(of_level).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::decide;
-    use super::*;
-    use crate::reduce::ChosenSet;
-    use crate::sweep::{Round, Sweep};
-    use proptest::prelude::*;
-    use std::path::Path;
-
-    fn sweep(axes: &str, refine: &str) -> Sweep {
-        let text = format!("name = \"a\"\n[model]\nT = 0.03\n[axes]\n{axes}\n[refine]\nby = \"locked\"\n{refine}");
-        Sweep::parse(&text, Path::new("test.toml")).unwrap()
-    }
-
-    /// Runs the rounds to their end, where a set is locked as this says of its parameters.
-    fn rounds(sweep: &Sweep, is_locked: impl Fn(f64, f64) -> bool) -> (Vec<Round>, BTreeMap<u64, SetRow>) {
-        let mut sets: BTreeMap<u64, SetRow> = BTreeMap::new();
-        let mut rounds = vec![sweep.first_round().unwrap()];
-        while !rounds.last().unwrap().is_end() {
-            for job in sweep.jobs().filter(|job| rounds.last().unwrap().has(job.point)) {
-                let locked = is_locked(job.parameters.modulation_amplitude, job.parameters.drive_velocity);
-                let new = || SetRow { finished_jobs: 0, is_locked: locked, ..SetRow::default() };
-                sets.entry(sweep.set_of(job.point)).or_insert_with(new).finished_jobs += 1;
-            }
-            let of = |(&number, row): (&u64, &SetRow)| ChosenSet { number, jobs: row.finished_jobs, row: row.clone() };
-            rounds.push(decide(sweep, &sets.iter().map(of).collect::<Vec<_>>()));
-            assert!(rounds.len() < 50, "no end");
-        }
-        (rounds, sets)
-    }
-
-    /// Leaves of the grid after these sets.
-    fn leaves(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Vec<CellOfGrid> {
-        let known = sets.iter().map(|(&set, row)| (set, row)).collect();
-        let refinement = sweep.rounds().unwrap().refinement.as_ref().unwrap();
-        Cells { sweep, refinement, known: &known }.leaves().0
-    }
-
-    #[test]
-    fn along_one_axis_an_edge_is_bisected() {
-        let sweep = sweep(
-            "Delta = { linear = [0.5e-6, 4.5e-6], points = 5 }\nseed = { count = 3 }",
-            "axes = \"Delta\"\nto = { Delta = 1e-9 }\nsets = 100",
-        );
-        let edge = 2.345_678e-6;
-        let (rounds, sets) = rounds(&sweep, |amplitude, _| amplitude > edge);
-        // 1e-6 halved ten times; one set a round.
-        let sizes: Vec<u64> = rounds.iter().map(|round| round.standing.sets_open).collect();
-        assert_eq!(sizes, [5, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0]);
-        let seeds = |round: &Round| round.points.iter().map(|range| range.end() - range.start() + 1).sum::<u64>();
-        assert!(rounds.iter().all(|round| seeds(round) == 3 * round.standing.sets_open));
-        let amplitude = |set: &u64| sweep.jobs().find(|job| job.point == *set).unwrap().parameters.modulation_amplitude;
-        let below = sets.iter().filter(|(_, row)| !row.is_locked).map(|(set, _)| amplitude(set)).fold(0.0, f64::max);
-        let above = sets.iter().filter(|(_, row)| row.is_locked).map(|(set, _)| amplitude(set)).fold(1.0, f64::min);
-        assert!(below <= edge && edge < above && above - below < 1e-9, "{below} {above}");
-    }
-
-    #[test]
-    fn without_a_difference_or_room_the_rounds_are_over_and_the_cap_is_reported() {
-        let axes = "Delta = { linear = [0.5e-6, 4.5e-6], points = 5 }\nV0 = { log = [1e-5, 1e-4], points = 3 }";
-        let refine = |sets| {
-            sweep(axes, &format!("axes = [\"Delta\", \"V0\"]\nto = {{ Delta = 1e-7, V0 = 0.3 }}\nsets = {sets}"))
-        };
-        let (none, _) = rounds(&refine(100), |_, _| true);
-        assert_eq!(none.len(), 2);
-        let slope = |amplitude: f64, velocity: f64| amplitude > 0.04 * velocity;
-        let (capped, sets) = rounds(&refine(22), slope);
-        let end = capped.last().unwrap().standing;
-        assert!(end.cells_capped > 0 && sets.len() <= 22 && sets.len() > 15, "{end:?} {}", sets.len());
-        let (free, _) = rounds(&refine(1000), slope);
-        assert_eq!(free.last().unwrap().standing.cells_capped, 0);
-    }
-
-    #[test]
-    fn conditions_and_points_without_modulation_are_passed_over() {
-        let text = "name = \"a\"\nwhere = \"Delta < 2e-6 or V0 < 5e-5\"\n[model]\nfrequency = 29\n[axes]\n\
-                    Delta = { linear = [0, 4e-6], points = 3 }\nV0 = { linear = [1e-5, 1e-4], points = 3 }\n\
-                    [refine]\nby = \"locked\"\naxes = [\"Delta\", \"V0\"]\nto = { Delta = 5e-7, V0 = 1e-5 }\nsets = 1000";
-        let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();
-        let (_, sets) = rounds(&sweep, |amplitude, velocity| amplitude > 0.02 * velocity);
-        let jobs: BTreeSet<u64> = sweep.jobs().map(|job| job.point).collect();
-        assert!(sets.len() > 12 && sets.keys().all(|set| jobs.contains(set)), "{}", sets.len());
-    }
-
-    proptest! {
-        /// An edge across the plane, wherever it lies.
-        #[test]
-        fn every_cell_at_the_edge_is_as_fine_as_is_wanted_and_few_others_are(slope in 0.005..0.2_f64, offset in -1e-6..3e-6_f64) {
-            let sweep = sweep(
-                "Delta = { linear = [0.5e-6, 4.5e-6], points = 5 }\nV0 = { linear = [1e-5, 9e-5], points = 5 }\nseed = { count = 2 }",
-                "axes = [\"Delta\", \"V0\"]\nto = { Delta = 1.3e-7, V0 = 2.6e-6 }\nsets = 3000",
-            );
-            let is_locked = |amplitude: f64, velocity: f64| amplitude > slope * (velocity - 1e-5) + offset;
-            let (_, sets) = rounds(&sweep, is_locked);
-            let found = leaves(&sweep, &sets);
-            // They cover the grid once: 4 by 4 cells, each of 8 by 8 of the finest.
-            let area: u64 = found.iter().map(|cell| 1 << (2 * (3 - cell.level))).sum();
-            prop_assert_eq!(area, 4 * 4 * 64);
-            for cell in &found {
-                let length = 8 >> cell.level;
-                let corner = |right: u64, up: u64| {
-                    let at = |row: u64, low: f64, step: f64| low + step * (row as f64);
-                    is_locked(
-                        at(cell.origin[0] + right * length, 0.5e-6, 1.25e-7),
-                        at(cell.origin[1] + up * length, 1e-5, 2.5e-6),
-                    )
-                };
-                let corners = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
-                let differ = corners.iter().any(|locked| *locked != corners[0]);
-                prop_assert!(!differ || cell.level == 3, "{:?}", cell);
-            }
-            // A line crosses some 64 of the 1024 finest cells; their neighbours are half as fine.
-            prop_assert!(sets.len() < 25 + 260, "{} sets", sets.len());
-        }
     }
 }
