@@ -18,11 +18,16 @@ pub(crate) fn assert_documented(page: &str, text: &str) {
 
 /// Asserts that the first table below a heading of a page describes these fields with their defaults.
 pub(crate) fn assert_table_documented(page: &str, heading: &str, fields: &[(Description, Value)]) {
+    assert_rows_documented(page, heading, &table(fields));
+}
+
+/// Asserts that the first table below a heading of a page is this one.
+pub(crate) fn assert_rows_documented(page: &str, heading: &str, table: &str) {
     let text = std::fs::read_to_string(file(page)).unwrap();
     let start = text.find(&format!("\n{heading}\n")).unwrap();
     let start = start + text[start..].find("\n|").unwrap() + 1;
     let end = text[start..].find("\n\n").map_or(text.len(), |end| start + end + 1);
-    assert_documented(page, &format!("{}{}{}", &text[..start], table(fields), &text[end..]));
+    assert_documented(page, &format!("{}{table}{}", &text[..start], &text[end..]));
 }
 
 fn file(page: &str) -> PathBuf {

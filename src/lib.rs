@@ -8,8 +8,8 @@
 //!                               model/
 //! ```
 //!
-//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `run`; `results` <- `reduce` <- `figure`;
-//! `run`, `reduce` <- `report`.
+//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
+//! `reduce` <- `figure`; `run`, `figure` <- `report`.
 //! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
 //! `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
 //! to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
@@ -25,6 +25,7 @@
 //! | sweep | a sweep file, parsed: parameters, axes, recording, solver |
 //! | job | one point of a sweep, known by a hash of parameters, solver and recording |
 //! | set | all jobs that differ in the seed alone |
+//! | round | points of a sweep that decides for itself, run together: an extension ([`rounds`]) |
 //! | extension | a sweep in a results directory; it owns its jobs but for those that earlier ones have done |
 //! | part | consecutive jobs of an extension, committed together |
 //! | outline | a part without its jobs: where they lie, and what they add up to |
@@ -48,6 +49,8 @@ pub mod reduce;
 pub mod report;
 #[cfg(feature = "sweeps")]
 pub mod results;
+#[cfg(feature = "sweeps")]
+pub mod rounds;
 #[cfg(feature = "sweeps")]
 pub mod run;
 #[cfg(feature = "sweeps")]

@@ -1,5 +1,7 @@
 //! Text for people and JSON for programs.
 
+use crate::results::rounds::RoundsSoFar;
+use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown};
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -53,6 +55,18 @@ pub fn duration(seconds: f64) -> String {
 /// A count with its noun, in the plural where that fits.
 pub fn count(number: u64, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
+}
+
+/// How far the rounds of a sweep are.
+pub fn rounds(rounds: &RoundsSoFar) -> String {
+    let Standing { sets_done, sets_open, sets_capped, cells_capped } = rounds.standing;
+    let over = if rounds.is_over { "the last" } else { "not the last" };
+    let sets = format!("{} ({over}): {} done, {sets_open} open", rounds.round, count(sets_done, "set"));
+    let capped = [
+        (sets_capped > 0).then(|| format!("; {sets_capped} miss the target with the most seeds")),
+        (cells_capped > 0).then(|| format!("; {} still differ at the most sets", count(cells_capped, "cell"))),
+    ];
+    capped.into_iter().flatten().fold(sets, |text, more| text + &more)
 }
 
 /// Writes a file beside its place and moves it there, so that no half of it looks whole.

@@ -5,9 +5,10 @@ use super::planning::Planning;
 use super::sweep::{self, Preset};
 use super::{output, signals};
 use crate::results::layout::Layout;
+use crate::results::rounds::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
 use crate::run::{Overview, status};
-use crate::sweep::{Extension, Plan, Sweep};
+use crate::sweep::{Bounds, Extension, Plan, Sweep};
 use crate::table::shown::{serialize_path, shown};
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
@@ -52,6 +53,9 @@ struct Report {
     predicted_cpu_seconds: f64,
     predicted_wall_seconds: f64,
     threads: usize,
+    /// What all rounds of a sweep that decides for itself may add up to; the numbers above are those of the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_most: Option<Bounds>,
     directory: Option<Directory>,
 }
 
@@ -63,6 +67,8 @@ struct Directory {
     refused: Option<String>,
     #[serde(flatten)]
     overview: Option<Overview>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rounds: Option<RoundsSoFar>,
 }
 
 impl Directory {
@@ -73,19 +79,21 @@ impl Directory {
         }
         let layout = Layout::new(&Disk, &root);
         let found = Results::preview(&layout, sweep).and_then(|results| status(&results));
-        let (refused, overview) = match found {
-            Ok(status) => (None, Some(status.overview)),
-            Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None),
+        let (refused, overview, rounds) = match found {
+            Ok(status) => (None, Some(status.overview), status.rounds),
+            Err(error) if error.kind == ErrorKind::Refused => (Some(error.to_string()), None, None),
             Err(error) => return Err(error.into()),
         };
-        Ok(Some(Self { path: root, refused, overview }))
+        Ok(Some(Self { path: root, refused, overview, rounds }))
     }
 
     fn in_words(&self) -> String {
         let path = shown(&self.path);
+        let round =
+            self.rounds.as_ref().map_or_else(String::new, |rounds| format!("; round {}", output::rounds(rounds)));
         match (&self.overview, &self.refused) {
             (Some(overview), _) => format!(
-                "{path}: {} done, {} failed, {} to run; {} kept that the sweep no longer has",
+                "{path}: {} done, {} failed, {} to run; {} kept that the sweep no longer has{round}",
                 overview.jobs_done, overview.jobs_failed, overview.jobs_missing, overview.jobs_kept
             ),
             (None, refused) => format!("refused: {}", refused.as_deref().unwrap_or_default()),
@@ -117,6 +125,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         predicted_cpu_seconds: totals.cost,
         predicted_wall_seconds: totals.cost / threads as f64,
         threads,
+        at_most: sweep.bounds(),
         directory: Directory::of(&sweep, root)?,
     };
     drop(planning);
@@ -126,7 +135,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         let axes: Vec<String> = report.axes.iter().map(|axis| format!("{} ({})", axis.keys, axis.points)).collect();
         let directory =
             report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
-        output::pairs(&[
+        let mut pairs = vec![
             ("sweep", report.name),
             ("axes", if axes.is_empty() { "none: a single point".to_owned() } else { axes.join(" x ") }),
             ("grid points", report.points.to_string()),
@@ -135,8 +144,14 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ("slips to record", report.slips.to_string()),
             ("predicted CPU time", output::duration(totals.cost)),
             ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
-            ("directory", directory),
-        ])?;
+        ];
+        if let Some(Bounds { sets, jobs, predicted_cost }) = report.at_most {
+            let cost = output::duration(predicted_cost);
+            let bounds = format!("the first of several; in all at most {sets} sets, {jobs} jobs, {cost} of CPU time");
+            pairs.push(("round", bounds));
+        }
+        pairs.push(("directory", directory));
+        output::pairs(&pairs)?;
     }
     Ok(Exit::Done)
 }

@@ -69,6 +69,11 @@ impl Progress {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
             }
+            RunEvent::RoundBegun { jobs, predicted_cost, rounds } => {
+                self.jobs += jobs;
+                self.predicted += predicted_cost;
+                self.say(&format!("{} more; round {}", output::count(*jobs, "job"), output::rounds(rounds)));
+            }
             RunEvent::JobDone { predicted_cost, .. } => self.advance(*predicted_cost),
             RunEvent::Tick => self.draw(),
             &RunEvent::OthersDone { jobs, predicted_cost } => {

@@ -217,6 +217,9 @@ fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {
         ("jobs run", format!("{}, {} failed", report.jobs_run + report.jobs_spilled, report.jobs_failed)),
         ("parts committed", report.parts_committed.to_string()),
     ];
+    if let Some(rounds) = &report.rounds {
+        pairs.push(("round", output::rounds(rounds)));
+    }
     if report.jobs_run > 0 {
         let measured = output::duration(report.measured_cost);
         pairs.push(("CPU time", format!("{measured}, predicted {}", output::duration(report.predicted_cost))));

@@ -48,14 +48,16 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             0 => String::new(),
             kept => format!(", {kept} of them kept of values that the sweep no longer has"),
         };
-        output::pairs(&[
+        let mut pairs = vec![
             ("sweep", status.name.clone()),
             ("jobs done", format!("{}{kept}", overview.jobs_done)),
             ("jobs failed", overview.jobs_failed.to_string()),
             ("jobs missing", overview.jobs_missing.to_string()),
             ("parts", format!("{} done, {} missing", overview.parts_done, overview.parts_missing)),
             ("time left", left),
-        ])?;
+        ];
+        pairs.extend(status.rounds.as_ref().map(|rounds| ("round", output::rounds(rounds))));
+        output::pairs(&pairs)?;
         for Present { worker, last_beat } in &status.workers {
             let Worker { host, process, threads, jobs_per_second, .. } = worker;
             output::print(&format!(

@@ -16,7 +16,7 @@ pub struct Preset {
     pub text: &'static str,
 }
 
-const PRESETS: [Preset; 24] = [
+const PRESETS: [Preset; 27] = [
     Preset::new("choices", include_str!("../../sweeps/choices.toml")),
     Preset::new("contacts", include_str!("../../sweeps/contacts.toml")),
     Preset::new("disorder", include_str!("../../sweeps/disorder.toml")),
@@ -32,7 +32,9 @@ const PRESETS: [Preset; 24] = [
     Preset::new("fig4d", include_str!("../../sweeps/fig4d.toml")),
     Preset::new("friction", include_str!("../../sweeps/friction.toml")),
     Preset::new("friction-drives", include_str!("../../sweeps/friction-drives.toml")),
+    Preset::new("friction-precise", include_str!("../../sweeps/friction-precise.toml")),
     Preset::new("fronts", include_str!("../../sweeps/fronts.toml")),
+    Preset::new("locking-edge", include_str!("../../sweeps/locking-edge.toml")),
     Preset::new("locking-map", include_str!("../../sweeps/locking-map.toml")),
     Preset::new("regimes", include_str!("../../sweeps/regimes.toml")),
     Preset::new("size", include_str!("../../sweeps/size.toml")),
@@ -40,6 +42,7 @@ const PRESETS: [Preset; 24] = [
     Preset::new("startup", include_str!("../../sweeps/startup.toml")),
     Preset::new("stiff-drive", include_str!("../../sweeps/stiff-drive.toml")),
     Preset::new("stochasticity", include_str!("../../sweeps/stochasticity.toml")),
+    Preset::new("tongues", include_str!("../../sweeps/tongues.toml")),
     Preset::new("velocity", include_str!("../../sweeps/velocity.toml")),
 ];
 

@@ -1,11 +1,12 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
 use super::{FigureError, Format, Look, OwnFigure, Picture};
-use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, regimes, staircase};
+use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, refined, regimes, staircase};
 use super::{own, sets};
-use crate::reduce::{SetRow, WRITER, read_reduced, read_sets};
+use crate::reduce::{CellRow, SetRow, WRITER, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
+use crate::table::columns::Table;
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
@@ -39,6 +40,9 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         ] {
             pictures.extend(figure(&sets, look));
         }
+    }
+    if layout.storage.exists(&layout.reduced_file(CellRow::NAME))? {
+        pictures.extend(refined::refined(&read_reduced(layout)?, &sets, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read_reduced(layout)?, look));

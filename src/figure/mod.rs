@@ -26,6 +26,7 @@ mod locking_map;
 mod own;
 mod pdf;
 mod picture;
+mod refined;
 mod regimes;
 mod regions;
 mod scaling;

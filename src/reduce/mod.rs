@@ -2,6 +2,8 @@
 //! of τ, start-up, and a sample of slips for scatter figures.
 
 mod backbone;
+mod cells;
+mod chosen;
 pub mod circular;
 mod confidence;
 mod histogram;
@@ -10,12 +12,18 @@ mod point;
 mod rank;
 mod read;
 mod reduction;
+mod rounds;
 mod sequence;
 mod set;
 mod slip_stats;
 mod startup;
+mod statistic;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
+pub use cells::{CellOfGrid, CellRow, Cells, Division, divide};
+#[cfg(test)]
+pub(crate) use chosen::row_of;
+pub use chosen::{ChosenSet, reduce_chosen};
 pub use confidence::{CONFIDENCE, Interval};
 pub use histogram::{BINS_PER_MEAN, HistogramBin};
 pub use moments::{Moments, quantile};
@@ -23,8 +31,10 @@ pub use point::{MAX_POINTS, Point, RampStage};
 pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
+pub use rounds::RoundOfSet;
 pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
+pub use statistic::StatisticValue;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
@@ -72,6 +82,8 @@ mod tests {
     fn documented_reduced_tables_are_those_written() {
         let tables = [
             markdown::<SetRow>(),
+            markdown::<RoundOfSet>(),
+            markdown::<CellRow>(),
             markdown::<HistogramBin>(),
             markdown::<StartupRow>(),
             markdown::<BackboneBin>(),

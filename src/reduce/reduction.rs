@@ -6,8 +6,10 @@
 
 use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin};
+use super::cells::{CellRow, cell_rows};
 use super::histogram::{HistogramBin, histogram};
 use super::point::{Point, RampStage, spacing};
+use super::rounds::SetWriter;
 use super::set::{SetJobs, SetRow, SetSlips};
 use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
@@ -88,6 +90,12 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
     let _alone = alone(layout, WRITER)?;
     let (commit, summary) = layout.read_tables(|| stage(results, max_slips))??;
     results.publish(commit)?;
+    let cells = layout.reduced_file(CellRow::NAME);
+    let is_refined = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
+    if !is_refined && layout.storage.exists(&cells)? {
+        // Of a sweep before.
+        layout.storage.remove(&cells)?;
+    }
     Ok(summary)
 }
 
@@ -117,7 +125,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
     let footer = &results.footer(results.extensions().len() - 1);
-    let mut set_writer = TableWriter::<SetRow>::new(stage(SetRow::NAME)?, footer)?;
+    let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
+    let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
+    let mut refined_sets = BTreeMap::new();
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
     let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
@@ -130,6 +140,9 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             let set = slips.finish(jobs);
             let row = &set.row;
             set_writer.push(row)?;
+            if refinement.is_some() {
+                refined_sets.extend(set_writer.chosen(row).map(|number| (number, row.clone())));
+            }
             for bin in histogram(row, &set.intervals) {
                 histogram_writer.push(&bin)?;
             }
@@ -153,6 +166,12 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     for bin in &summary.backbone {
         backbone_writer.push(bin)?;
     }
+    if let Some(refinement) = refinement {
+        let mut cell_writer = TableWriter::new(stage(CellRow::NAME)?, footer)?;
+        let known = refined_sets.iter().map(|(&number, row)| (number, row)).collect();
+        cell_rows(results.sweep(), refinement, &known).iter().try_for_each(|cell| cell_writer.push(cell))?;
+        cell_writer.finish()?;
+    }
     set_writer.finish()?;
     histogram_writer.finish()?;
     startup_writer.finish()?;
@@ -162,9 +181,16 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
 }
 
 columns! {
-    /// What a reduction takes from the jobs table beside the parameters.
-    struct JobOfSet {
+    /// The set of a job, and the job.
+    pub(super) struct JobOfSet {
         set_id: String;
+        facts: JobFacts;
+    }
+}
+
+columns! {
+    /// What a reduction takes from the jobs table beside set and parameters.
+    pub(super) struct JobFacts {
         outcome: JobOutcome;
         slips: Option<u64>;
         mean_friction: Option<f64>;
@@ -181,6 +207,26 @@ columns! {
     }
 }
 
+impl SetJobs {
+    /// A job of the set has ended.
+    pub(super) fn push(&mut self, job: &JobFacts) {
+        if job.outcome == JobOutcome::Failed {
+            self.failed += 1;
+            return;
+        }
+        self.finished += 1;
+        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
+        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
+        self.friction.extend(job.mean_friction);
+        self.attached_fraction.extend(job.attached_fraction);
+        self.slip_share.extend(job.slip_share);
+        self.regime = match (self.regime, job.regime) {
+            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
+            (regime, other) => other.or(regime),
+        };
+    }
+}
+
 /// The sets of all jobs, in the order of their parameters.
 fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
     let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
@@ -188,20 +234,7 @@ fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
         for (job, parameters) in batch? {
             let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters.parameters);
             let set = sets.entry(job.set_id).or_insert_with_key(new);
-            if job.outcome == JobOutcome::Failed {
-                set.failed += 1;
-            } else {
-                set.finished += 1;
-                set.slips = set.slips.saturating_add(job.slips.unwrap_or(0));
-                set.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-                set.friction.extend(job.mean_friction);
-                set.attached_fraction.extend(job.attached_fraction);
-                set.slip_share.extend(job.slip_share);
-                set.regime = match (set.regime, job.regime) {
-                    (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
-                    (regime, other) => other.or(regime),
-                };
-            }
+            set.push(&job.facts);
         }
     }
     let mut sets: Vec<SetJobs> = sets.into_values().collect();
@@ -257,11 +290,7 @@ fn gather(slips: Dataset<'_>, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Ga
             let parameters = &set.parameters;
             let is_ramped = parameters.ramp_time > 0.0;
             let eta = slip.modulation.eta(parameters.drive_velocity);
-            if is_ramped {
-                slips.push(&slip, &PhaseLimits::at(eta));
-            } else {
-                slips.push(&slip, &limits[index]);
-            }
+            slips.push_of(parameters, &slip, &limits[index]);
             if here % spacing == 0 {
                 let point = Point {
                     drive_velocity: parameters.drive_velocity,

@@ -181,6 +181,15 @@ impl SetSlips {
         self.slow_front_speed.extend(slip.slow_front_speed);
     }
 
+    /// A slip of a job with these parameters, whose modulation may be ramped; else its phases lie in `limits`.
+    pub(super) fn push_of(&mut self, parameters: &Parameters, slip: &Slip, limits: &PhaseLimits) {
+        if parameters.ramp_time > 0.0 {
+            self.push(slip, &PhaseLimits::at(slip.modulation.eta(parameters.drive_velocity)));
+        } else {
+            self.push(slip, limits);
+        }
+    }
+
     /// The statistics of the set.
     pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();

@@ -7,6 +7,7 @@ use crate::results::commit::own_number;
 use crate::results::error::ResultsError;
 use crate::results::handle::Results;
 use crate::results::layout::TableFile;
+use crate::results::rounds::RoundsSoFar;
 use crate::sweep::Outline;
 use crate::table::file::{FILE_EXTENSION, PROGRAM};
 use crate::table::storage::{StorageError, StoredFile};
@@ -39,6 +40,16 @@ pub enum RunEvent {
         jobs_there: u64,
         /// Predicted cost of the jobs to run.
         predicted_cost: f64,
+    },
+    /// The next round of a sweep that decides for itself has begun.
+    RoundBegun {
+        /// Jobs that it runs.
+        jobs: u64,
+        /// Their predicted cost.
+        predicted_cost: f64,
+        /// How far the rounds are.
+        #[serde(flatten)]
+        rounds: RoundsSoFar,
     },
     /// A job is done, though not yet committed.
     JobDone {
@@ -144,6 +155,9 @@ pub struct RunReport {
     pub measured_cost: f64,
     /// Wall time of the run, in s.
     pub wall: f64,
+    /// How far the rounds are, of a sweep that decides for itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounds: Option<RoundsSoFar>,
 }
 
 impl RunEvent {

@@ -33,7 +33,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
     pub fn open(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
-        let before = Found::look(layout, sweep)?;
+        let before = Found::look(layout, sweep, 0)?;
         let results = Self::new(layout, before.extensions(sweep));
         if before.is_of(sweep) {
             return Ok(results);
@@ -42,7 +42,7 @@ impl<'a> Results<'a> {
         let _alone = alone(layout, manifest::WRITER)?;
         // In this order: another run may have written the manifest before the lock was ours, and who is at work has.
         let at_work = layout.living(SystemTime::now())?;
-        let found = Found::look(layout, sweep)?;
+        let found = Found::look(layout, sweep, 0)?;
         let is_as_before = (&found.manifest, &found.done) == (&before.manifest, &before.done);
         let results = if is_as_before { results } else { Self::new(layout, found.extensions(sweep)) };
         if !found.is_of(sweep) {
@@ -66,7 +66,7 @@ impl<'a> Results<'a> {
     /// # Errors
     /// When the directory holds something else, or cannot be read.
     pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
-        Ok(Self::new(layout, Found::look(layout, sweep)?.extensions(sweep)))
+        Ok(Self::new(layout, Found::look(layout, sweep, 0)?.extensions(sweep)))
     }
 
     /// Reads a directory as it is.
@@ -183,19 +183,19 @@ impl<'a> Results<'a> {
 }
 
 /// What a directory holds that a sweep can be run in: its extensions, and which parts are done; none if it is fresh.
-struct Found {
+pub(super) struct Found {
     manifest: Option<Manifest>,
-    extensions: Vec<Extension>,
-    done: DoneParts,
+    pub extensions: Vec<Extension>,
+    pub done: DoneParts,
 }
 
 impl Found {
-    /// Looks into a directory.
-    fn look(layout: &Layout<'_>, sweep: &Sweep) -> Result<Self, ResultsError> {
+    /// Looks into a directory, at which this process has so many workers.
+    pub fn look(layout: &Layout<'_>, sweep: &Sweep, own: usize) -> Result<Self, ResultsError> {
         let begin = Instant::now();
         // In this order: another run may write the manifest in between, and none removes it.
         let mut seen = (is_fresh(layout)?, manifest::read_with_sweeps(layout)?);
-        while begin.elapsed() < LATE && is_late(layout, seen.1.as_ref().map(|(manifest, _)| manifest), sweep)? {
+        while begin.elapsed() < LATE && is_late(layout, seen.1.as_ref().map(|(manifest, _)| manifest), sweep, own)? {
             std::thread::sleep(LATE_PAUSE);
             seen = (is_fresh(layout)?, manifest::read_with_sweeps(layout)?);
         }
@@ -220,7 +220,7 @@ impl Found {
     }
 
     /// Whether this sweep was the one asked for last.
-    fn is_of(&self, sweep: &Sweep) -> bool {
+    pub fn is_of(&self, sweep: &Sweep) -> bool {
         self.extensions.last().is_some_and(|last| last.sweep.text() == sweep.text())
     }
 
@@ -241,7 +241,7 @@ impl Found {
 
 /// Whether a host of a network disk sees an older manifest than its listing has. The copies of sweep files come first, so
 /// one that the manifest does not have says so, or was left by a run that was killed between the two.
-fn is_late(layout: &Layout<'_>, manifest: Option<&Manifest>, sweep: &Sweep) -> Result<bool, StorageError> {
+fn is_late(layout: &Layout<'_>, manifest: Option<&Manifest>, sweep: &Sweep, own: usize) -> Result<bool, StorageError> {
     let names = match layout.storage.list(&layout.run()) {
         // A file at this place is somebody else's.
         Err(error) if error.kind() == ErrorKind::NotADirectory => return Ok(false),
@@ -254,7 +254,7 @@ fn is_late(layout: &Layout<'_>, manifest: Option<&Manifest>, sweep: &Sweep) -> R
     let Some(copy) = layout.sweeps()?.into_iter().nth(known) else { return Ok(false) };
     // If nobody is at work, to write the same again mends it.
     let is_ours = layout.storage.read(&copy).is_ok_and(|text| text == sweep.text().as_bytes());
-    Ok(!is_ours || !layout.living(SystemTime::now())?.is_empty())
+    Ok(!is_ours || layout.living(SystemTime::now())?.len() > own)
 }
 
 /// Whether a directory holds nothing, or no more than what a run leaves that was killed before it had a manifest.

@@ -4,7 +4,7 @@
 //! results/<name>/tables/{slips,precursors,jobs}/part-EEE-FFFFFF.parquet   committed files only, at every instant
 //!                tables/{slips,precursors,jobs}/compact-EEE-FFFFFF-LLLLLL-CHECKSUM.parquet  what was compacted
 //!                reduced/  figures/  report.html                         made from the tables
-//!                run/manifest.json  sweep-EEE.toml                       what the tables belong to
+//!                run/manifest.json  sweep-EEE.toml  round-EEE.json       what the tables belong to
 //!                run/{workers,claims,staging,lock,log}/                  of no use once nothing runs
 //!                run/staging/replaced/tables/                            what the last compaction replaced, for a while
 //!                run/spill/{slips,precursors,jobs}/                      finished jobs of parts that are not done
@@ -191,6 +191,12 @@ impl<'a> Layout<'a> {
     #[must_use]
     pub fn sweep(&self, extension: usize) -> PathBuf {
         self.run().join(format!("sweep-{extension:03}.toml"))
+    }
+
+    /// Copy of the round that an extension is.
+    #[must_use]
+    pub fn round(&self, extension: usize) -> PathBuf {
+        self.run().join(format!("round-{extension:03}.json"))
     }
 
     /// Where a repair puts what is damaged.

@@ -13,7 +13,7 @@ use crate::results::commit::Commit;
 use crate::results::error::ResultsError;
 use crate::results::layout::Layout;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
-use crate::sweep::{Extension, PLAN_VERSION, Sweep};
+use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
 use crate::table::columns::Table;
 use crate::table::file::PROGRAM;
@@ -23,8 +23,8 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Version of the manifest and of the layout around it. 5: it says what of each sweep is kept.
-const FORMAT: u32 = 5;
+/// Version of the manifest and of the layout around it. 6: it has rounds.
+const FORMAT: u32 = 6;
 /// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
 pub(super) const WRITER: &str = "manifest";
 
@@ -56,6 +56,8 @@ pub(super) struct Record {
     pub sweep: String,
     part_cost: f64,
     kept: Option<Vec<RangeInclusive<u64>>>,
+    /// Of a sweep that decides for itself.
+    round: Option<Round>,
 }
 
 /// The format alone, read first: a newer manifest may have keys that are not known here.
@@ -127,6 +129,9 @@ impl Manifest {
     pub(super) fn write(&self, layout: &Layout<'_>) -> Result<(), ResultsError> {
         let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
         for (extension, record) in self.extensions.iter().enumerate() {
+            if let Some(text) = record.round_text(layout, extension)? {
+                commit.stage_bytes(&layout.round(extension), text.as_bytes())?;
+            }
             commit.stage_bytes(&layout.sweep(extension), record.sweep.as_bytes())?;
         }
         let path = layout.manifest();
@@ -143,10 +148,20 @@ impl Manifest {
 
     /// Its extensions, with their sweeps parsed.
     pub(super) fn extensions(&self, layout: &Layout<'_>) -> Result<Vec<Extension>, ResultsError> {
-        let extension = |(number, Record { sweep, part_cost, kept }): (usize, &Record)| {
-            Ok(Extension { sweep: parse(layout, number, sweep)?, part_cost: *part_cost, kept: kept.clone() })
-        };
-        self.extensions.iter().enumerate().map(extension).collect()
+        let mut extensions: Vec<Extension> = Vec::with_capacity(self.extensions.len());
+        for (number, Record { sweep: text, part_cost, kept, round }) in self.extensions.iter().enumerate() {
+            // Rounds of one sweep follow each other.
+            let sweep = match extensions.last() {
+                Some(Extension { sweep, .. }) if sweep.text() == text => sweep.clone(),
+                _ => parse(layout, number, text)?,
+            };
+            if sweep.rounds().is_some() != round.is_some() {
+                let problem = format!("its sweep {number} has rounds where it decides nothing, or none where it does");
+                return Err(ResultsError::damaged(&layout.manifest(), problem));
+            }
+            extensions.push(Extension { sweep, part_cost: *part_cost, kept: kept.clone(), round: round.clone() });
+        }
+        Ok(extensions)
     }
 
     /// Looks whether a program can have written this.
@@ -162,8 +177,13 @@ impl Manifest {
             kept.iter().all(|range| range.start() <= range.end())
                 && kept.windows(2).all(|pair| pair[0].end() < pair[1].start())
         };
-        let mut kept = earlier.iter().filter_map(|record| record.kept.as_ref());
-        if kept.all(is_ordered) { Ok(()) } else { Err("the points that it keeps are not in order") }
+        let kept = earlier.iter().filter_map(|record| record.kept.as_ref());
+        let rounds = self.extensions.iter().filter_map(|record| Some(&record.round.as_ref()?.points));
+        if kept.chain(rounds).all(is_ordered) {
+            Ok(())
+        } else {
+            Err("the points that it keeps, or those of a round, are not in order")
+        }
     }
 
     /// Reads the manifest alone; `None` if there is none.
@@ -191,11 +211,18 @@ impl Manifest {
 impl Record {
     /// Whether it is that of an extension, whatever of it is kept since.
     pub(super) fn is_of(&self, extension: &Extension) -> bool {
-        (self.sweep.as_str(), self.part_cost) == (extension.sweep.text(), extension.part_cost)
+        (self.sweep.as_str(), self.part_cost, &self.round)
+            == (extension.sweep.text(), extension.part_cost, &extension.round)
     }
 
-    pub(super) fn new(Extension { sweep, part_cost, kept }: &Extension) -> Self {
-        Self { sweep: sweep.text().to_owned(), part_cost: *part_cost, kept: kept.clone() }
+    /// The copy of its round; the first of a directory follows from the sweep.
+    pub(super) fn round_text(&self, layout: &Layout<'_>, extension: usize) -> Result<Option<String>, ResultsError> {
+        let round = self.round.as_ref().filter(|_| extension > 0).map(checksum::to_json).transpose();
+        round.map_err(|error| ResultsError::damaged(&layout.round(extension), error.to_string()))
+    }
+
+    pub(super) fn new(Extension { sweep, part_cost, kept, round }: &Extension) -> Self {
+        Self { sweep: sweep.text().to_owned(), part_cost: *part_cost, kept: kept.clone(), round: round.clone() }
     }
 }
 

@@ -6,6 +6,7 @@
 //! layout.rs, manifest.rs      where everything lies, and which sweeps it belongs to
 //! handle.rs                   a directory that fits this program
 //!   parts.rs                  which parts are done, and the rows of one, in all tables at once
+//!   rounds.rs                 what a sweep that decides for itself runs next
 //!   workers.rs, claims.rs     who is at work, and at what
 //!   events.rs                 what happens, and its log
 //!   compact.rs, merge.rs      many parts in one file, many directories in one
@@ -24,6 +25,7 @@ pub mod manifest;
 pub mod merge;
 mod missing;
 pub mod parts;
+pub mod rounds;
 pub mod tables;
 pub mod verify;
 pub mod workers;

@@ -8,6 +8,8 @@
 //! All but the kernel is done on the calling thread.
 //! What is done is what is committed, so a killed run resumes by looking which part files are missing. The same command,
 //! started several times, shares the parts.
+//! A sweep that decides for itself goes on in rounds: when all parts are done, who finds that first adds those of the next
+//! (`rounds/`), and nobody ends before the last.
 //! Contract: the bytes of the tables depend on neither threads nor workers nor interruptions. Memory: the parts with a
 //! job in flight.
 
@@ -31,14 +33,16 @@ use crate::results::events::Log;
 use crate::results::layout::Layout;
 use crate::results::workers::{Member, Task};
 use crate::results::{ErrorKind, Results, ResultsError};
+use crate::rounds;
 use crate::run::collect::Collector;
-use crate::run::share::{Left, Share};
+use crate::run::share::{LOOK, Left, Share};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
 use crate::table::storage::StorageError;
+use std::borrow::Cow;
 use std::num::NonZeroUsize;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
@@ -98,6 +102,11 @@ pub fn join<T, E: From<ResultsError>>(
 ) -> Result<T, E> {
     let begin = Instant::now();
     let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
+    if sweep.rounds().is_some() && options.shard != Shard::default() {
+        let problem = "a sweep with [precision] or [refine] has no shards: each round needs all results of the one before; \
+                       run it on a common disk, started as often as you like";
+        return Err(ResultsError::refused(layout.root(), problem).into());
+    }
     let results = Results::open(layout, sweep)?;
     let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
     results.join(Task::Run, threads, |member| {
@@ -124,33 +133,85 @@ impl Joined<'_> {
     /// # Errors
     /// When the disk fails. What was committed is kept, and the same command resumes from there.
     pub fn run(&self, kernel: &Kernel<'_>, display: &mut dyn FnMut(&RunEvent)) -> Result<RunReport, ResultsError> {
-        let Self { results, parts, member, begin, threads, options } = *self;
-        results.sync_names()?;
-        member.tidy()?;
-        let share = Share::look_up(results, parts, options.retry_failed)?;
+        self.results.sync_names()?;
+        self.member.tidy()?;
+        let (mut events, mut report) = (Events { log: None, display }, RunReport::default());
+        let mut retry_failed = self.options.retry_failed;
+        let mut round = (Cow::Borrowed(self.results), Cow::Borrowed(self.parts));
+        loop {
+            let (results, parts) = &round;
+            self.run_parts(results, parts, retry_failed, kernel, &mut events, &mut report)?;
+            // Those that failed in this run fail again.
+            retry_failed = false;
+            if report.jobs_left > 0 {
+                break;
+            }
+            let Some(next) = results.next_round(rounds::next)? else { break };
+            let parts = next.plan().outlines().collect();
+            round = (Cow::Owned(next), Cow::Owned(parts));
+        }
+        let (results, parts) = &round;
+        report.rounds = results.rounds_so_far();
+        if report.jobs_left == 0 && self.member.others()?.is_empty() {
+            let overview = Share::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
+            report.jobs_failed = overview.jobs_failed;
+        }
+        events.send(&RunEvent::Finished(report.clone()))?;
+        Ok(report)
+    }
+
+    /// Runs the parts that are there now: all, or those of the rounds so far.
+    fn run_parts(
+        &self,
+        results: &Results<'_>,
+        parts: &[Outline],
+        retry_failed: bool,
+        kernel: &Kernel<'_>,
+        events: &mut Events<'_>,
+        report: &mut RunReport,
+    ) -> Result<(), ResultsError> {
+        let Self { member, begin, threads, options, .. } = *self;
+        let share = Share::look_up(results, parts, retry_failed)?;
         let overview = share.overview(false, |_, _, _| ())?;
         let (jobs_again, cost_again) =
-            if options.retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
-        let jobs_left = overview.jobs_missing + jobs_again;
-        let mut report = RunReport { jobs_failed: jobs_again, jobs_left, ..RunReport::default() };
-        let mut events = Events { log: None, display };
-        if jobs_left > 0 {
+            if retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
+        report.jobs_failed += jobs_again;
+        report.jobs_left = overview.jobs_missing + jobs_again;
+        if report.jobs_left > 0 {
             let earlier_pace = if options.walltime.is_some() { results.pace()? } else { None };
             let walltime = Walltime::new(begin, options.walltime, threads, earlier_pace);
-            events.log = Some(results.begin_log()?);
-            let (shard, predicted_cost) = (options.shard.to_string(), overview.predicted_cost_missing + cost_again);
-            let (others, jobs_there) = (member.others()?.len(), overview.jobs_done + overview.jobs_failed - jobs_again);
-            events.send(&RunEvent::started(shard, others, threads, jobs_left, jobs_there, predicted_cost))?;
-            let mut collector =
-                Collector::new(&share, member, &walltime, threads, options.stop, &mut events, &mut report);
+            let (jobs, predicted_cost) = (report.jobs_left, overview.predicted_cost_missing + cost_again);
+            if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
+                events.send(&RunEvent::RoundBegun { jobs, predicted_cost, rounds })?;
+            } else {
+                events.log = Some(results.begin_log()?);
+                let shard = options.shard.to_string();
+                let others = member.others()?.len();
+                let jobs_there = overview.jobs_done + overview.jobs_failed - jobs_again;
+                events.send(&RunEvent::started(shard, others, threads, jobs, jobs_there, predicted_cost))?;
+            }
+            let mut collector = Collector::new(&share, member, &walltime, threads, options.stop, events, report);
             let ended = loop {
                 match collector.run(kernel) {
                     Ok(true) => (),
                     ended => break ended.map(|_| None),
                 }
-                match share.left(member) {
+                let must_end = || options.stop.load(Ordering::Relaxed) || walltime.is_over();
+                let left = loop {
+                    match share.left(member) {
+                        // There may be work for this one in the next round.
+                        Ok(Left { jobs: 1.., has_abandoned: false, .. })
+                            if results.round().is_some() && !must_end() =>
+                        {
+                            std::thread::sleep(LOOK);
+                        }
+                        left => break left,
+                    }
+                };
+                match left {
                     // Their worker has died since this one looked.
                     Ok(Left { has_abandoned: true, .. }) => (),
+                    Ok(Left { jobs: 1.., .. }) if must_end() => break Ok(None),
                     left => break left.map(Some),
                 }
             };
@@ -165,13 +226,7 @@ impl Joined<'_> {
                 (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());
             }
         }
-        results.tidy_spill(parts)?;
-        if report.jobs_left == 0 && member.others()?.is_empty() {
-            let overview = Share::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
-            report.jobs_failed = overview.jobs_failed;
-        }
-        events.send(&RunEvent::Finished(report.clone()))?;
-        Ok(report)
+        Ok(results.tidy_spill(parts)?)
     }
 
     /// Whether this worker is the one that reduces, of all that find every job done.

@@ -21,7 +21,7 @@ use std::vec::IntoIter;
 /// Lost claims after which all are listed.
 const LOSSES: u32 = 3;
 /// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
-const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
+pub(super) const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
 const LOOK_BUSY: Duration = Duration::from_secs(5);
 
 /// Parts that are a worker's to take, and which of them were done when that was looked up.
@@ -206,11 +206,20 @@ impl<'a> Work<'a> {
         let last_look = *self.last_look.get_or_insert_with(Instant::now);
         if self.walltime.refused().is_some() {
             self.has_ended = true;
-        } else if last_look.elapsed() >= if is_busy { LOOK_BUSY } else { LOOK } {
+        } else if last_look.elapsed() >= self.pause(is_busy) {
             self.last_look = Some(Instant::now());
             self.has_ended = self.take_abandoned()?;
         }
         Ok(())
+    }
+
+    /// Time between two looks at workers who may have died; none for one that was alone and has nothing else to do.
+    fn pause(&self, is_busy: bool) -> Duration {
+        match (is_busy, self.others.is_empty()) {
+            (true, _) => LOOK_BUSY,
+            (false, true) => Duration::ZERO,
+            (false, false) => LOOK,
+        }
     }
 
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and

@@ -2,6 +2,7 @@
 
 use crate::results::events::RunEvent;
 use crate::results::parts::Unfinished;
+use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::share::Share;
@@ -56,6 +57,9 @@ pub struct Status {
     pub time_left: Option<f64>,
     /// The first failed jobs.
     pub failures: Vec<Failure>,
+    /// How far the rounds are, of a sweep that decides for itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rounds: Option<RoundsSoFar>,
 }
 
 /// A worker that is there.
@@ -189,5 +193,6 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
             .zip(threads)
             .map(|(pace, threads)| overview.predicted_cost_missing * pace / threads.max(1) as f64),
         failures,
+        rounds: results.rounds_so_far(),
     })
 }

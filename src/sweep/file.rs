@@ -11,6 +11,8 @@ use super::grid::Sweep;
 use super::job::Identity;
 use super::quantity::Quantity;
 use super::read_axes;
+use super::read_rounds::{read_precision, read_refinement};
+use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::{Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
@@ -48,30 +50,50 @@ impl Sweep {
 fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let table = source.table()?;
     let file = Section { source, title: "the file", at: 0, table: &table };
-    file.only(&["name", "where", "model", "axes", "record", "solver"]).ok();
+    file.only(&["name", "where", "model", "axes", "record", "solver", "precision", "refine"]).ok();
     let name = read_name(&file);
     let mut places = Places::new(source);
     let model = read_section(&file, "model", "[model]", |model| read_model(model, &mut places));
-    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places));
+    let wanted = read_section(&file, "refine", "[refine]", |refine| read_refinement(refine).map(Some));
+    let finer = wanted.as_ref().ok().and_then(Option::as_ref);
+    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places, finer));
+    let precision =
+        read_section(&file, "precision", "[precision]", |precision| read_precision(precision, &mut places).map(Some));
     let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
     let recording = read_section(&file, "record", "[record]", read_recording);
     let solver = read_section(&file, "solver", "[solver]", read_solver);
     source.passed()?;
     let ((base, period), recording, solver) = (model?, recording?, solver?);
-    let axes = period.into_iter().chain(axes?).collect();
+    let (wanted, precision) = (wanted?, precision?);
+    let axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
+    let refinement = wanted.as_ref().map(|wanted| wanted.over(&axes)).transpose()?;
+    let (precision, seeds) = precision.unzip();
+    let axes = axes.into_iter().chain(seeds).collect();
+    let has_rounds = precision.is_some() || refinement.is_some();
+    let rounds = has_rounds.then_some(Rounds { precision, refinement });
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
-    let sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity };
+    let sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds };
     check::whole(&sweep, &file, &places)?;
+    if has_rounds {
+        let sets = sweep.first_sets().len() as u64;
+        if let Some(wanted) = &wanted {
+            wanted.check_sets(sets)?;
+        } else if sets > MAX_SETS {
+            let problem =
+                format!("[axes]: {sets} sets; a sweep with [precision] has at most {MAX_SETS}; take several sweeps");
+            return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+        }
+    }
     Ok(sweep)
 }
 
 /// Reads a table of the file, or takes the default if there is none.
-fn read_section<T: Default>(
-    file: &Section<'_>,
+fn read_section<'a, T: Default>(
+    file: &Section<'a>,
     key: &str,
     title: &'static str,
-    read: impl FnOnce(&Section<'_>) -> Result<T, Refused>,
+    read: impl FnOnce(&Section<'a>) -> Result<T, Refused>,
 ) -> Result<T, Refused> {
     match file.entry(key) {
         None => Ok(T::default()),

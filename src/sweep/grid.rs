@@ -10,6 +10,7 @@ use super::cost::predicted_cost;
 use super::filter::Condition;
 use super::job::{Identity, Job, JobId, SetId, settings};
 use super::quantity::{Point, Quantity};
+use super::rounds::Rounds;
 use super::walked;
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
@@ -30,6 +31,7 @@ pub struct Sweep {
     pub(super) recording: Recording,
     pub(super) solver: Solver,
     pub(super) identity: Identity,
+    pub(super) rounds: Option<Rounds>,
 }
 
 /// Something besides axes and conditions in which two sweeps differ.
@@ -113,7 +115,8 @@ impl Sweep {
     }
 
     /// Number of the point that is the job with these canonical parameters.
-    pub(super) fn find(&self, parameters: &Parameters) -> Option<u64> {
+    #[must_use]
+    pub fn find(&self, parameters: &Parameters) -> Option<u64> {
         let rows: Vec<u64> = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
         let is_job = point.parameters == *parameters && self.admits(&point);
@@ -198,7 +201,7 @@ impl Sweep {
     }
 
     /// The point of these rows, as the axes set it.
-    fn point(&self, rows: &[u64]) -> Point {
+    pub(super) fn point(&self, rows: &[u64]) -> Point {
         let mut point = Point { parameters: self.base.clone(), fixes_period: None };
         for (axis, &row) in self.axes.iter().zip(rows) {
             axis.apply(row, &mut point);

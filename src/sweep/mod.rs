@@ -3,6 +3,7 @@
 //! ```text
 //! sweep file -> axes, filter -> points -> jobs -> parts
 //!   file.rs     axes.rs filter.rs  grid.rs  job.rs   plan.rs
+//!               rounds.rs: of a sweep that decides for itself
 //! ```
 //!
 //! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
@@ -20,9 +21,12 @@ mod job;
 mod plan;
 mod quantity;
 mod read_axes;
+mod read_rounds;
+mod rounds;
 mod samples;
 mod schema;
 mod source;
+mod statistic;
 #[cfg(test)]
 mod tests;
 mod walked;
@@ -32,6 +36,8 @@ pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
+pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
 pub use schema::schema;
 pub use source::{Mistake, SweepError, nearest};
+pub use statistic::{STATISTICS, Statistic, StatisticKind};
 pub use walked::walked;

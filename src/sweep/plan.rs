@@ -1,19 +1,22 @@
 //! The plan of a results directory: the sweeps that were run in it, one after the other, and their jobs in parts.
 //!
 //! Each sweep that is run in a directory opens an *extension*, which owns its jobs but for those that earlier extensions
-//! keep: what they had done by then. A *part* is a run of consecutive jobs of an extension, committed together. Parts are
+//! keep: what they had done by then. Each round of a sweep that decides for itself is one, too. A *part* is a run of consecutive jobs of an extension, committed together. Parts are
 //! small, so that many workers can share them and little is lost with one, but not many: see [`Extension::new`].
 //! Contract: parts are a function of the texts of the sweeps, of what was done when each began, and of [`PLAN_VERSION`].
 //! Memory: one part. The outlines of all parts, from which single parts are built again, take some 60 bytes each.
 
 use super::grid::Sweep;
 use super::job::Job;
+use super::rounds::{Round, contains};
 use std::ops::{Deref, Range, RangeInclusive};
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
 pub const PART_COST: f64 = 5.0;
 /// Least number of parts of a sweep with jobs of equal cost, if it has as many jobs: enough for some dozens of workers.
 const MIN_PARTS: f64 = if cfg!(test) { 2.0 } else { 64.0 };
+/// Least predicted CPU time of a part of a round, in s: of many rounds, most have few jobs, and a commit takes some 20 ms.
+const ROUND_PART_COST: f64 = if cfg!(test) { 0.0 } else { 0.25 };
 /// A sweep has hardly more parts than twice this: names in a folder stay few.
 const MANY_PARTS: f64 = 20_000.0;
 /// What rounding may add to the sum of costs.
@@ -33,6 +36,8 @@ pub struct Extension {
     /// Where in the grid the jobs lie that it keeps, as first and last points of its parts; `None` for the last extension,
     /// which owns all that no earlier one keeps.
     pub kept: Option<Vec<RangeInclusive<u64>>>,
+    /// The round that it is, of a sweep that decides for itself; the jobs of another are all points.
+    pub round: Option<Round>,
 }
 
 /// The extensions of a directory in the order in which they began.
@@ -89,30 +94,49 @@ impl Extension {
     /// many, a 20,000th. A dear job is a part of its own.
     #[must_use]
     pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
-        let total: f64 = own_jobs(sweep, earlier, sweep.points()).map(|job| job.cost).sum();
-        let part_cost = PART_COST.max(total / MANY_PARTS).min(total / MIN_PARTS);
-        Self { sweep: sweep.clone(), part_cost: part_cost * (1.0 + ROUNDING), kept: None }
+        Self::in_round(sweep, earlier, sweep.first_round())
+    }
+
+    /// Begins a further round.
+    #[must_use]
+    pub fn next_round(sweep: &Sweep, earlier: &[Self], round: Round) -> Self {
+        Self::in_round(sweep, earlier, Some(round))
+    }
+
+    fn in_round(sweep: &Sweep, earlier: &[Self], round: Option<Round>) -> Self {
+        let mut own = Self { sweep: sweep.clone(), part_cost: 0.0, kept: None, round };
+        let total: f64 = own_jobs(&own, earlier, &sweep.points()).map(|job| job.cost).sum();
+        let least = if own.round.is_some() { ROUND_PART_COST } else { 0.0 };
+        own.part_cost = PART_COST.max(total / MANY_PARTS).min(least.max(total / MIN_PARTS)) * (1.0 + ROUNDING);
+        own
+    }
+
+    /// Its points among these.
+    fn points(&self, among: &Range<u64>) -> Vec<Range<u64>> {
+        let Some(round) = &self.round else { return vec![among.clone()] };
+        let from = round.points.partition_point(|range| *range.end() < among.start);
+        let ranges = round.points[from..].iter().take_while(|range| *range.start() < among.end);
+        ranges.map(|range| among.start.max(*range.start())..among.end.min(range.end() + 1)).collect()
     }
 
     /// Whether it keeps a point of its grid.
     fn keeps(&self, point: u64) -> bool {
-        self.kept.as_ref().is_none_or(|kept| {
-            let after = kept.partition_point(|range| *range.end() < point);
-            kept.get(after).is_some_and(|range| range.contains(&point))
-        })
+        self.kept.as_ref().is_none_or(|kept| contains(kept, point))
+            && self.round.as_ref().is_none_or(|round| round.has(point))
     }
 }
 
-/// The jobs at these points of a sweep that no earlier extension keeps, in grid order.
+/// The jobs of an extension among these points that no earlier one keeps, in grid order.
 fn own_jobs<'a>(
-    sweep: &'a Sweep,
+    own: &'a Extension,
     earlier: &'a [Extension],
-    points: Range<u64>,
+    among: &Range<u64>,
 ) -> impl Iterator<Item = Job> + Clone + Send + use<'a> {
     let is_kept = |extension: &Extension, job: &Job| {
         extension.sweep.find(&job.parameters).is_some_and(|point| extension.keeps(point))
     };
-    sweep.jobs_at(points).filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
+    let jobs = own.points(among).into_iter().flat_map(|points| own.sweep.jobs_at(points));
+    jobs.filter(move |job| !earlier.iter().any(|extension| is_kept(extension, job)))
 }
 
 impl<'a> Plan<'a> {
@@ -125,7 +149,7 @@ impl<'a> Plan<'a> {
     /// The parts of an extension, in order.
     pub fn parts_of(self, extension: usize) -> impl Iterator<Item = Part> + Clone + Send + use<'a> {
         let own = &self.extensions[extension];
-        let mut source = own_jobs(&own.sweep, &self.extensions[..extension], own.sweep.points()).peekable();
+        let mut source = own_jobs(own, &self.extensions[..extension], &own.sweep.points()).peekable();
         let parts = (0..).map_while(move |index| {
             let (mut jobs, mut cost) = (Vec::new(), 0.0);
             let fits = |jobs: &[Job], cost: f64| jobs.is_empty() || (jobs.len() < PART_JOBS && cost <= own.part_cost);
@@ -152,9 +176,9 @@ impl<'a> Plan<'a> {
     /// The part of an outline, whose points alone are walked through.
     #[must_use]
     pub fn part(self, outline: &Outline) -> Part {
-        let (own, earlier) = (&self.extensions[outline.extension].sweep, &self.extensions[..outline.extension]);
+        let (own, earlier) = (&self.extensions[outline.extension], &self.extensions[..outline.extension]);
         let points = *outline.points.start()..outline.points.end() + 1;
-        Part { outline: outline.clone(), jobs: own_jobs(own, earlier, points).collect() }
+        Part { outline: outline.clone(), jobs: own_jobs(own, earlier, &points).collect() }
     }
 
     /// Where in the grid those parts of an extension lie that are to be kept.

@@ -14,6 +14,7 @@
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::check::Places;
 use super::quantity::Quantity;
+use super::read_rounds::{Wanted, WantedAxis};
 use super::samples::{Range, Sample};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::{Shortest, Value};
@@ -25,14 +26,18 @@ const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in
 
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
-/// Reads all axes.
-pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
+/// Reads all axes, those that are to be refined as fine as that.
+pub(super) fn read(
+    section: &Section<'_>,
+    places: &mut Places<'_>,
+    wanted: Option<&Wanted<'_>>,
+) -> Result<Vec<Axis>, Refused> {
     let axes = all(section.entries().iter().map(|entry| {
         let (title, read): (_, TableReader) = match entry.key {
             "zip" => ("[axes.zip]", read_zip),
             "sobol" => ("[axes.sobol]", |table, places| read_sample(table, Sample::Sobol, places)),
             "latin" => ("[axes.latin]", |table, places| read_sample(table, Sample::Latin, places)),
-            _ => return Ok(vec![read_single(entry, places)?]),
+            _ => return Ok(vec![read_single(entry, places, wanted)?]),
         };
         all(tables(entry, title)?.iter().map(|table| read(table, places)))
     }));
@@ -58,12 +63,12 @@ fn known(entry: &Entry<'_>, title: &str, also: &[&'static str], places: &mut Pla
     Ok(quantity)
 }
 
-fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
+fn read_single(entry: &Entry<'_>, places: &mut Places<'_>, wanted: Option<&Wanted<'_>>) -> Result<Axis, Refused> {
     let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"], places)?;
     if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, first, count });
     }
-    let values = read_values(entry, quantity)?;
+    let values = read_values(entry, quantity, wanted.and_then(|wanted| wanted.axis(quantity)))?;
     let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
     Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
@@ -77,8 +82,12 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refus
     })
 }
 
-/// Reads the values of a quantity, each with the byte of the text that sets it.
-fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, Refused> {
+/// Reads the values of a quantity, each with the byte of the text that sets it; more of a range that is to be refined.
+fn read_values(
+    entry: &Entry<'_>,
+    quantity: Quantity,
+    finer: Option<&WantedAxis<'_>>,
+) -> Result<Vec<(Value, usize)>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -107,6 +116,7 @@ fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usiz
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
     let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
+    let points = finer.map_or(Ok(points), |axis| axis.points(&range, points))?;
     range.spaced(points).map(|value| Ok((ranged(entry, quantity, value)?, entry.at))).collect()
 }
 
@@ -187,7 +197,7 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity)?.into_iter().map(|(value, _)| value).collect();
+        let values = read_values(entry, quantity, None)?.into_iter().map(|(value, _)| value).collect();
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {

@@ -3,7 +3,11 @@
 //! Keys, units, meanings and ranges are those of the one description of each field. What depends on several keys, such as
 //! `dfs <= fs`, is left to [`Sweep::parse`](super::Sweep::parse).
 
+use super::axes::MAX_ROWS;
 use super::quantity::Quantity;
+use super::read_rounds::{Keys, PRECISION, REFINE, is_refinable};
+use super::rounds::MAX_SETS;
+use super::statistic::STATISTICS;
 use crate::model::{BreakOn, Description, Parameters, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
@@ -38,6 +42,14 @@ pub fn schema() -> Json {
         ("model", with(closed(model), "description", "Parameters that differ from those of Fig. 1, in SI units")),
         ("axes", with(closed(axes.chain(tables)), "description", "What is varied; every combination is a job")),
         ("record", with(closed(record), "description", "What each job records, and when it ends")),
+        (
+            "precision",
+            with(precision(), "description", "How precise statistics are to be: sets get seeds until they are"),
+        ),
+        (
+            "refine",
+            with(refine(), "description", "Where the grid is to be finer: cells are divided where their sets differ"),
+        ),
         ("solver", with(solver(), "description", "How motion is computed, and how accurately")),
     ]);
     file["$schema"] = json!("http://json-schema.org/draft-07/schema#");
@@ -175,10 +187,77 @@ fn solver() -> Json {
     ])
 }
 
+/// An object with these keys, each with its meaning and a schema.
+fn keyed(keys: &Keys, schemas: &[(&str, Json)], required: &[&str]) -> Json {
+    let properties = schemas.iter().map(|(key, schema)| {
+        let words = keys.iter().find(|(known, ..)| known == key);
+        let meaning = words.map_or_else(String::new, |(_, meaning, allowed)| format!("{meaning}: {allowed}"));
+        (*key, with(schema.clone(), "description", &meaning))
+    });
+    let mut table = closed(properties);
+    table["required"] = json!(required);
+    table
+}
+
+/// Exactly one of these keys, or none of them as well.
+fn one_of(mut table: Json, keys: [&str; 2], or_none: bool) -> Json {
+    let both = json!({ "not": { "required": keys } });
+    let any = json!({ "anyOf": keys.map(|key| json!({ "required": [key] })) });
+    table["allOf"] = if or_none { json!([both]) } else { json!([both, any]) };
+    table
+}
+
+fn precision() -> Json {
+    let estimates: Vec<&str> = STATISTICS.iter().filter(|known| known.has_interval()).map(|known| known.key).collect();
+    let estimate = json!({ "enum": estimates });
+    let of = json!({ "anyOf": [estimate, { "type": "array", "items": estimate, "minItems": 1 }] });
+    let count = json!({ "type": "integer", "minimum": 2, "maximum": MAX_ROWS });
+    let mut seeds = closed([("from", count.clone()), ("to", count)]);
+    seeds["required"] = json!(["from", "to"]);
+    let schemas = [
+        ("of", of),
+        ("relative", json!({ "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 })),
+        ("absolute", json!({ "type": "number", "exclusiveMinimum": 0 })),
+        ("seeds", seeds),
+    ];
+    one_of(keyed(PRECISION, &schemas, &["of", "seeds"]), ["relative", "absolute"], false)
+}
+
+fn refine() -> Json {
+    let quantities: Vec<&str> = Quantity::all().filter(|quantity| is_refinable(*quantity)).map(Quantity::key).collect();
+    let quantity = json!({ "enum": quantities });
+    let step = json!({ "type": "number", "exclusiveMinimum": 0 });
+    let schemas = [
+        (
+            "axes",
+            json!({ "anyOf": [quantity, { "type": "array", "items": quantity, "minItems": 1, "uniqueItems": true }] }),
+        ),
+        ("by", json!({ "enum": STATISTICS.map(|known| known.key).to_vec() })),
+        ("threshold", json!({ "type": "number" })),
+        ("step", step.clone()),
+        ("to", closed(quantities.iter().map(|key| (*key, step.clone())))),
+        ("sets", json!({ "type": "integer", "minimum": 1, "maximum": MAX_SETS })),
+    ];
+    one_of(keyed(REFINE, &schemas, &["axes", "by", "to", "sets"]), ["threshold", "step"], true)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_documented;
+    use crate::documented::{assert_documented, assert_rows_documented};
+
+    #[test]
+    fn documented_keys_are_those_of_precision_and_refinement() {
+        for (heading, keys) in [("## [precision]", PRECISION), ("## [refine]", REFINE)] {
+            let row = |(key, meaning, allowed): &(&str, &str, &str)| format!("| `{key}` | {meaning} | {allowed} |\n");
+            let rows: String = keys.iter().map(row).collect();
+            assert_rows_documented(
+                "rounds.md",
+                heading,
+                &format!("| key | meaning | allowed |\n|---|---|---|\n{rows}"),
+            );
+        }
+    }
 
     #[test]
     fn the_documented_schema_is_the_one_printed() {

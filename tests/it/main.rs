@@ -25,6 +25,7 @@ mod program;
 mod ramp;
 mod regimes;
 mod report;
+mod rounds;
 mod runs;
 mod sharing;
 mod simulate;

@@ -17,6 +17,9 @@ GOOD = [
     'name = "a"\n[[axes.latin]]\npoints = 8\nV0 = { log = [1e-5, 1e-4] }\n[[axes.latin]]\npoints = 3\nK = { log = [1e7, 1e8] }\n',
     'name = "a"\n[record]\nslips = 7\nprecursors = true\ndrop_size = 0.5\n[solver]\nmethod = "fixed-step"\ndt = 1e-6\n',
     'name = "a"\n[solver]\nresolve = "taylor"\ntolerance = 1e-9\n',
+    'name = "a"\n[precision]\nof = ["tau_mean", "drop_mean"]\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
+    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n'
+    '[refine]\naxes = "V0"\nby = "tau_mean"\nthreshold = 0.1\nto = { V0 = 0.1 }\nsets = 9\n',
 ]
 BAD = [
     "[model]\nN = 3",
@@ -39,6 +42,10 @@ BAD = [
     'name = "a"\n[record]\nmax_time = -1',
     'name = "a"\n[solver]\ntolerance = 1',
     'name = "a"\n[solver]\nmethod = "euler"',
+    'name = "a"\n[precision]\nof = "tau_sd"\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
+    'name = "a"\n[precision]\nof = "tau_mean"\nseeds = { from = 4, to = 64 }\n',
+    'name = "a"\n[precision]\nof = "tau_mean"\nrelative = 0.1\nabsolute = 1\nseeds = { from = 4, to = 64 }\n',
+    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxes = "V0"\nby = "locked"\nto = { V0 = 0.1 }\n',
 ]
 
 

@@ -111,9 +111,9 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
     other.identity = "0".repeat(32);
     fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
     refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
-    fs::write(&path, text.replace("\"format\": 5", "\"format\": 6, \"new\": 0")).unwrap();
+    fs::write(&path, text.replace("\"format\": 6", "\"format\": 7, \"new\": 0")).unwrap();
     let error = Results::read(&Layout::new(&Disk, root.path())).unwrap_err().to_string();
-    assert!(error.contains("has format 6"), "{error}");
+    assert!(error.contains("has format 7"), "{error}");
 }
 
 #[test]

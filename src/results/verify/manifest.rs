@@ -8,7 +8,8 @@ use crate::results::layout::Layout;
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
 use crate::results::missing::no_results;
 use crate::results::tables;
-use crate::sweep::{Extension, Part};
+use crate::sweep::{Extension, Part, Round};
+use crate::table::checksum;
 use crate::table::file::{DatasetError, footer};
 use crate::table::storage::StorageError;
 use std::path::PathBuf;
@@ -34,7 +35,12 @@ fn begin_again(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Extension>, 
     let mut extensions = Vec::new();
     for (number, text) in texts.iter().enumerate() {
         let sweep = parse(layout, number, text)?;
-        extensions.push(Extension::new(&sweep, &extensions));
+        let extension = if number > 0 && sweep.rounds().is_some() {
+            Extension::next_round(&sweep, &extensions, round(layout, number)?)
+        } else {
+            Extension::new(&sweep, &extensions)
+        };
+        extensions.push(extension);
         if number + 1 < texts.len() {
             let results = Results::new(layout, extensions.clone());
             let (done, committed) = (results.done_parts()?, results.committed_parts()?);
@@ -43,6 +49,13 @@ fn begin_again(layout: &Layout<'_>, texts: &[String]) -> Result<Vec<Extension>, 
         }
     }
     Ok(extensions)
+}
+
+/// The copy of a round.
+fn round(layout: &Layout<'_>, extension: usize) -> Result<Round, ResultsError> {
+    let path = layout.round(extension);
+    let text = read_text(layout, &path)?;
+    checksum::from_json(&text).map_err(|problem| ResultsError::damaged(&path, problem))
 }
 
 /// Writes the manifest and the copies of the sweep files again.
@@ -74,6 +87,16 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
                         let problem =
                             if is_there { "it is not the text that the manifest has" } else { "it is missing" };
                         problems.push(problem_with(layout, path, problem)?);
+                    }
+                    if let Some(expected) = record.round_text(layout, extension)? {
+                        let path = layout.round(extension);
+                        match read_text(layout, &path) {
+                            Ok(text) if text == expected => {}
+                            Err(error) if error.kind != ErrorKind::Damaged => return Err(error),
+                            _ => {
+                                problems.push(problem_with(layout, path, "it is not the round that the manifest has")?);
+                            }
+                        }
                     }
                 }
                 return Ok(Texts::Manifest(manifest));

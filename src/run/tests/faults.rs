@@ -14,6 +14,14 @@ pub fn small_sweep(seeds: u64) -> Sweep {
     Sweep::parse(&text, Path::new("small.toml")).unwrap()
 }
 
+/// The same jobs, but run in rounds: some seeds first, then the others.
+pub fn small_sweep_in_rounds(first: u64, seeds: u64) -> Sweep {
+    let precision =
+        format!("[precision]\nof = \"tau_mean\"\nrelative = 0.01\nseeds = {{ from = {first}, to = {seeds} }}\n");
+    let text = small_sweep(seeds).text().replace(&format!("seed = {{ count = {seeds} }}\n"), "") + &precision;
+    Sweep::parse(&text, Path::new("small.toml")).unwrap()
+}
+
 /// What was done on a disk before.
 #[derive(Clone, Copy)]
 enum Before {
@@ -37,15 +45,24 @@ struct Scenario {
     retry_failed: bool,
     /// Whether the tables are reduced.
     reduces: bool,
+    /// Whether it decides for itself how many seeds there are.
+    in_rounds: bool,
 }
 
-const FIRST_RUN: Scenario =
-    Scenario { name: "first run", before: Before::Nothing, seeds: 3, retry_failed: false, reduces: false };
-const SCENARIOS: [Scenario; 4] = [
+const FIRST_RUN: Scenario = Scenario {
+    name: "first run",
+    before: Before::Nothing,
+    seeds: 3,
+    retry_failed: false,
+    reduces: false,
+    in_rounds: false,
+};
+const SCENARIOS: [Scenario; 5] = [
     FIRST_RUN,
     Scenario { name: "extension of a killed run", before: Before::KilledRun, seeds: 5, ..FIRST_RUN },
     Scenario { name: "retry of failed jobs", before: Before::FailingRun, retry_failed: true, ..FIRST_RUN },
     Scenario { name: "reduction", before: Before::FirstRun, reduces: true, ..FIRST_RUN },
+    Scenario { name: "rounds", in_rounds: true, ..FIRST_RUN },
 ];
 
 /// Runs with one thread, and reduces.
@@ -56,7 +73,7 @@ fn attempt(layout: &Layout<'_>, scenario: &Scenario, faults: bool) -> Result<Run
         1 if faults => Err(SimulationError::EventBudget { time: 0.5, events: 10 }),
         _ => Ok(measure(&job.parameters)),
     };
-    let sweep = small_sweep(scenario.seeds);
+    let sweep = if scenario.in_rounds { small_sweep_in_rounds(2, scenario.seeds) } else { small_sweep(scenario.seeds) };
     let report = run(layout, &sweep, options, &kernel, &mut |_| ()).map_err(|error| error.to_string())?;
     if scenario.reduces {
         let results = Results::read(layout).map_err(|error| error.to_string())?;

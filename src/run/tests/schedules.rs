@@ -2,7 +2,7 @@
 //! a network file system or without. Whatever the order, and whoever is killed: nothing is lost, done twice, moved or
 //! reported as damaged, and the end is the same bytes.
 
-use super::faults::{files_below, results, small_sweep};
+use super::faults::{files_below, results, small_sweep, small_sweep_in_rounds};
 use super::host::Host;
 use super::schedule::{Schedule, random_index};
 use super::*;
@@ -19,6 +19,8 @@ use std::sync::LazyLock;
 const SEEDS: u64 = 8;
 /// Fewer, for what was there before.
 const FEWER: u64 = 5;
+/// Seeds of the first round, of sweeps that decide for themselves: more follow in two further ones.
+const AT_FIRST: u64 = 3;
 /// Schedules in the usual tests.
 const SCHEDULES: u64 = 150;
 /// Environment variable with another number of them, and the first seed.
@@ -64,10 +66,10 @@ impl Process {
     const ALL: [Self; 7] =
         [Self::Run, Self::StoppedRun, Self::Compact, Self::Repair, Self::Verify, Self::Reduce, Self::Read];
 
-    fn act(self, layout: &Layout<'_>, runs: &Runs) -> anyhow::Result<()> {
+    fn act(self, layout: &Layout<'_>, in_rounds: bool, runs: &Runs) -> anyhow::Result<()> {
         match self {
-            Self::Run => run_some(layout, SEEDS, None, runs).map(|_| ()),
-            Self::StoppedRun => run_some(layout, SEEDS, Some(STOP_AFTER), runs).map(|_| ()),
+            Self::Run => run_some(layout, (SEEDS, in_rounds), None, runs).map(|_| ()),
+            Self::StoppedRun => run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), runs).map(|_| ()),
             Self::Compact => Ok(Results::read(layout)?.compact_by(PARTS_PER_FILE).map(|_| ())?),
             Self::Repair => assert_sound(&Results::repair(layout)?),
             Self::Verify => assert_sound(&Results::verify(layout)?),
@@ -86,7 +88,14 @@ fn assert_sound(verification: &Verification) -> anyhow::Result<()> {
     problems.next().map_or(Ok(()), |problem| Err(anyhow::anyhow!("{problem:?}")))
 }
 
-fn run_some(layout: &Layout<'_>, seeds: u64, stop_after: Option<u64>, runs: &Runs) -> anyhow::Result<RunReport> {
+/// Runs the sweep with so many seeds, in rounds or not.
+fn run_some(
+    layout: &Layout<'_>,
+    (seeds, in_rounds): (u64, bool),
+    stop_after: Option<u64>,
+    runs: &Runs,
+) -> anyhow::Result<RunReport> {
+    let sweep = if in_rounds { small_sweep_in_rounds(AT_FIRST, seeds) } else { small_sweep(seeds) };
     let (stop, begun) = (AtomicBool::new(false), AtomicU64::new(0));
     let kernel = |job: &Job, interrupt: &AtomicBool| {
         if stop_after.is_some_and(|most| begun.fetch_add(1, Ordering::Relaxed) >= most) {
@@ -100,7 +109,7 @@ fn run_some(layout: &Layout<'_>, seeds: u64, stop_after: Option<u64>, runs: &Run
         Ok(measure(&job.parameters))
     };
     let mut done = 0;
-    let report = run(layout, &small_sweep(seeds), options(&stop, 1), &kernel, &mut |event| {
+    let report = run(layout, &sweep, options(&stop, 1), &kernel, &mut |event| {
         done += u64::from(matches!(event, RunEvent::JobDone { .. }));
         stop.store(stop_after.is_some_and(|most| done >= most), Ordering::Relaxed);
     })?;
@@ -110,21 +119,21 @@ fn run_some(layout: &Layout<'_>, seeds: u64, stop_after: Option<u64>, runs: &Run
 impl There {
     const ALL: [Self; 5] = [Self::Nothing, Self::StoppedRun, Self::FewerJobs, Self::Compacted, Self::AllJobs];
 
-    fn prepare(self, layout: &Layout<'_>) -> anyhow::Result<()> {
+    fn prepare(self, layout: &Layout<'_>, in_rounds: bool) -> anyhow::Result<()> {
         let runs = Runs::default();
         match self {
             Self::Nothing => (),
             Self::StoppedRun => {
-                assert!(run_some(layout, SEEDS, Some(STOP_AFTER), &runs)?.jobs_spilled > 0);
+                assert!(run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), &runs)?.jobs_spilled > 0);
             }
             Self::FewerJobs | Self::Compacted => {
-                run_some(layout, FEWER, None, &runs)?;
+                run_some(layout, (FEWER, in_rounds), None, &runs)?;
                 if self == Self::Compacted {
                     assert!(Results::read(layout)?.compact_by(PARTS_PER_FILE)?.changed);
                 }
             }
             Self::AllJobs => {
-                run_some(layout, SEEDS, None, &runs)?;
+                run_some(layout, (SEEDS, in_rounds), None, &runs)?;
             }
         }
         Ok(())
@@ -144,9 +153,9 @@ fn write_files(root: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
 }
 
 /// Completes a directory alone: runs, compacts, reduces; its files, and the jobs that were missing.
-fn complete(root: &Path, runs: &Runs) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
+fn complete(root: &Path, in_rounds: bool, runs: &Runs) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
     let layout = Layout::new(&Disk, root);
-    let report = run_some(&layout, SEEDS, None, runs)?;
+    let report = run_some(&layout, (SEEDS, in_rounds), None, runs)?;
     anyhow::ensure!((report.jobs_failed, report.jobs_left) == (0, 0), "{report:?}");
     let results = Results::read(&layout)?;
     results.compact_by(PARTS_PER_FILE)?;
@@ -163,17 +172,17 @@ struct Trial {
     missing: BTreeMap<(u64, u64), usize>,
 }
 
-static TRIALS: LazyLock<BTreeMap<There, Trial>> = LazyLock::new(|| {
-    let trial = |there: There| {
+static TRIALS: LazyLock<BTreeMap<(There, bool), Trial>> = LazyLock::new(|| {
+    let trial = |(there, in_rounds): (There, bool)| {
         let (folder, runs) = (folder(), Runs::default());
         let root = folder.path().join("small");
         fs::create_dir(&root).unwrap();
-        there.prepare(&Layout::new(&Disk, &root)).unwrap();
+        there.prepare(&Layout::new(&Disk, &root), in_rounds).unwrap();
         let before = files_below(&root);
-        let after = complete(&root, &runs).unwrap();
-        (there, Trial { before, after, missing: runs.into_inner().unwrap() })
+        let after = complete(&root, in_rounds, &runs).unwrap();
+        ((there, in_rounds), Trial { before, after, missing: runs.into_inner().unwrap() })
     };
-    There::ALL.map(trial).into()
+    There::ALL.into_iter().flat_map(|there| [(there, false), (there, true)]).map(trial).collect()
 });
 
 /// Whether a process of these may end with this error, though nothing has befallen it.
@@ -196,13 +205,14 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let there = There::ALL[below(There::ALL.len())];
     let mut processes = vec![Process::Run];
     processes.extend((0..=below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
-    let (has_caches, is_killing) = (below(2) == 0, below(3) == 0);
+    let (has_caches, is_killing, in_rounds) = (below(2) == 0, below(3) == 0, below(3) == 0);
     let case = format!(
-        "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}",
+        "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}{}",
         if has_caches { ", with caches" } else { "" },
-        if is_killing { ", one is killed" } else { "" }
+        if is_killing { ", one is killed" } else { "" },
+        if in_rounds { ", in rounds" } else { "" }
     );
-    let trial = &TRIALS[&there];
+    let trial = &TRIALS[&(there, in_rounds)];
     let (folder, runs) = (folder(), Runs::default());
     let root = folder.path().join("small");
     write_files(&root, &trial.before);
@@ -214,7 +224,8 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
                 scope.spawn(move || {
                     KNOWN_NUMBER.set(Some(seed.wrapping_mul(31) + number as u64));
                     let host = Host::new(schedule, number, has_caches);
-                    let acted = catch_unwind(AssertUnwindSafe(|| process.act(&Layout::new(&host, root), runs)));
+                    let acted =
+                        catch_unwind(AssertUnwindSafe(|| process.act(&Layout::new(&host, root), in_rounds, runs)));
                     (acted, schedule.end(number))
                 })
             })
@@ -232,7 +243,8 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
         }
         is_any_killed
     });
-    let completed = complete(&root, &runs).unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
+    let completed =
+        complete(&root, in_rounds, &runs).unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
     let differing: Vec<_> = completed.iter().filter(|(path, bytes)| trial.after.get(*path) != Some(bytes)).collect();
     let differing: Vec<_> = differing.iter().map(|(path, _)| path).collect();
     assert!(results(&completed) == results(&trial.after), "{case}: {differing:?}");

@@ -265,3 +265,85 @@ fn every_column_of_a_zip_or_a_sample_and_every_axis_is_read() {
     let lines: Vec<usize> = mistakes.iter().map(|mistake| mistake.line).collect();
     assert_eq!(lines, [3, 4, 6, 7, 9, 10, 11, 12, 13], "{mistakes:?}");
 }
+
+#[test]
+fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
+    const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
+                          Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
+    let precision = |text: &str| format!("name = \"a\"\n[precision]\n{text}");
+    let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
+    let good = "axes = [\"frequency\"]\nby = \"locked\"\nto = { frequency = 0.1 }\nsets = 50\n";
+    Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
+    let instead = |from: &str, to: &str| refine(&good.replace(from, to));
+    let seeds = "seeds = { from = 4, to = 8 }";
+    let precise = |of: &str| precision(&format!("of = {of}\nrelative = 0.01\n{seeds}"));
+    let table: Vec<(String, usize, &[&str])> = vec![
+        (precise("\"tau\""), 3, &["of = \"tau\"", "no statistic of a set", "tau_mean"]),
+        (precise("\"tau_meen\""), 3, &["did you mean tau_mean?"]),
+        (precise("\"tau_sd\""), 3, &["of = \"tau_sd\"", "no confidence interval", "mean_friction"]),
+        (precise("[]"), 3, &["at least one statistic"]),
+        (precise("[\"tau_mean\",\n3]"), 4, &["of = 3", "in quotes"]),
+        (precise("\"phase_mean\""), 4, &["relative = 0.01", "an angle", "absolute"]),
+        (precision(&format!("of = \"tau_mean\"\n{seeds}")), 2, &["relative is missing", "or absolute"]),
+        (precision(&format!("relative = 0.1\n{seeds}")), 2, &["of is missing"]),
+        (precision(&format!("of = \"tau_mean\"\nrelative = 0\n{seeds}")), 4, &["relative = 0", "> 0 and < 1"]),
+        (precision(&format!("of = \"tau_mean\"\nrelative = -0.1\n{seeds}")), 4, &["relative = -0.1", "> 0 and < 1"]),
+        (precision(&format!("of = \"tau_mean\"\nabsolute = 0\n{seeds}")), 4, &["absolute = 0", "> 0, in s"]),
+        (
+            precision(&format!("of = \"tau_mean\"\nrelative = 0.1\nabsolute = 1\n{seeds}")),
+            5,
+            &["absolute = 1", "relative is there too", "keep one"],
+        ),
+        (
+            precision(&format!("of = [\"tau_mean\", \"drop_mean\"]\nabsolute = 1\n{seeds}")),
+            4,
+            &["absolute = 1", "different units"],
+        ),
+        (precision("of = \"tau_mean\"\nrelative = 0.1"), 2, &["seeds is missing"]),
+        (precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = 8"), 5, &["seeds = 8", "{ from = 24, to = 256 }"]),
+        (
+            precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 8, to = 4 }"),
+            5,
+            &["to = 4", "at least from, which is 8"],
+        ),
+        (precision("of = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 1, to = 4 }"), 5, &["from = 1", "from 2"]),
+        (precise("\"tau_mean\"\nrelativ = 3"), 4, &["relativ = 3", "[precision]", "did you mean relative?"]),
+        (
+            format!("{}\n[axes]\nseed = {{ count = 3 }}", precise("\"tau_mean\"")),
+            5,
+            &["seed", "is set in [axes], too (line 7)"],
+        ),
+        (instead("[\"frequency\"]", "[\"frequenzy\"]"), 7, &["axes = \"frequenzy\"", "did you mean frequency?"]),
+        (instead("[\"frequency\"]", "[\"break_on\"]"), 7, &["axes = \"break_on\"", "is a word"]),
+        (instead("[\"frequency\"]", "[\"N\"]"), 7, &["axes = \"N\"", "whole numbers"]),
+        (instead("[\"frequency\"]", "[\"frequency\", \"frequency\"]"), 7, &["named twice"]),
+        (instead("[\"frequency\"]", "[]"), 7, &["names no axis"]),
+        (instead("frequency", "T"), 7, &["axes = \"T\"", "T follows from the axis frequency", "refine frequency"]),
+        (instead("frequency", "K"), 7, &["axes = \"K\"", "is no axis of [axes]"]),
+        (instead("frequency", "V0"), 7, &["axes = \"V0\"", "no values in between", "linear"]),
+        (
+            format!(
+                "name = \"a\"\n[axes.zip]\nK = [1e8, 2e8]\nV0 = [1e-4, 2e-4]\n[refine]\n{}",
+                good.replace("frequency", "K")
+            ),
+            6,
+            &["axes = \"K\"", "zip or a sample"],
+        ),
+        (instead("\"locked\"", "\"loked\""), 8, &["by = \"loked\"", "did you mean locked?"]),
+        (instead("\"locked\"", "\"locked\"\nthreshold = 1"), 9, &["threshold = 1", "locked is no number"]),
+        (instead("\"locked\"", "\"tau_mean\""), 8, &["by = \"tau_mean\"", "threshold", "step"]),
+        (instead("\"locked\"", "\"tau_mean\"\nstep = 0"), 9, &["step = 0", "> 0"]),
+        (instead("\"locked\"", "\"tau_mean\"\nthreshold = 1\nstep = 1"), 10, &["step = 1", "keep one"]),
+        (instead("frequency = 0.1", "frequency = 10"), 9, &["frequency = 10", "finer than 10"]),
+        (instead("frequency = 0.1", "frequency = 0"), 9, &["frequency = 0", "> 0"]),
+        (instead("frequency = 0.1", "frequency = 1e-9"), 9, &["frequency = 1e-9", "1000000 values"]),
+        (instead("frequency = 0.1", "Delta = 0.1"), 9, &["Delta = 0.1", "allowed are frequency"]),
+        (instead("frequency = 0.1", ""), 9, &["frequency is missing"]),
+        (instead("sets = 50", "sets = 39"), 10, &["sets = 39", "at least the 40 sets"]),
+        (instead("sets = 50", "sets = 0"), 10, &["sets = 0", "from 1 to 100000"]),
+        (instead("sets = 50", "sets = 50\nfiner = 3"), 11, &["finer = 3", "[refine]", "allowed are axes, by"]),
+    ];
+    for (text, line, words) in &table {
+        assert_refused(&[(text, *line, words)]);
+    }
+}

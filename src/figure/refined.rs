@@ -1,0 +1,203 @@
+//! Refined grids: a map of cells of different size with the edge between two kinds of sets; and, along one axis, the edge
+//! against another parameter, each with the band in which it lies.
+
+use super::axis::Axis;
+use super::dependence::{label, number};
+use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::legend::{Mark, entry};
+use super::picture::{Dot, Fill, Ink, Picture, Stroke};
+use super::sets::MICROMETRES;
+use super::style::{BAR_WIDTH, INKS, LIGHT_GREY, Look, RADIUS, WHITE, dot};
+use crate::model::Symbol;
+use crate::reduce::{CellRow, SetSummary};
+use kuva::render::color::Color;
+use std::collections::{BTreeMap, HashMap};
+
+const MAP: Layout = Layout::column(560.0, &[400.0], ROW_GAP, RIGHT);
+const LINE: Layout = Layout::column(490.0, &[300.0], ROW_GAP, RIGHT);
+/// Ratio of the largest to the least value above which a scale is logarithmic.
+const LOGARITHMIC: f64 = 20.0;
+/// Cells in which all sets are locked, or above the threshold.
+const YES: Ink = "#7fa8cf";
+/// Cells in which none is.
+const NO: Ink = "#f2f2f0";
+/// Cells in which sets differ.
+const EDGE: Ink = INKS[1];
+const OUTLINE: Stroke = Stroke::solid(LIGHT_GREY, 0.5);
+
+/// Draws the cells of a grid that was refined along two axes and has no third, or the edges along one; `None` for others.
+pub(super) fn refined(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture> {
+    if cells.iter().all(|cell| cell.y.is_some()) { map(cells, look) } else { edges(cells, sets, look) }
+}
+
+/// Label of an axis, and the factor to its unit.
+fn axis_of(key: &str) -> (String, f64) {
+    match (key, Symbol::from_key(key)) {
+        ("frequency", _) => ("Frequency 1/T (Hz)".to_owned(), 1.0),
+        ("eta", _) => ("η".to_owned(), 1.0),
+        (_, Some(Symbol::Delta)) => ("Amplitude Δ (µm)".to_owned(), MICROMETRES),
+        (_, Some(symbol)) => (label(symbol), 1.0),
+        (key, None) => (key.to_owned(), 1.0),
+    }
+}
+
+fn scale(label: &str, low: f64, high: f64) -> Axis {
+    if low > 0.0 && high / low > LOGARITHMIC {
+        Axis::logarithmic(label, low, high)
+    } else {
+        Axis::linear(label, low, high)
+    }
+}
+
+/// What sets in a cell without an edge are.
+fn words(by: &str) -> [String; 2] {
+    if by == "locked" {
+        ["locked".to_owned(), "not locked".to_owned()]
+    } else {
+        [format!("{by} above the threshold"), "not above".to_owned()]
+    }
+}
+
+/// Ends of a cell along an axis.
+type Ends = (f64, f64);
+/// A quantity of a set.
+type Quantity = Box<dyn Fn(&SetSummary) -> Option<f64>>;
+
+/// The least and the largest value.
+fn range(values: impl Iterator<Item = f64>) -> Ends {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
+fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
+    let first = cells.first()?;
+    let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(&first.x), axis_of(first.y.as_deref()?));
+    let mut boxes: BTreeMap<[u64; 2], u32> = BTreeMap::new();
+    let mut placed: Vec<(Ends, Ends, &CellRow)> = Vec::new();
+    for cell in cells {
+        let [x, y] = [(cell.x_low, cell.x_high, x_factor), (cell.y_low?, cell.y_high?, y_factor)]
+            .map(|(low, high, factor)| (factor * low, factor * high));
+        *boxes.entry([x.0.to_bits(), y.0.to_bits()]).or_default() += 1;
+        placed.push((x, y, cell));
+    }
+    // Of several maps on top of each other, none would be seen.
+    if boxes.values().any(|&count| count > 1) {
+        return None;
+    }
+    let (x_low, x_high) = range(placed.iter().flat_map(|(x, ..)| [x.0, x.1]));
+    let (y_low, y_high) = range(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]));
+    let [yes, no] = words(&first.by);
+    let patch = |ink| Mark::Patch(Fill { ink, opacity: 1.0 });
+    let legend = [entry(patch(YES), yes), entry(patch(NO), no), entry(patch(EDGE), "the edge lies here")];
+    let (page, mut sheet) = MAP.page("refined-map", look, &legend);
+    let frame = page.frame(0, 0, scale(&x_label, x_low, x_high), scale(&y_label, y_low, y_high));
+    frame.clipped(&mut sheet, |sheet| {
+        let colour = |cell: &CellRow| match cell.share {
+            _ if cell.differs => EDGE,
+            Some(share) if share > 0.5 => YES,
+            Some(_) => NO,
+            None => WHITE,
+        };
+        sheet.rectangles(placed.iter().map(|&(x, y, cell)| (frame.box_of(x, y), Color::from(colour(cell)))));
+        // The finest cells are seen by their colour.
+        for &(x, y, _) in placed.iter().filter(|(.., cell)| !cell.differs) {
+            frame.curve(sheet, [(x.0, y.1), (x.0, y.0), (x.1, y.0)], OUTLINE);
+        }
+    });
+    frame.axes(&mut sheet);
+    Some(sheet.finish())
+}
+
+/// The edges along one axis against the one other quantity in which sets differ.
+fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture> {
+    let by_id: HashMap<&str, &SetSummary> = sets.iter().map(|set| (set.set_id.as_str(), set)).collect();
+    let at_edges = cells.iter().filter(|cell| cell.differs);
+    let bands: Vec<(&CellRow, &SetSummary)> =
+        at_edges.filter_map(|cell| Some((cell, *by_id.get(cell.set_id.as_deref()?)?))).collect();
+    let refined = &cells.first()?.x;
+    let quantities = Symbol::ALL.into_iter().filter(|symbol| *symbol != Symbol::Seed).filter_map(|symbol| {
+        let (key, of): (_, Quantity) = match symbol {
+            Symbol::T => ("frequency", Box::new(|set| set.parameters.modulation_period.map(|period| 1.0 / period))),
+            symbol => (symbol.key(), Box::new(move |set| number(&set.parameters, symbol))),
+        };
+        let is_refined = key == refined || (symbol == Symbol::T && ["T", "eta"].contains(&refined.as_str()));
+        let mut values = bands.iter().filter_map(|(_, set)| of(set));
+        let first = values.next()?;
+        (!is_refined && values.any(|value| value != first)).then_some((key, of))
+    });
+    let quantities: Vec<_> = quantities.collect();
+    let [(key, of)] = quantities.as_slice() else { return None };
+    let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(key), axis_of(refined));
+    let points: Vec<(f64, f64, f64)> = bands
+        .iter()
+        .filter_map(|(cell, set)| Some((x_factor * of(set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
+        .collect();
+    let (x_low, x_high) = range(points.iter().map(|point| point.0));
+    let (y_low, y_high) = range(points.iter().flat_map(|point| [point.1, point.2]));
+    let margin = 0.05 * (x_high - x_low);
+    let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {}, and the band in which it lies", cells[0].by))];
+    let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
+    let y = if y_low > 0.0 && y_high / y_low > LOGARITHMIC {
+        Axis::logarithmic(&y_label, 0.8 * y_low, 1.25 * y_high)
+    } else {
+        Axis::rounded(&y_label, y_low, y_high)
+    };
+    let frame = page.frame(0, 0, Axis::linear(&x_label, x_low - margin, x_high + margin), y);
+    for &(x, low, high) in &points {
+        frame.error_bar(&mut sheet, x, (low, high), Stroke::solid(INKS[0], BAR_WIDTH));
+    }
+    let middles = points.iter().map(|&(x, low, high)| (x, frame.y.middle(low, high)));
+    frame.points(&mut sheet, middles, Dot::solid(INKS[0], 0.7 * RADIUS));
+    frame.axes(&mut sheet);
+    Some(sheet.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Parameters;
+
+    fn cell(x: (f64, f64), y: Option<(f64, f64)>, differs: bool) -> CellRow {
+        CellRow {
+            set_id: Some(format!("{}", x.0)),
+            x: "Delta".to_owned(),
+            x_low: x.0,
+            x_high: x.1,
+            y: y.map(|_| "V0".to_owned()),
+            y_low: y.map(|y| y.0),
+            y_high: y.map(|y| y.1),
+            differs,
+            share: Some(f64::from(u8::from(x.0 > 1e-6))),
+            by: "locked".to_owned(),
+            ..CellRow::default()
+        }
+    }
+
+    #[test]
+    fn cells_are_drawn_as_large_as_they_are_and_maps_on_top_of_each_other_are_not() {
+        let cells = [
+            cell((1e-6, 2e-6), Some((1e-5, 2e-5)), true),
+            cell((2e-6, 3e-6), Some((1e-5, 2e-5)), false),
+            cell((1e-6, 3e-6), Some((2e-5, 4e-5)), false),
+        ];
+        let svg = refined(&cells, &[], &Look::default()).unwrap().svg();
+        assert_eq!(svg.matches(EDGE).count(), 2, "one cell and the legend");
+        let twice: Vec<CellRow> = cells.iter().chain(&cells).cloned().collect();
+        assert!(refined(&twice, &[], &Look::default()).is_none());
+    }
+
+    #[test]
+    fn edges_along_one_axis_are_drawn_against_the_other_quantity() {
+        let set = |name: f64, drive_velocity| SetSummary {
+            set_id: format!("{name}"),
+            parameters: Parameters { drive_velocity, ..Parameters::default() },
+            ..SetSummary::default()
+        };
+        let cells =
+            [cell((1e-6, 1.1e-6), None, true), cell((2e-6, 2.1e-6), None, true), cell((3e-6, 4e-6), None, false)];
+        let sets = [set(1e-6, 1e-5), set(2e-6, 2e-5), set(3e-6, 2e-5)];
+        let svg = refined(&cells, &sets, &Look::default()).unwrap().svg();
+        assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
+        assert!(refined(&cells, &sets[..1], &Look::default()).is_none(), "nothing to draw it against");
+        assert!(refined(&[], &sets, &Look::default()).is_none());
+    }
+}

@@ -1,0 +1,82 @@
+//! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are done.
+//!
+//! All workers look; one of them, which holds the lock of the manifest, decides what the next round runs, and writes it.
+
+use crate::results::commit::alone;
+use crate::results::error::ResultsError;
+use crate::results::handle::{Found, Results};
+use crate::results::manifest::{self, Manifest};
+use crate::sweep::{Extension, Round, Standing};
+use serde::{Deserialize, Serialize};
+
+/// How far the rounds of a sweep are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoundsSoFar {
+    /// The round that was begun last, from 1.
+    pub round: u64,
+    /// Whether it is done, and there will be no more.
+    pub is_over: bool,
+    /// How sets and cells stood when it began; at the end, when the rounds are over.
+    #[serde(flatten)]
+    pub standing: Standing,
+}
+
+impl Results<'_> {
+    /// The rounds so far of the sweep that was asked for last, in order; itself alone if it decides nothing.
+    #[must_use]
+    pub fn rounds(&self) -> &[Extension] {
+        let text = self.sweep().text();
+        let others = self.extensions().iter().rev().skip_while(|extension| extension.sweep.text() == text).count();
+        &self.extensions()[others..]
+    }
+
+    /// The round that was begun last; `None` if the sweep has none.
+    #[must_use]
+    pub fn round(&self) -> Option<&Round> {
+        self.extensions().last().and_then(|extension| extension.round.as_ref())
+    }
+
+    /// How far the rounds are; `None` if the sweep has none.
+    #[must_use]
+    pub fn rounds_so_far(&self) -> Option<RoundsSoFar> {
+        let round = self.round()?;
+        let is_over = round.is_end();
+        Some(RoundsSoFar { round: self.rounds().len() as u64 - u64::from(is_over), is_over, standing: round.standing })
+    }
+
+    /// The directory as it goes on, once all its parts are done: in a round that another worker has begun meanwhile, or in
+    /// the one that `decide` has found. `None` if the rounds are over, or if there are none.
+    ///
+    /// # Errors
+    /// When another sweep was begun here, something cannot be read or written, and what `decide` says.
+    pub fn next_round(
+        &self,
+        decide: impl FnOnce(&Self) -> Result<Round, ResultsError>,
+    ) -> Result<Option<Self>, ResultsError> {
+        if self.round().is_none_or(Round::is_end) {
+            return Ok(None);
+        }
+        let layout = self.layout();
+        let _alone = alone(layout, manifest::WRITER)?;
+        self.check_place()?;
+        let found = Found::look(layout, self.sweep(), 1)?;
+        if !found.is_of(self.sweep()) {
+            let problem = "another sweep file was begun here meanwhile; choose another directory with --out";
+            return Err(ResultsError::refused(layout.root(), problem));
+        }
+        let current = Results::new(layout, found.extensions);
+        // Another worker was first; or a repair has taken a part away.
+        if current.extensions().len() > self.extensions().len()
+            || current.plan().outlines().any(|part| !found.done.has(&part))
+        {
+            return Ok(Some(current));
+        }
+        let round = decide(&current)?;
+        let mut extensions = current.extensions().to_vec();
+        let last = extensions.len() - 1;
+        extensions[last].kept = Some(current.plan().ranges(last, |_| true));
+        extensions.push(Extension::next_round(current.sweep(), &extensions, round));
+        Manifest::new(&extensions).write(layout)?;
+        Ok(Some(Results::new(layout, extensions)))
+    }
+}

@@ -1,0 +1,85 @@
+//! Rounds: what a sweep that decides for itself runs next.
+//!
+//! ```text
+//! chosen jobs that are committed -> sets, reduced -> more seeds (precision.rs), else finer cells (reduce/cells.rs)
+//! ```
+//!
+//! Sets get seeds first; cells are divided when every set is as precise as it will be. Contract: a round is a pure
+//! function of the sweep and of the committed rows of the jobs that its earlier rounds chose: the same for any threads,
+//! workers, kills and order, and for a directory that has had other sweeps.
+
+#[cfg(test)]
+mod coverage;
+mod precision;
+#[cfg(test)]
+mod tests;
+
+pub use precision::MIN_SEEDS;
+
+use crate::reduce::{ChosenSet, SetRow, divide, reduce_chosen};
+use crate::results::{Results, ResultsError};
+use crate::sweep::{Round, Standing, Sweep, merged};
+use precision::Need;
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+/// The round after those that a directory has. All their jobs must be done.
+///
+/// # Errors
+/// When a table is damaged or cannot be read.
+pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
+    let sweep = results.sweep();
+    let chosen = Chosen::of(results);
+    let sets = reduce_chosen(results, |parameters| {
+        let point = sweep.find(parameters)?;
+        chosen.has(point).then(|| sweep.set_of(point))
+    })?;
+    Ok(decide(sweep, &sets))
+}
+
+/// The points that the rounds of the present sweep have chosen.
+struct Chosen(Vec<RangeInclusive<u64>>);
+
+impl Chosen {
+    fn of(results: &Results<'_>) -> Self {
+        let rounds = results.rounds().iter().filter_map(|extension| extension.round.as_ref());
+        Self(merged(rounds.flat_map(|round| round.points.iter().cloned()).collect()))
+    }
+
+    fn has(&self, point: u64) -> bool {
+        let at = self.0.partition_point(|range| *range.end() < point);
+        self.0.get(at).is_some_and(|range| range.contains(&point))
+    }
+}
+
+/// The round after these sets, which are in order.
+fn decide(sweep: &Sweep, sets: &[ChosenSet]) -> Round {
+    let Some(rounds) = sweep.rounds() else { return Round::default() };
+    let mut standing = Standing::default();
+    let mut points = Vec::new();
+    for set in sets {
+        match rounds
+            .precision
+            .as_ref()
+            .map_or(Need::Nothing, |precision| precision::need(precision, set.jobs, &set.row))
+        {
+            Need::Nothing => standing.sets_done += 1,
+            Need::TooMuch => standing.sets_capped += 1,
+            Need::Seeds(seeds) => {
+                standing.sets_open += 1;
+                points.extend(sweep.points_of_set(set.number, set.jobs..seeds));
+            }
+        }
+    }
+    if points.is_empty()
+        && let Some(refinement) = &rounds.refinement
+    {
+        let known: BTreeMap<u64, &SetRow> = sets.iter().map(|set| (set.number, &set.row)).collect();
+        let division = divide(sweep, refinement, &known);
+        standing.sets_open = division.sets.len() as u64;
+        standing.cells_capped = division.cells_left;
+        let seeds = rounds.seeds_at_first(sweep.seed_count());
+        points.extend(division.sets.into_iter().flat_map(|set| sweep.points_of_set(set, 0..seeds)));
+    }
+    Round { points: merged(points), standing }
+}

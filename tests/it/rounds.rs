@@ -1,0 +1,167 @@
+//! The built program on sweeps that decide for themselves: the rounds are the same for any processes, kills and earlier
+//! sweeps, and they end.
+
+use crate::program::{Folder, json, wait};
+use std::collections::BTreeSet;
+use std::fs;
+use std::time::Duration;
+
+/// Some seconds of CPU time, in a dozen of rounds: seeds to a precision, then finer cells.
+const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = { linear = [10, 60], points = 3 }\n\
+                   Delta = { log = [1e-7, 4e-6], points = 3 }\n[record]\nslips = 10\n\
+                   [precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 4, to = 30 }\n\
+                   [refine]\naxes = [\"frequency\", \"Delta\"]\nby = \"locked\"\nto = { frequency = 7, Delta = 1 }\nsets = 60\n";
+
+fn manifest(folder: &Folder, out: &str) -> Vec<u8> {
+    fs::read(folder.path(&format!("{out}/run/manifest.json"))).unwrap()
+}
+
+#[test]
+fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
+    let folder = Folder::new();
+    folder.write("map.toml", MAP);
+    let whole = json(&folder.ends(0, "run map.toml --out whole --json").stdout);
+    assert!(whole["rounds"]["round"].as_u64() > Some(4) && whole["rounds"]["is_over"] == true, "{whole}");
+    folder.ends(0, "verify whole");
+
+    let shared: Vec<_> = (0..4).map(|_| folder.start("run map.toml --out shared --threads 1")).collect();
+    let ended: Vec<_> = shared.into_iter().map(wait).collect();
+    assert!(ended.iter().all(|(code, ..)| *code == Some(0)), "{ended:?}");
+
+    // Kills at instants spread over the run, rounds and decisions alike; begun again whenever one has come to the end.
+    let (mut kills, mut rounds_at_kills) = (0, BTreeSet::new());
+    for run in 0.. {
+        let mut child = folder.start("run map.toml --out killed --no-reduce");
+        std::thread::sleep(Duration::from_millis(50 + 60 * (run % 7)));
+        child.kill().unwrap();
+        if wait(child).0.is_none() {
+            kills += 1;
+            let is_there = |round: &usize| folder.path(&format!("killed/run/sweep-{round:03}.toml")).exists();
+            let rounds = (0..).take_while(is_there).count();
+            rounds_at_kills.insert(rounds);
+        } else {
+            // One that had ended.
+            fs::remove_dir_all(folder.path("killed")).unwrap();
+        }
+        if kills >= 20 && rounds_at_kills.len() >= 3 {
+            break;
+        }
+        assert!(run < 200, "{kills} kills at these numbers of rounds: {rounds_at_kills:?}");
+    }
+    folder.ends(0, "run map.toml --out killed");
+
+    for out in ["shared", "killed"] {
+        assert!(folder.tables(out) == folder.tables("whole"), "tables of {out}");
+        for results in ["reduced", "figures"] {
+            assert!(
+                folder.contents(&format!("{out}/{results}")) == folder.contents(&format!("whole/{results}")),
+                "{out}"
+            );
+        }
+        assert!(manifest(&folder, out) == manifest(&folder, "whole"), "manifest of {out}");
+        folder.ends(0, &format!("verify {out}"));
+    }
+    let again = json(&folder.ends(0, "run whole --json --no-reduce").stdout);
+    assert_eq!((again["jobs_run"].as_u64(), &again["rounds"]), (Some(0), &whole["rounds"]));
+}
+
+#[test]
+fn an_interrupted_round_goes_on_after_compaction_and_decides_the_same() {
+    let folder = Folder::new();
+    folder.write("map.toml", MAP);
+    folder.ends(0, "run map.toml --out whole --no-reduce");
+    let rounds = |out: &str| {
+        let manifest = json(&String::from_utf8(manifest(&folder, out)).unwrap());
+        let extensions = manifest["extensions"].as_array().unwrap().clone();
+        extensions.iter().map(|extension| extension["round"].clone()).collect::<Vec<_>>()
+    };
+    let mut stops = 0;
+    loop {
+        let child = folder.start("run map.toml --out r --no-reduce");
+        std::thread::sleep(Duration::from_millis(700));
+        // It may have ended.
+        let process = rustix::process::Pid::from_child(&child);
+        let _ = rustix::process::kill_process(process, rustix::process::Signal::INT);
+        let (code, _, stderr) = wait(child);
+        folder.ends(0, "compact r");
+        if code == Some(0) {
+            break;
+        }
+        assert_eq!(code, Some(3), "{stderr}");
+        stops += 1;
+    }
+    assert!(stops > 0);
+    assert_eq!(rounds("r"), rounds("whole"));
+    folder.ends(0, "verify r");
+    folder.ends(0, "compact whole");
+    assert!(folder.tables("r") == folder.tables("whole"));
+}
+
+#[test]
+fn a_directory_that_has_had_other_sweeps_goes_through_the_same_rounds_and_runs_what_is_missing_alone() {
+    let folder = Folder::new();
+    folder.write("map.toml", MAP);
+    // Other seeds of some of its sets, and sets of its own.
+    let (axes, _) = MAP.split_once("[precision]").unwrap();
+    folder.write("plain.toml", &axes.replace("[record]", "seed = { count = 9 }\n[record]"));
+    folder.write("coarse.toml", &MAP.replace("relative = 0.1", "relative = 0.2"));
+    let whole = json(&folder.ends(0, "run map.toml --out whole --no-reduce --json").stdout);
+    for sweep in ["plain.toml", "coarse.toml"] {
+        folder.ends(0, &format!("run {sweep} --out r --no-reduce"));
+    }
+    let after = json(&folder.ends(0, "run map.toml --out r --no-reduce --json").stdout);
+    assert_eq!(after["rounds"], whole["rounds"]);
+    assert!(after["jobs_run"].as_u64() < whole["jobs_run"].as_u64(), "{after}");
+    let wider = folder.ends(0, "plan map.toml --out r").stdout;
+    assert!(wider.contains("0 to run"), "{wider}");
+    let ids = folder.table("r", "jobs");
+    let mut ids = ids.texts("job_id");
+    let count = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), count, "a job is there twice");
+    folder.ends(0, "verify r");
+}
+
+#[test]
+fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
+    let folder = Folder::new();
+    let text = "name = \"hard\"\n[model]\nN = 10\nNs = 5\n[axes]\nV0 = [5e-5, 1e-4]\n[record]\nslips = 3\n\
+                [precision]\nof = [\"tau_mean\", \"mean_friction\"]\nrelative = 1e-9\nseeds = { from = 3, to = 11 }\n";
+    folder.write("hard.toml", text);
+    let planned = folder.ends(0, "plan hard.toml").stdout;
+    assert!(planned.contains("jobs                 6 ") && planned.contains("at most 2 sets, 22 jobs"), "{planned}");
+    let ended = folder.ends(0, "run hard.toml --out r");
+    assert!(ended.stdout.contains("2 miss the target with the most seeds"), "{}", ended.stdout);
+    assert!(folder.ends(0, "status r").stdout.contains("round         3 (the last): 0 sets done, 0 open; 2 miss"));
+    let sets = folder.file("r/reduced/sets.parquet");
+    assert_eq!(
+        (sets.counts("jobs"), sets.counts("seeds"), sets.counts("last_round")),
+        (vec![11; 2], vec![11; 2], vec![3; 2])
+    );
+    let refused = folder.ends(2, "run hard.toml --out s --shard 1/2");
+    assert!(refused.stderr.contains("has no shards"), "{}", refused.stderr);
+}
+
+#[test]
+fn a_lost_manifest_is_restored_with_its_rounds() {
+    let folder = Folder::new();
+    folder.write("map.toml", MAP);
+    folder.ends(0, "run map.toml --out r --no-reduce");
+    let (before, tables) = (manifest(&folder, "r"), folder.tables("r"));
+    fs::remove_file(folder.path("r/run/manifest.json")).unwrap();
+    folder.ends(4, "verify r");
+    folder.ends(0, "verify r --repair");
+    assert!(manifest(&folder, "r") == before);
+    let copy = folder.path("r/run/round-002.json");
+    let text = fs::read_to_string(&copy).unwrap();
+    fs::write(&copy, text.replace("sets_done", "sets_dome")).unwrap();
+    assert!(folder.ends(4, "verify r").stdout.contains("round-002.json"));
+    folder.ends(0, "verify r --repair");
+    assert_eq!(fs::read_to_string(&copy).unwrap(), text);
+    // A part of an early round is run again before anything else.
+    let lost = folder.parts("r", "jobs")[1].clone();
+    fs::remove_file(&lost).unwrap();
+    folder.ends(0, "run map.toml --out r --no-reduce");
+    assert!(folder.tables("r") == tables && manifest(&folder, "r") == before);
+}
