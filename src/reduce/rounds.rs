@@ -17,7 +17,7 @@ columns! {
         last_round: Option<u64> = "", "round that gave it its last seeds";
         seeds: Option<u64> = "", "seeds that the rounds have given it";
         target_met: Option<bool> = "",
-            "whether all its statistics under [precision] are as precise as is wanted; null without any value of them";
+            "whether all statistics that are to be precise are so; null without any value of them";
     }
 }
 
