@@ -213,9 +213,11 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Time between two looks at workers who may have died; none for one that was alone and has nothing else to do.
+    /// Time between two looks at workers who may have died; none for one that was alone, has nothing else to do, and has
+    /// rounds before it.
     fn pause(&self, is_busy: bool) -> Duration {
-        match (is_busy, self.others.is_empty()) {
+        let has_rounds = self.share.results.round().is_some();
+        match (is_busy, self.others.is_empty() && has_rounds) {
             (true, _) => LOOK_BUSY,
             (false, true) => Duration::ZERO,
             (false, false) => LOOK,
