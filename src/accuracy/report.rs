@@ -133,8 +133,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The figure of the sets that are this one without modulation: cost against the error of break times, and against distances of distributions from those
-/// of the reference, in units of the distance that chance alone stays under.
+/// The figure of the sets that are this one without modulation: cost against the error of break times, and against
+/// distances of distributions from those of the reference, in units of the distance that chance alone stays under.
 fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture, AccuracyError> {
     const WORK: &str = "CPU time per slip (s)";
     const NOTE: &str = "W₁: first Wasserstein distance between a method's distribution and that of the reference, over what \

@@ -1,7 +1,7 @@
 //! The study: every solver at several settings, in one run, on one thread, interleaved; cost and errors of each.
 //!
-//! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first breaks against
-//! the tightest tolerance there is; the energy ledger, of all but the grid; and an ensemble of slips that is timed and
+//! The event-driven solver counts as two methods, by how it resolves motion. At each set of parameters: the first breaks
+//! against the tightest tolerance there is; the energy ledger, of all but the grid; and an ensemble of slips that is timed and
 //! whose distributions are held against a reference ensemble of other seeds. At the first
 //! set more realisations, not timed, make the ensembles large enough to show a bias of some parts in a thousand. A
 //! fixed step at low velocity would take hours for its slips: it is timed over a short stretch, and its cost per slip

@@ -190,7 +190,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Looks into a directory, at which this process has so many workers.
+    /// Looks into a directory where this process has `own` workers.
     pub fn look(layout: &Layout<'_>, sweep: &Sweep, own: usize) -> Result<Self, ResultsError> {
         let begin = Instant::now();
         // In this order: another run may write the manifest in between, and none removes it.

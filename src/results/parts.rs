@@ -105,14 +105,12 @@ impl Results<'_> {
         if done.is_compacted(part) {
             return Ok(Some(unfinished));
         }
-        let max_time = self.sweep().recording().max_time.unwrap_or(f64::INFINITY);
-        let is_cut = |time: Option<f64>| time.is_some_and(|time| time < max_time * (1.0 - SAME_TIME));
         let path = self.part_file(tables::JOBS, part);
         for batch in Dataset::new(self.layout().storage, vec![path.clone()]).rows::<OutcomeRow>() {
             for row in batch? {
                 let why = match row.outcome {
                     JobOutcome::Failed => Some(Unfinished::Failed(row.reason.unwrap_or_default())),
-                    JobOutcome::TimeLimit if is_cut(row.simulated_time) => Some(Unfinished::Cut),
+                    JobOutcome::TimeLimit if self.is_cut(row.simulated_time) => Some(Unfinished::Cut),
                     _ => None,
                 };
                 unfinished.extend(why.map(|why| (rows, why)));
@@ -124,6 +122,12 @@ impl Results<'_> {
         } else {
             Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.job_count)))
         }
+    }
+
+    /// Whether a job that a time limit ended after this time, in s, may run for longer now.
+    pub(super) fn is_cut(&self, time: Option<f64>) -> bool {
+        let max_time = self.sweep().recording().max_time.unwrap_or(f64::INFINITY);
+        time.is_some_and(|time| time < max_time * (1.0 - SAME_TIME))
     }
 
     /// The parts of which something is spilled.

@@ -21,7 +21,6 @@ use crate::results::{Results, ResultsError};
 use crate::sweep::{Round, Standing, Sweep, merged};
 use precision::Need;
 use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
 
 /// The round after those that a directory has. All their jobs must be done.
 ///
@@ -29,27 +28,14 @@ use std::ops::RangeInclusive;
 /// When a table is damaged or cannot be read.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
-    let chosen = Chosen::of(results);
+    let rounds = results.rounds().iter().filter_map(|extension| extension.round.as_ref());
+    let points = merged(rounds.flat_map(|round| round.points.iter().cloned()).collect());
+    let chosen = Round { points, ..Round::default() };
     let sets = reduce_chosen(results, |parameters| {
         let point = sweep.find(parameters)?;
         chosen.has(point).then(|| sweep.set_of(point))
     })?;
     Ok(decide(sweep, &sets))
-}
-
-/// The points that the rounds of the present sweep have chosen.
-struct Chosen(Vec<RangeInclusive<u64>>);
-
-impl Chosen {
-    fn of(results: &Results<'_>) -> Self {
-        let rounds = results.rounds().iter().filter_map(|extension| extension.round.as_ref());
-        Self(merged(rounds.flat_map(|round| round.points.iter().cloned()).collect()))
-    }
-
-    fn has(&self, point: u64) -> bool {
-        let at = self.0.partition_point(|range| *range.end() < point);
-        self.0.get(at).is_some_and(|range| range.contains(&point))
-    }
 }
 
 /// The round after these sets, which are in order.

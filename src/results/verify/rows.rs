@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 pub(super) type Files = Vec<(&'static str, PathBuf)>;
 
 /// Goes through all rows, and compares them with the ids of the planned jobs. A job that may run again, as it failed or was
-/// ended by a limit, may have more rows than it says: a run that was killed while it replaced them left them, and the same
-/// command puts that right.
+/// ended by a shorter limit, may have further rows than it says, numbered on: a run that was killed while it replaced them
+/// left them, and the same command puts that right.
 ///
 /// # Errors
 /// When rows are missing, in excess, or in another order than the jobs.
@@ -34,9 +34,16 @@ pub(super) fn check_rows(
             }
             for (table, path, rows) in &mut others {
                 let count = if *table == tables::SLIPS { job.slips } else { job.precursors };
-                expect(rows, path, table, &job.job_id, count.unwrap_or(0))?;
-                if matches!(job.outcome, JobOutcome::Failed | JobOutcome::TimeLimit) {
-                    while rows.next_if(|row| matches!(row, Ok((id, _)) if *id == job.job_id)).is_some() {}
+                let mut number = count.unwrap_or(0);
+                expect(rows, path, table, &job.job_id, number)?;
+                let may_run_again = match job.outcome {
+                    JobOutcome::Failed => true,
+                    JobOutcome::TimeLimit => results.is_cut(job.simulated_time),
+                    _ => false,
+                };
+                let is_next = |row: &Result<Row, DatasetError>, number| matches!(row, Ok((id, found)) if *id == job.job_id && found.is_none_or(|found| found == number));
+                while may_run_again && rows.next_if(|row| is_next(row, number)).is_some() {
+                    number += 1;
                 }
             }
         }
@@ -57,6 +64,7 @@ columns! {
     struct JobCounts {
         job_id: String;
         outcome: JobOutcome;
+        simulated_time: Option<f64>;
         slips: Option<u64>;
         precursors: Option<u64>;
     }

@@ -88,7 +88,7 @@ fn assert_sound(verification: &Verification) -> anyhow::Result<()> {
     problems.next().map_or(Ok(()), |problem| Err(anyhow::anyhow!("{problem:?}")))
 }
 
-/// Runs the sweep with so many seeds, in rounds or not.
+/// Runs the sweep with this number of seeds, in rounds or not.
 fn run_some(
     layout: &Layout<'_>,
     (seeds, in_rounds): (u64, bool),
