@@ -131,9 +131,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         }
         let is_complete = report.jobs_left == 0 && !report.stopped;
         if is_complete && !arguments.no_reduce {
-            if arguments.shard.is_some() || joined.takes_reduction()? {
-                reduce_and_draw(&layout, arguments)?;
-            } else {
+            let reduce = || reduce_and_draw(&layout, arguments);
+            if arguments.shard.is_some() {
+                reduce()?;
+            } else if joined.reduce(reduce)?.is_none() {
                 output::report("all jobs are done; another worker reduces them");
             }
         }

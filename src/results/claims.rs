@@ -60,10 +60,10 @@ impl<'a> Claims<'a> {
         Ok(())
     }
 
-    /// Whether nobody has claimed this, as far as is known.
+    /// The last generation of a claim, as far as is known; `None` if nobody has claimed it.
     #[must_use]
-    pub fn is_unclaimed(&self, what: &str) -> bool {
-        !self.generations.contains_key(what)
+    pub fn last(&self, what: &str) -> Option<u64> {
+        self.generations.get(what).copied()
     }
 
     /// How a claim stands among workers that live.
@@ -74,7 +74,7 @@ impl<'a> Claims<'a> {
         if self.own.contains(what) {
             return Ok(Standing::Own);
         }
-        let Some(&generation) = self.generations.get(what) else { return Ok(Standing::Free(0)) };
+        let Some(generation) = self.last(what) else { return Ok(Standing::Free(0)) };
         let owner = self.owner(what, generation)?;
         if owner == self.member.name() {
             return Ok(Standing::Own);

@@ -48,8 +48,9 @@ use std::time::{Duration, Instant};
 /// What runs a job: until it is done, cannot continue, or the flag turns true, which is [`SimulationError::Interrupted`].
 pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, SimulationError> + Sync + 'a;
 
-/// What the claim of the reduction is called.
+/// What the claim of the reduction is called, and the mark of one that has ended, which has its generation.
 const REDUCTION: &str = "reduce";
+const REDUCED: &str = "reduced";
 
 /// How to run.
 #[derive(Clone, Copy, Debug)]
@@ -177,6 +178,9 @@ impl Joined<'_> {
             if retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
+        if jobs_again > 0 {
+            self.claim_next_reduction()?;
+        }
         if report.jobs_left > 0 {
             let earlier_pace = if options.walltime.is_some() { results.pace()? } else { None };
             let walltime = Walltime::new(begin, options.walltime, threads, earlier_pace);
@@ -229,17 +233,39 @@ impl Joined<'_> {
         Ok(results.tidy_spill(parts)?)
     }
 
-    /// Whether this worker is the one that reduces, of all that find every job done.
+    /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.
     ///
     /// # Errors
-    /// When the claims cannot be read or written.
-    pub fn takes_reduction(&self) -> Result<bool, ResultsError> {
+    /// When the claims cannot be read or written; and what `body` says.
+    pub fn reduce<T, E: From<ResultsError>>(&self, body: impl FnOnce() -> Result<T, E>) -> Result<Option<T>, E> {
+        let Some((mut claims, generation)) = self.take_reduction()? else { return Ok(None) };
+        let reduced = body()?;
+        claims.take(REDUCED, generation)?;
+        Ok(Some(reduced))
+    }
+
+    /// Claims the reduction; `None` if another worker has it, or has ended it.
+    fn take_reduction(&self) -> Result<Option<(Claims<'_>, u64)>, ResultsError> {
+        // In this order: who has ended has left its mark before.
+        let others = self.member.others()?;
         let mut claims = Claims::list(self.results, self.member)?;
-        match claims.standing(REDUCTION, &self.member.others()?)? {
-            Standing::Free(generation) => claims.take(REDUCTION, generation),
-            Standing::Own => Ok(true),
-            Standing::Taken(_) => Ok(false),
-        }
+        let last = claims.last(REDUCTION);
+        let is_taken = match claims.standing(REDUCTION, &others)? {
+            Standing::Own => true,
+            Standing::Taken(_) => false,
+            Standing::Free(_) if last.is_some() && claims.last(REDUCED) == last => false,
+            Standing::Free(generation) => claims.take(REDUCTION, generation)?,
+        };
+        let generation = claims.last(REDUCTION).unwrap_or_default();
+        Ok(is_taken.then_some((claims, generation)))
+    }
+
+    /// Claims the reduction for one that comes after the jobs that this worker runs again: what another reduces
+    /// meanwhile, or has reduced, lacks them.
+    fn claim_next_reduction(&self) -> Result<(), ResultsError> {
+        let mut claims = Claims::list(self.results, self.member)?;
+        while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
+        Ok(())
     }
 }
 

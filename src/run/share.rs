@@ -229,7 +229,7 @@ impl<'a> Work<'a> {
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
         let name = part_name(outline);
         if !self.share.done.has(outline) {
-            return Ok(self.claims.is_unclaimed(&name) && self.take_missing(outline, 0)?);
+            return Ok(self.claims.last(&name).is_none() && self.take_missing(outline, 0)?);
         }
         let Some((part, unfinished)) = self.share.unfinished(outline)? else { return Ok(false) };
         let again = unfinished.into_iter().map(|(position, why)| (position, why != Unfinished::Cut));

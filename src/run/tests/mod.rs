@@ -406,6 +406,34 @@ fn workers_that_begin_at_once_run_every_part_exactly_once() {
 }
 
 #[test]
+fn what_is_done_is_reduced_once_and_again_only_after_a_failure_or_a_retry() {
+    let root = tempfile::tempdir().unwrap();
+    let (sweep, layout, stop) = (sweep(SEEDS, ""), Layout::new(&Disk, root.path()), AtomicBool::new(false));
+    // Runs beside the others that are there, then looks whether it is to reduce.
+    let work = |retry_failed, reduce: &dyn Fn() -> Result<(), ResultsError>| {
+        join(&layout, &sweep, Options { retry_failed, ..options(&stop, 1) }, |joined| {
+            joined.run(&|job, _| faulty(job, true), &mut |_| ())?;
+            joined.reduce(reduce).map(|reduced| reduced.is_some())
+        })
+    };
+    let fails = || Err(ResultsError::refused(root.path(), "no"));
+    let fine = || Ok(());
+    join(&layout, &sweep, options(&stop, 1), |last| -> Result<(), ResultsError> {
+        last.run(&|job, _| faulty(job, true), &mut |_| ())?;
+        assert!(work(false, &fails).is_err());
+        assert!(work(false, &fine)?, "the reduction before it failed");
+        assert!(!work(false, &fine)? && last.reduce(fine)?.is_none(), "it was reduced by one that has ended");
+        assert!(work(true, &fine)?, "what was reduced lacks the jobs that ran again");
+        assert!(last.reduce(fine)?.is_none());
+        assert!(work(true, &fails).is_err());
+        assert!(last.reduce(fine)?.is_some(), "the one that ran jobs again has not reduced them");
+        Ok(())
+    })
+    .unwrap();
+    assert!(work(false, &fine).unwrap(), "nobody else was there");
+}
+
+#[test]
 fn finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again() {
     let root = tempfile::tempdir().unwrap();
     let all = Mutex::new(BTreeSet::new());
