@@ -293,7 +293,7 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
 /// Every case, group by group.
 #[must_use]
 pub fn hard_cases() -> Vec<HardCase> {
-    use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, L, M, N, Ns, Seed, SmallK, T, TauR, V0};
+    use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, Ki, L, M, N, Ns, Seed, T, TauR, V0};
     use Value::{Count, Real};
     let case = HardCase::new;
     let mut cases = Vec::new();
@@ -366,7 +366,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     }
 
     let extreme = "values beyond what doubles resolve";
-    for (symbol, value) in [(K, 1e30), (Kd, 1e30), (SmallK, 1e30), (Gamma, 1e30), (M, 1e-30)] {
+    for (symbol, value) in [(K, 1e30), (Kd, 1e30), (Ki, 1e30), (Gamma, 1e30), (M, 1e-30)] {
         cases.push(case(extreme, &[(symbol, Real(value))], 1.0).stops("too short"));
     }
     cases.push(case(extreme, &modulated(1e300, 1.0), 1.0).stops("not finite"));
@@ -386,12 +386,12 @@ pub fn hard_cases() -> Vec<HardCase> {
     let mut refuse = |symbol: Symbol, value: Value| {
         cases.push(case(bad, &[(symbol, value)], 0.1).refused(symbol.key()));
     };
-    for symbol in [M, K, Kd, SmallK, Fs, Dfs, TauR, Gamma, V0, Delta, T, FN, L] {
+    for symbol in [M, K, Kd, Ki, Fs, Dfs, TauR, Gamma, V0, Delta, T, FN, L] {
         for value in [f64::NAN, f64::INFINITY, -1.0] {
             refuse(symbol, Real(value));
         }
     }
-    for symbol in [M, K, Kd, SmallK, Fs, TauR, V0, T, FN, L] {
+    for symbol in [M, K, Kd, Ki, Fs, TauR, V0, T, FN, L] {
         refuse(symbol, Real(0.0));
     }
     for (symbol, count) in [(N, 0), (N, u64::MAX), (Ns, 0), (Ns, u64::MAX), (Seed, u64::MAX)] {

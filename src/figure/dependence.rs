@@ -137,7 +137,7 @@ pub(super) fn label(symbol: Symbol) -> String {
         Symbol::M => "Slider mass M",
         Symbol::K => "Slider stiffness K",
         Symbol::Kd => "Drive stiffness Kd",
-        Symbol::SmallK => "Contact stiffness k",
+        Symbol::Ki => "Contact stiffness k",
         Symbol::Fs => "Contact threshold fₛ",
         Symbol::Dfs => "Spread of thresholds Δfₛ / fₛ",
         Symbol::TauR => "Reattachment delay τᵣ",

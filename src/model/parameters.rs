@@ -21,7 +21,7 @@ fields! {
         K("K", "K") slider_stiffness: f64 = 1e8, "N/m", positive,
             "slider stiffness; neighbours are joined by (N-1) K";
         Kd("Kd", "K_d") drive_stiffness: f64 = 4e7, "N/m", positive, "stiffness of the driving spring";
-        SmallK("k", "k") contact_stiffness: f64 = 5e6, "N/m", positive, "mean contact stiffness";
+        Ki("ki", "k") contact_stiffness: f64 = 5e6, "N/m", positive, "mean contact stiffness, <k_i>";
         Fs("fs", "f_s") mean_threshold: f64 = 1.37, "N", positive, "mean contact threshold";
         Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", not_negative and "dfs <= fs",
             "standard deviation of the contact thresholds";

@@ -195,7 +195,7 @@ def loading_profile(results: Path) -> Section:
     profile = read(file, "scripts/reproduce eq1").sort_values("block")
     given = parameters(file)
     coupling = (given["N"] - 1) * given["K"]
-    continuum = math.sqrt(given["k"] * given["Ns"] / coupling)
+    continuum = math.sqrt(given["ki"] * given["Ns"] / coupling)
     discrete = 2 * math.asinh(0.5 * continuum)
     # Away from the free end, whose reflection is e^(-2κ(N-j)).
     half = profile[profile["block"] <= given["N"] // 2]

@@ -296,7 +296,7 @@ def stochasticity(results: Path) -> Section:
     # By √(K_int/K_s) in units of N.
     spreads = {}
     for (blocks, stiffness), rows in slips.groupby(["N", "K"]):
-        length = ((blocks - 1) * stiffness / (rows["k"] * rows["Ns"]).iloc[0]) ** 0.5
+        length = ((blocks - 1) * stiffness / (rows["ki"] * rows["Ns"]).iloc[0]) ** 0.5
         spreads[length / blocks] = spread(rows)
     long, middle, stiff = (
         [one for length, one in spreads.items() if low < length < high]

@@ -659,6 +659,9 @@ fn all_tables_have_the_described_columns() {
         let batch = dataset.batches().next().unwrap().unwrap();
         let names: Vec<_> = batch.rows.schema().fields().iter().map(|field| field.name().clone()).collect();
         assert_eq!(names, expected);
+        // Some readers, such as DuckDB, ignore case.
+        let ignoring_case: BTreeSet<_> = names.iter().map(|name| name.to_lowercase()).collect();
+        assert_eq!(ignoring_case.len(), names.len(), "{names:?}");
     }
 }
 
