@@ -108,9 +108,12 @@ pub fn run(
                 };
                 // That nobody listens any more does not end a run.
                 let report = joined.run(&kernel, &mut |event| drop(events.send(event.clone())))?;
-                if reduce && report.jobs_left == 0 && !report.stopped && joined.takes_reduction()? {
-                    stickslip::reduce::reduce(&Results::read(&layout)?)?;
-                    draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
+                if reduce && report.jobs_left == 0 && !report.stopped {
+                    joined.reduce(|| -> Result<(), Error> {
+                        stickslip::reduce::reduce(&Results::read(&layout)?)?;
+                        draw_all(&layout, &Look::of_sweep(sweep.name()), &Format::DEFAULT)?;
+                        Ok(())
+                    })?;
                 }
                 Ok(report)
             })
