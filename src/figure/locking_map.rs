@@ -88,11 +88,9 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 /// The colour of a set in a panel, if it has one.
 type CellColour<'a> = dyn Fn(&SetSummary) -> Option<Color> + 'a;
 
-/// The median interval in periods, rounded.
+/// n of τ = nT.
 fn whole_periods(set: &SetSummary) -> Option<usize> {
-    let periods = set.tau_quartiles?[1] / set.parameters.modulation_period?;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
-    Some(periods.round() as usize)
+    usize::try_from(set.periods?).ok()
 }
 
 /// The numbers of periods that occur, as shades.
@@ -173,7 +171,6 @@ mod tests {
         assert!(shares.windows(2).all(|pair| pair[0] < pair[1]));
         assert!(shares[0] == FIRST_SHADE && (numbers.share(40) - 1.0).abs() < 1e-12);
         assert_eq!(numbers.bar().ticks.last().unwrap().1, ">12");
-        assert_eq!(whole_periods(&set(1e-6, 0.02, 3.02)), Some(3));
     }
 
     #[test]

@@ -41,21 +41,27 @@ fn axis_of(key: &str) -> (String, f64) {
     }
 }
 
+fn is_wide(low: f64, high: f64) -> bool {
+    low > 0.0 && high / low > LOGARITHMIC
+}
+
 fn scale(label: &str, low: f64, high: f64) -> Axis {
-    if low > 0.0 && high / low > LOGARITHMIC {
-        Axis::logarithmic(label, low, high)
-    } else {
-        Axis::linear(label, low, high)
+    if is_wide(low, high) { Axis::logarithmic(label, low, high) } else { Axis::linear(label, low, high) }
+}
+
+/// What the sets of a cell without an edge are, on either side of it; by the condition of the table.
+fn words(by: &str) -> [String; 2] {
+    match by.split_once(" = ") {
+        Some(("periods", n)) => [format!("n = {n}"), "other n".to_owned()],
+        Some((_, word)) => [word.to_owned(), format!("not {word}")],
+        None if by == "locked" => ["locked".to_owned(), "not locked".to_owned()],
+        None => [by.to_owned(), "not so".to_owned()],
     }
 }
 
-/// What sets in a cell without an edge are.
-fn words(by: &str) -> [String; 2] {
-    if by == "locked" {
-        ["locked".to_owned(), "not locked".to_owned()]
-    } else {
-        [format!("{by} above the threshold"), "not above".to_owned()]
-    }
+/// A logarithmic axis with margins for values over decades, else another.
+fn wide(label: &str, (low, high): Ends, narrow: impl FnOnce() -> Axis) -> Axis {
+    if is_wide(low, high) { Axis::logarithmic(label, 0.8 * low, 1.25 * high) } else { narrow() }
 }
 
 /// Ends of a cell along an axis.
@@ -133,15 +139,13 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
         .collect();
     let (x_low, x_high) = range(points.iter().map(|point| point.0));
     let (y_low, y_high) = range(points.iter().flat_map(|point| [point.1, point.2]));
-    let margin = 0.05 * (x_high - x_low);
-    let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {}, and the band in which it lies", cells[0].by))];
+    let legend =
+        [entry(Mark::Bar(dot(INKS[0])), format!("edge of: {}; and the band in which it lies", words(&cells[0].by)[0]))];
     let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
-    let y = if y_low > 0.0 && y_high / y_low > LOGARITHMIC {
-        Axis::logarithmic(&y_label, 0.8 * y_low, 1.25 * y_high)
-    } else {
-        Axis::rounded(&y_label, y_low, y_high)
-    };
-    let frame = page.frame(0, 0, Axis::linear(&x_label, x_low - margin, x_high + margin), y);
+    let margin = 0.05 * (x_high - x_low);
+    let x = wide(&x_label, (x_low, x_high), || Axis::linear(&x_label, x_low - margin, x_high + margin));
+    let y = wide(&y_label, (y_low, y_high), || Axis::rounded(&y_label, y_low, y_high));
+    let frame = page.frame(0, 0, x, y);
     for &(x, low, high) in &points {
         frame.error_bar(&mut sheet, x, (low, high), Stroke::solid(INKS[0], BAR_WIDTH));
     }

@@ -255,6 +255,7 @@ pub(super) mod tests {
             tau_mean: statistic(tau),
             tau_deviation: Some(0.1 * tau),
             tau_quartiles: Some([0.98 * tau, tau, 1.02 * tau]),
+            periods: (0..100_u32).find(|&n| (f64::from(n) - periods).abs() <= 0.5).map(u64::from),
             is_locked: amplitude > 0.0,
             locking_index: statistic(0.8).filter(|_| amplitude > 0.0),
             resultant_length: statistic(0.7).filter(|_| amplitude > 0.0),

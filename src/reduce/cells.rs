@@ -43,9 +43,9 @@ columns! {
         y: Option<String> = "", "the second, if there is one";
         y_low: Option<f64> = "", "its lower end";
         y_high: Option<f64> = "", "its upper end";
-        by: String = "", "the statistic that tells sets apart";
+        by: String = "", "the statistic that tells sets apart, such as `locked`, `periods = 4` or `mean_friction > 300`";
         differs: bool = "", "whether the sets that touch the cell differ: the edge lies in it";
-        share: Option<f64> = "", "share of these sets that are locked, or lie above the threshold; null of other statistics";
+        share: Option<f64> = "", "share of these sets that are locked, have the value or lie above the threshold; null otherwise";
     }
 }
 
@@ -83,8 +83,8 @@ pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap
             y,
             y_low,
             y_high,
-            by: refinement.by.key.to_owned(),
-            differs: seen.differ(refinement.contrast),
+            by: refinement.condition(),
+            differs: seen.differ(&refinement.contrast),
             share: seen.share(),
         })
     };
@@ -97,7 +97,7 @@ pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &Set
     let mut division = Division::default();
     let mut room = refinement.max_sets.saturating_sub(known.len() as u64);
     for (leaf, seen) in grid.seen() {
-        if leaf.level == grid.levels() || !seen.differ(refinement.contrast) {
+        if leaf.level == grid.levels() || !seen.differ(&refinement.contrast) {
             continue;
         }
         let is_new = |set: &u64| !known.contains_key(set) && !division.sets.contains(set);
@@ -144,19 +144,22 @@ impl Seen {
         (yes + no > 0.0).then(|| yes / (yes + no))
     }
 
-    fn differ(&self, contrast: Contrast) -> bool {
+    fn differ(&self, contrast: &Contrast) -> bool {
         let is_wide = |step: f64| self.range.is_some_and(|(low, high)| high - low > step);
-        self.classes.len() > 1 || matches!(contrast, Contrast::Step(step) if is_wide(step))
+        self.classes.len() > 1 || matches!(contrast, Contrast::Step(step) if is_wide(*step))
     }
 }
 
 /// The class of a value, and the number that may vary within it. A statistic without value is a class of its own.
-fn class(value: StatisticValue, contrast: Contrast) -> (String, Option<f64>) {
+fn class(value: StatisticValue, contrast: &Contrast) -> (String, Option<f64>) {
     match (value, contrast) {
-        (StatisticValue::Class(class), _) => (class, None),
         (StatisticValue::Nothing, _) => (String::new(), None),
-        (StatisticValue::Number(number), Contrast::Threshold(threshold)) => ((number > threshold).to_string(), None),
-        (StatisticValue::Number(number), _) => ("number".to_owned(), Some(number)),
+        (StatisticValue::Class(class), Contrast::Value(value)) => ((class == *value).to_string(), None),
+        (StatisticValue::Number(number), Contrast::Value(value)) => ((number.to_string() == *value).to_string(), None),
+        (StatisticValue::Number(number), Contrast::Threshold(threshold)) => ((number > *threshold).to_string(), None),
+        (StatisticValue::Number(number), Contrast::Step(_)) => ("number".to_owned(), Some(number)),
+        (StatisticValue::Number(number), Contrast::Class) => (number.to_string(), None),
+        (StatisticValue::Class(class), _) => (class, None),
     }
 }
 
@@ -189,7 +192,7 @@ impl Cells<'_> {
             if row.finished_jobs == 0 {
                 continue;
             }
-            let (class, number) = class(row.statistic(self.refinement.by.key), self.refinement.contrast);
+            let (class, number) = class(row.statistic(self.refinement.by.key), &self.refinement.contrast);
             for cell in self.touching(rows) {
                 if let Some(seen) = seen.get_mut(&cell) {
                     seen.add(&class, number);

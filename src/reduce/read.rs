@@ -18,6 +18,8 @@ pub struct SetSummary {
     pub tau_deviation: Option<f64>,
     /// Quantiles of τ at 25, 50 and 75 %.
     pub tau_quartiles: Option<[f64; 3]>,
+    /// The median of τ/T, rounded.
+    pub periods: Option<u64>,
     pub is_locked: bool,
     pub locking_index: Option<Statistic>,
     pub resultant_length: Option<Statistic>,
@@ -64,6 +66,7 @@ impl From<SetRow> for SetSummary {
             tau_mean: Statistic::new(row.tau_mean, row.tau_interval),
             tau_deviation: row.tau_deviation,
             tau_quartiles: row.tau_25.zip(row.tau_50).zip(row.tau_75).map(|((low, median), high)| [low, median, high]),
+            periods: row.periods,
             is_locked: row.is_locked,
             locking_index: Statistic::new(row.locking_index, row.locking_interval),
             resultant_length: Statistic::new(row.resultant_length, row.length_interval),

@@ -104,6 +104,7 @@ columns! {
         tau_75: Option<f64> = "s", "75 % quantile";
         tau_95: Option<f64> = "s", "95 % quantile";
         periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
+        periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
         locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
         expected_locking_index: Option<f64> = "",
@@ -203,10 +204,12 @@ impl SetSlips {
         let loads = estimate(&by_job, |slip| non_nan(slip.load_phase).map(unit));
 
         let mut sorted: Vec<f64> = self.slips.iter().filter_map(SlipStats::interval).collect();
-        let (mut tau, mut periods) = (Moments::default(), Moments::default());
+        let mut periods: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.periods)).collect();
+        let (mut tau, mut mean_periods) = (Moments::default(), Moments::default());
         tau.extend(sorted.iter().copied());
-        periods.extend(self.slips.iter().filter_map(|slip| non_nan(slip.periods)));
+        mean_periods.extend(periods.iter().copied());
         sorted.sort_by(f64::total_cmp);
+        periods.sort_by(f64::total_cmp);
 
         let has_limit = limits.minimum.is_some() && phases.count() > 0;
         let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
@@ -215,6 +218,8 @@ impl SetSlips {
             real.hypot(imaginary)
         });
         let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| quantile(&sorted, share));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
+        let whole = |periods: f64| periods.round() as u64;
         let row = SetRow {
             set_id: jobs.set_id,
             parameters: Selected::new(jobs.parameters),
@@ -238,7 +243,8 @@ impl SetSlips {
             tau_50,
             tau_75,
             tau_95,
-            periods_mean: periods.mean(),
+            periods_mean: mean_periods.mean(),
+            periods: quantile(&periods, 0.5).map(whole),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
             expected_locking_index: expected.map(|length| length * length),
@@ -335,6 +341,7 @@ pub(super) mod tests {
         let row = reduced(jobs(1e-6, period), [3.0, 4.0, 4.0, 5.0, 400.0].map(|n| slip(n, period)));
         assert!(row.locking_index.unwrap() > 1.0 - 1e-9);
         assert!((row.periods_mean.unwrap() - 83.2).abs() < 1e-9);
+        assert_eq!(row.periods, Some(4));
         assert!((row.phase_mean.unwrap() + 1.2).abs() < 1e-12);
         let halves = reduced(jobs(1e-6, period), [3.0, 3.5, 4.0, 4.5].map(|n| slip(n, period)));
         assert!(halves.locking_index.unwrap() < 1e-9);
@@ -388,7 +395,7 @@ pub(super) mod tests {
         let slow = jobs(1e-6, 1.0);
         assert_eq!(reduced(slow, phases.map(|phase| slip(None, Some(phase)))).share_below, None);
         let still = reduced(jobs(0.0, 1.0), [slip(Some(0.1), None), slip(Some(0.2), None)]);
-        assert_eq!((still.share_below, still.phase_mean, still.locking_index), (None, None, None));
+        assert_eq!((still.share_below, still.phase_mean, still.locking_index, still.periods), (None, None, None, None));
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
         assert!(!still.is_locked);
     }

@@ -85,7 +85,7 @@ mod tests {
                 Kind::Real => !is_end(&column.name) && !is_given && !is_parameter,
                 Kind::Flag => true,
                 Kind::Text => column.name == "regime",
-                Kind::Count => false,
+                Kind::Count => column.name == "periods",
             };
             assert_eq!(known.is_some(), is_statistic, "{}", column.name);
             let Some(known) = known else { continue };

@@ -14,12 +14,16 @@ fn sweep(axes: &str, refine: &str) -> Sweep {
 
 /// Runs the rounds to their end, where a set is locked as this says of its parameters.
 fn rounds(sweep: &Sweep, is_locked: impl Fn(f64, f64) -> bool) -> (Vec<Round>, BTreeMap<u64, SetRow>) {
+    rounds_of(sweep, |amplitude, velocity| SetRow { is_locked: is_locked(amplitude, velocity), ..SetRow::default() })
+}
+
+/// Runs the rounds to their end, where sets of these parameters have such rows.
+fn rounds_of(sweep: &Sweep, row: impl Fn(f64, f64) -> SetRow) -> (Vec<Round>, BTreeMap<u64, SetRow>) {
     let mut sets: BTreeMap<u64, SetRow> = BTreeMap::new();
     let mut rounds = vec![sweep.first_round().unwrap()];
     while !rounds.last().unwrap().is_end() {
         for job in sweep.jobs().filter(|job| rounds.last().unwrap().has(job.point)) {
-            let locked = is_locked(job.parameters.modulation_amplitude, job.parameters.drive_velocity);
-            let new = || SetRow { finished_jobs: 0, is_locked: locked, ..SetRow::default() };
+            let new = || row(job.parameters.modulation_amplitude, job.parameters.drive_velocity);
             sets.entry(sweep.set_of(job.point)).or_insert_with(new).finished_jobs += 1;
         }
         let of = |(&number, row): (&u64, &SetRow)| ChosenSet { number, jobs: row.finished_jobs, row: row.clone() };
@@ -53,6 +57,24 @@ fn along_one_axis_an_edge_is_bisected() {
     let below = sets.iter().filter(|(_, row)| !row.is_locked).map(|(set, _)| amplitude(set)).fold(0.0, f64::max);
     let above = sets.iter().filter(|(_, row)| row.is_locked).map(|(set, _)| amplitude(set)).fold(1.0, f64::min);
     assert!(below <= edge && edge < above && above - below < 1e-9, "{below} {above}");
+}
+
+#[test]
+fn the_edges_of_one_value_are_bisected_and_no_others() {
+    let at_first = |value: &str| {
+        let text = format!(
+            "name = \"a\"\n[model]\nT = 0.03\n[axes]\nDelta = {{ linear = [0.5e-6, 8.5e-6], points = 9 }}\n\
+             [refine]\nby = \"periods\"\n{value}\naxes = \"Delta\"\nto = {{ Delta = 1e-8 }}\nsets = 500"
+        );
+        Sweep::parse(&text, Path::new("test.toml")).unwrap()
+    };
+    // n = 2, 3, 4, 5, 6: four edges, of which n = 4 has two. Each takes seven halvings.
+    let of_amplitude = |amplitude: f64, _: f64| {
+        let periods = (2..).zip([2.2e-6, 3.7e-6, 5.1e-6, 7.3e-6, 1.0]).find(|(_, end)| amplitude < *end).unwrap().0;
+        SetRow { periods: Some(periods), ..SetRow::default() }
+    };
+    let sets = |value| rounds_of(&at_first(value), of_amplitude).1.len();
+    assert_eq!([sets(""), sets("value = 4"), sets("value = 7")], [9 + 4 * 7, 9 + 2 * 7, 9]);
 }
 
 #[test]

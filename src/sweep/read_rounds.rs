@@ -7,7 +7,7 @@
 //! seeds    = { from = 24, to = 256 } seeds of a set: at first, and at most
 //! [refine]
 //! axes = ["frequency", "Delta"]     ranges of [axes]
-//! by   = "locked"                   a flag, a word, or a number with threshold = .. or step = ..
+//! by   = "locked"                   a flag; a word or a count, or one value of it; a number with threshold or step
 //! to   = { frequency = 0.1, Delta = 0.02 }
 //! sets = 2000                       at most
 //! ```
@@ -22,6 +22,7 @@ use super::samples::Range;
 use super::source::{Entry, Refused, Section, all, hint};
 use super::statistic::{STATISTICS, Statistic, StatisticKind};
 use crate::model::{Shortest, Symbol, Value};
+use crate::observe::Regime;
 use std::cell::Cell;
 
 /// Keys with their meanings and allowed values: of messages, the schema and the documentation.
@@ -55,7 +56,12 @@ pub(super) const REFINE: &Keys = &[
     (
         "by",
         "Column of the reduced [`sets`](reduced-tables.md#sets): a cell is divided where it differs",
-        "`locked`, `regime`, or a number with `threshold` or `step`",
+        "`locked`; `regime` or `periods`, also with `value`; a number with `threshold` or `step`",
+    ),
+    (
+        "value",
+        "Of `regime` or `periods`: sets differ if some have this value and some have not",
+        "`stick-slip`, `mixed` or `sliding`; a whole number",
     ),
     ("threshold", "Of a number: sets differ if some are above this value and some are not", "a finite number"),
     ("step", "Of a number: sets differ if it varies by more than this", "> 0"),
@@ -221,7 +227,13 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Statistic, Contr
         .ok_or_else(|| entry.refuse(format!("is no statistic of a set; {}", hint(word, &known))))?;
     let is_class = statistic.kind == StatisticKind::Class;
     let contrast = match (section.entry("threshold"), section.entry("step")) {
-        (None, None) if is_class => Contrast::Class,
+        (None, None) if is_class => match section.entry("value") {
+            Some(entry) => Contrast::Value(read_value(&entry, word)?),
+            None => Contrast::Class,
+        },
+        _ if !is_class && let Some(entry) = section.entry("value") => {
+            return Err(entry.refuse(format!("{word} is a number; set threshold or step in place of value")));
+        }
         (None, None) => {
             return Err(
                 entry.refuse("is a number: set threshold, a value that it crosses, or step, by which it may vary")
@@ -241,6 +253,19 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Statistic, Contr
         }
     };
     Ok((statistic, contrast))
+}
+
+/// The value of a statistic that sets are to have.
+fn read_value(entry: &Entry<'_>, statistic: &str) -> Result<String, Refused> {
+    let regimes = Regime::ALL.map(Regime::word);
+    match statistic {
+        "periods" => Ok(entry.count(0, MAX_ROWS)?.to_string()),
+        "regime" => {
+            let word = entry.word().filter(|word| regimes.contains(word));
+            Ok(word.ok_or_else(|| entry.must_be(&format!("one of {}", regimes.join(", "))))?.to_owned())
+        }
+        _ => Err(entry.refuse(format!("{statistic} is true or false; remove value"))),
+    }
 }
 
 impl<'a> Wanted<'a> {
@@ -264,7 +289,7 @@ impl<'a> Wanted<'a> {
                 (None, _) => Err(wanted.entry.refuse(why_not_swept(wanted.quantity, axes))),
             }
         }))?;
-        Ok(Refinement { axes, by: self.by, contrast: self.contrast, max_sets: self.max_sets })
+        Ok(Refinement { axes, by: self.by, contrast: self.contrast.clone(), max_sets: self.max_sets })
     }
 
     /// Refuses fewer sets than there are at first.

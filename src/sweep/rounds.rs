@@ -8,7 +8,7 @@ use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
 use super::statistic::Statistic;
-use crate::model::{Parameters, Symbol};
+use crate::model::{Parameters, Shortest, Symbol};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -68,10 +68,12 @@ pub struct RefinedAxis {
 }
 
 /// When the sets of a cell differ in a statistic.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Contrast {
     /// They are not all the same.
     Class,
+    /// Some have this value, and some have not.
+    Value(String),
     /// Some are above this value, and some are not.
     Threshold(f64),
     /// Largest and smallest differ by more than this.
@@ -111,6 +113,19 @@ pub struct Bounds {
     pub jobs: u64,
     /// Predicted CPU time at most, in s; of sets that are not known yet, that of the dearest of the first round.
     pub predicted_cost: f64,
+}
+
+impl Refinement {
+    /// What makes a set lie on one side of the edge, as the table of cells says it.
+    #[must_use]
+    pub fn condition(&self) -> String {
+        let key = self.by.key;
+        match &self.contrast {
+            Contrast::Class | Contrast::Step(_) => key.to_owned(),
+            Contrast::Value(value) => format!("{key} = {value}"),
+            Contrast::Threshold(threshold) => format!("{key} > {}", Shortest(*threshold)),
+        }
+    }
 }
 
 impl Rounds {

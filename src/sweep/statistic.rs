@@ -21,14 +21,14 @@ pub enum StatisticKind {
     Angle,
     /// A number alone.
     Number,
-    /// A flag or a word.
+    /// A flag, a word, or a count that tells kinds of sets apart.
     Class,
 }
 
 use StatisticKind::{Angle, Class, Estimate, Number};
 
 /// All that a sweep file may name.
-pub const STATISTICS: [Statistic; 33] = [
+pub const STATISTICS: [Statistic; 34] = [
     Statistic::new("tau_mean", "s", Estimate),
     Statistic::new("mean_friction", "N", Estimate),
     Statistic::new("locking_index", "", Estimate),
@@ -37,6 +37,7 @@ pub const STATISTICS: [Statistic; 33] = [
     Statistic::new("phase_mean", "rad", Angle),
     Statistic::new("locked", "", Class),
     Statistic::new("regime", "", Class),
+    Statistic::new("periods", "", Class),
     Statistic::new("slip_share", "", Number),
     Statistic::new("attached_fraction", "", Number),
     Statistic::new("effective_slips", "", Number),
