@@ -16,7 +16,7 @@ pub struct Preset {
     pub text: &'static str,
 }
 
-const PRESETS: [Preset; 27] = [
+const PRESETS: [Preset; 30] = [
     Preset::new("choices", include_str!("../../sweeps/choices.toml")),
     Preset::new("contacts", include_str!("../../sweeps/contacts.toml")),
     Preset::new("disorder", include_str!("../../sweeps/disorder.toml")),
@@ -28,6 +28,7 @@ const PRESETS: [Preset; 27] = [
     Preset::new("fig2", include_str!("../../sweeps/fig2.toml")),
     Preset::new("fig3", include_str!("../../sweeps/fig3.toml")),
     Preset::new("fig3-full", include_str!("../../sweeps/fig3-full.toml")),
+    Preset::new("fig3-precise", include_str!("../../sweeps/fig3-precise.toml")),
     Preset::new("fig4b", include_str!("../../sweeps/fig4b.toml")),
     Preset::new("fig4d", include_str!("../../sweeps/fig4d.toml")),
     Preset::new("friction", include_str!("../../sweeps/friction.toml")),
@@ -38,10 +39,12 @@ const PRESETS: [Preset; 27] = [
     Preset::new("locking-map", include_str!("../../sweeps/locking-map.toml")),
     Preset::new("regimes", include_str!("../../sweeps/regimes.toml")),
     Preset::new("size", include_str!("../../sweeps/size.toml")),
+    Preset::new("sliding-edge", include_str!("../../sweeps/sliding-edge.toml")),
     Preset::new("staircase", include_str!("../../sweeps/staircase.toml")),
     Preset::new("startup", include_str!("../../sweeps/startup.toml")),
     Preset::new("stiff-drive", include_str!("../../sweeps/stiff-drive.toml")),
     Preset::new("stochasticity", include_str!("../../sweeps/stochasticity.toml")),
+    Preset::new("tongue-4", include_str!("../../sweeps/tongue-4.toml")),
     Preset::new("tongues", include_str!("../../sweeps/tongues.toml")),
     Preset::new("velocity", include_str!("../../sweeps/velocity.toml")),
 ];

@@ -139,8 +139,7 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
         .collect();
     let (x_low, x_high) = range(points.iter().map(|point| point.0));
     let (y_low, y_high) = range(points.iter().flat_map(|point| [point.1, point.2]));
-    let legend =
-        [entry(Mark::Bar(dot(INKS[0])), format!("edge of: {}; and the band in which it lies", words(&cells[0].by)[0]))];
+    let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
     let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
     let margin = 0.05 * (x_high - x_low);
     let x = wide(&x_label, (x_low, x_high), || Axis::linear(&x_label, x_low - margin, x_high + margin));
