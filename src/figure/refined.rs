@@ -139,6 +139,8 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
         .collect();
     let (x_low, x_high) = range(points.iter().map(|point| point.0));
     let (y_low, y_high) = range(points.iter().flat_map(|point| [point.1, point.2]));
+    let [yes, _] = words(&cells[0].by);
+    let edge = if yes == "locked" { "locking" } else { &yes };
     let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
     let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
     let margin = 0.05 * (x_high - x_low);

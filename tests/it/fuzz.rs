@@ -22,6 +22,7 @@ use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, StartupRow, re
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
+use stickslip::rounds::next;
 use stickslip::run::{Options, Shard, run, status};
 use stickslip::sweep::Sweep;
 use stickslip::table::checksum::{PLACEHOLDER, hexadecimal};
@@ -155,15 +156,38 @@ discard = 0
 precursors = true
 ";
 
-/// A folder with a results directory, and one that is compacted.
+/// One of two sets gets more seeds, and the cells between them are divided.
+const ROUNDS: &str = "\
+name = \"rounds\"
+[model]
+N = 2
+Ns = 1
+[axes]
+V0 = { log = [1e-4, 2e-4], points = 2 }
+[record]
+slips = 2
+discard = 0
+[precision]
+of = \"tau_mean\"
+relative = 0.5
+seeds = { from = 2, to = 3 }
+[refine]
+axes = \"V0\"
+by = \"tau_mean\"
+step = 1e-9
+to = { V0 = 0.3 }
+sets = 5
+";
+
+/// A folder with results directories: as they are run, compacted, and of a sweep in rounds.
 struct Examples {
     folder: tempfile::TempDir,
 }
 
 static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let sweep = Sweep::parse(TINY, Path::new("tiny.toml")).unwrap();
-    for name in ["parts", "compacted"] {
+    for name in EXAMPLES {
+        let sweep = Sweep::parse(if name == "rounds" { ROUNDS } else { TINY }, Path::new("tiny.toml")).unwrap();
         let stop = AtomicBool::new(false);
         let options =
             Options { threads: None, stop: &stop, retry_failed: false, shard: Shard::default(), walltime: None };
@@ -173,11 +197,17 @@ static RESULTS: LazyLock<Examples> = LazyLock::new(|| {
         run(&Layout::new(&Disk, &folder.path().join(name)), &sweep, options, &kernel, &mut |_| ()).unwrap();
     }
     Results::read(&Layout::new(&Disk, &folder.path().join("compacted"))).unwrap().compact().unwrap();
-    for name in ["parts", "compacted"] {
+    for name in EXAMPLES {
         reduce(&Results::read(&Layout::new(&Disk, &folder.path().join(name))).unwrap()).unwrap();
     }
     Examples { folder }
 });
+
+const EXAMPLES: [&str; 3] = ["parts", "compacted", "rounds"];
+
+fn example() -> impl Strategy<Value = &'static str> {
+    prop::sample::select(EXAMPLES.to_vec())
+}
 
 /// The files of a folder and those below it.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -303,6 +333,9 @@ fn read_all(root: &Path, file: &Path) {
     let layout = Layout::new(&Disk, root);
     let _ = Results::verify(&layout);
     if let Ok(results) = Results::read(&layout) {
+        if results.round().is_some() {
+            let _ = next(&results);
+        }
         if file.starts_with(layout.reduced()) {
             let _ = draw_all(&layout, &Look::default(), &Format::ALL);
         } else {
@@ -325,8 +358,8 @@ fn peak_memory() -> Option<u64> {
 }
 
 /// A table file of a copy of one of the directories.
-fn table_file(compacted: bool, which: Index) -> (tempfile::TempDir, PathBuf) {
-    let root = RESULTS.folder.path().join(if compacted { "compacted" } else { "parts" });
+fn table_file(example: &str, which: Index) -> (tempfile::TempDir, PathBuf) {
+    let root = RESULTS.folder.path().join(example);
     let tables: Vec<PathBuf> = ["tables", "reduced"].iter().flat_map(|folder| files(&root.join(folder))).collect();
     let file = &tables[which.index(tables.len())];
     let (copy, _) = copy(&root, Path::new(""), &[]);
@@ -373,17 +406,20 @@ proptest! {
 
     #[test]
     fn files_of_a_directory_are_read_or_refused(
-        compacted in any::<bool>(),
+        example in example(),
         which in any::<Index>(),
         changes in prop::collection::vec(change(), 1..6),
     ) {
         let begin = Instant::now();
-        let root = RESULTS.folder.path().join(if compacted { "compacted" } else { "parts" });
+        let root = RESULTS.folder.path().join(example);
         let mut run_files = files(&root.join("run"));
         run_files.retain(|path| path.extension().is_some_and(|extension| extension == "json" || extension == "toml"));
-        let (copy, is_changed) = copy(&root, &run_files[which.index(run_files.len())], &changes);
+        let file = &run_files[which.index(run_files.len())];
+        let (copy, is_changed) = copy(&root, file, &changes);
         let read = Results::read(&Layout::new(&Disk, copy.path()));
-        prop_assert_eq!(read.is_err(), is_changed);
+        // Copies of rounds are read only if the manifest is lost.
+        let is_read = !file.file_name().unwrap().to_string_lossy().starts_with("round-");
+        prop_assert_eq!(read.is_err(), is_changed && is_read);
         match Results::verify(&Layout::new(&Disk, copy.path())) {
             Ok(verification) => prop_assert_eq!(verification.whole, !is_changed),
             Err(error) => prop_assert!(is_changed, "{}", error),
@@ -393,12 +429,12 @@ proptest! {
 
     #[test]
     fn tables_are_read_as_they_were_written_or_refused(
-        compacted in any::<bool>(),
+        example in example(),
         which in any::<Index>(),
         changes in prop::collection::vec(change(), 1..6),
     ) {
         let begin = Instant::now();
-        let root = RESULTS.folder.path().join(if compacted { "compacted" } else { "parts" });
+        let root = RESULTS.folder.path().join(example);
         let tables = files(&root.join("tables"));
         let file = &tables[which.index(tables.len())];
         let (copy, is_changed) = copy(&root, file, &changes);
@@ -418,25 +454,25 @@ proptest! {
 
     #[test]
     fn bytes_that_make_no_sense_under_a_right_checksum_are_refused(
-        compacted in any::<bool>(),
+        example in example(),
         which in any::<Index>(),
         in_footer in any::<bool>(),
         changes in prop::collection::vec(change(), 1..4),
     ) {
-        let (copy, file) = table_file(compacted, which);
+        let (copy, file) = table_file(example, which);
         fs::write(&file, resealed(&fs::read(&file).unwrap(), in_footer, &changes)).unwrap();
         read_all(copy.path(), &file);
     }
 
     #[test]
     fn values_that_make_no_sense_under_a_right_checksum_are_refused_or_reduced(
-        compacted in any::<bool>(),
+        example in prop::sample::select(vec!["parts", "compacted"]),
         which in any::<Index>(),
         column in any::<Index>(),
         row in any::<Index>(),
         value in any::<Index>(),
     ) {
-        let (copy, file) = table_file(compacted, which);
+        let (copy, file) = table_file(example, which);
         let name = if file.starts_with(copy.path().join("reduced")) { file.file_stem() } else { file.parent().unwrap().file_name() };
         let write = match name.unwrap().to_str().unwrap() {
             "slips" => write_nonsense::<SlipRow<'_>>,
@@ -455,11 +491,11 @@ proptest! {
 
     #[test]
     fn a_manifest_that_makes_no_sense_under_a_right_checksum_is_refused(
-        compacted in any::<bool>(),
+        example in example(),
         which in any::<Index>(),
         number in prop::sample::select(NUMBERS.to_vec()),
     ) {
-        let (copy, _) = table_file(compacted, which);
+        let (copy, _) = table_file(example, which);
         let file = copy.path().join("run/manifest.json");
         fs::write(&file, resealed_json(&fs::read_to_string(&file).unwrap(), which, number)).unwrap();
         read_all(copy.path(), &file);
