@@ -90,10 +90,15 @@ impl<'a> Results<'a> {
     /// When it is not, or cannot be read.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let found = Manifest::read(&self.layout)?;
-        // A run may have added a sweep since.
+        let text = self.sweep().text();
         let is_ours = |manifest: &Manifest| {
-            manifest.extensions.len() >= self.extensions.len()
-                && manifest.extensions.iter().zip(&self.extensions).all(|(found, ours)| found.is_of(ours))
+            let found = &manifest.extensions;
+            // A run may have added a sweep since. Or, without locks, another was late to write an earlier round of this
+            // sweep: those that it lacks follow from it.
+            let lacking = self.extensions.get(found.len()..).unwrap_or_default();
+            found.iter().zip(&self.extensions).all(|(found, ours)| found.is_of(ours))
+                && lacking.iter().all(|ours| ours.round.is_some() && ours.sweep.text() == text)
+                && (lacking.is_empty() || found.last().is_some_and(|last| last.sweep == text))
         };
         if found.as_ref().is_some_and(is_ours) {
             return Ok(());

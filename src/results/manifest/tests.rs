@@ -148,6 +148,28 @@ fn two_runs_may_begin_a_directory_at_once_whichever_is_first() {
 }
 
 #[test]
+fn a_manifest_that_goes_back_to_an_earlier_round_is_still_ours_and_that_of_another_sweep_is_not() {
+    let root = tempfile::tempdir().unwrap();
+    let layout = Layout::new(&Disk, root.path());
+    let rounds = sweep("[precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 2, to = 3 }");
+    let first = Results::open(&layout, &rounds).unwrap();
+    let earlier = fs::read(layout.manifest()).unwrap();
+    let mut extensions = first.extensions().to_vec();
+    extensions[0].kept = Some(vec![0..=1]);
+    extensions.push(Extension::next_round(&rounds, &extensions, Round { points: vec![2..=2], ..Round::default() }));
+    Manifest::new(&extensions).write(&layout).unwrap();
+    let second = Results::new(&layout, extensions);
+    assert!(first.check_place().is_ok() && second.check_place().is_ok());
+    // One that was late to write the first round.
+    fs::write(layout.manifest(), earlier).unwrap();
+    assert!(second.check_place().is_ok());
+    let other = tempfile::tempdir().unwrap();
+    Results::open(&Layout::new(&Disk, other.path()), &sweep(TWO_SEEDS)).unwrap();
+    fs::copy(other.path().join("run/manifest.json"), layout.manifest()).unwrap();
+    assert!(first.check_place().is_err() && second.check_place().is_err());
+}
+
+#[test]
 fn a_changed_or_cut_file_of_the_directory_is_named() {
     let root = tempfile::tempdir().unwrap();
     Results::open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap();
