@@ -7,8 +7,8 @@ use super::hues::Hues;
 use super::legend::{Mark, entry};
 use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
 use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
-use super::values::Values;
 pub use super::values::columns;
+use super::values::{FREQUENCY_COLUMN, Values};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 
@@ -262,9 +262,9 @@ fn layout(panels: usize, right: f64) -> Layout<'static> {
     Layout { columns, column_gap: LEFT, has_headings: true, ..Layout::column(PANEL_WIDTH, heights, 26.0, right) }
 }
 
-/// Sets that differ in the x axis alone, if that is a parameter or η, in the order of x.
+/// Sets that differ in the x axis alone, if that is a parameter, η or 1/T, in the order of x.
 fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<usize>> {
-    let symbol = if x_name == "eta" { Some(Symbol::T) } else { Symbol::from_key(x_name) };
+    let symbol = if ["eta", FREQUENCY_COLUMN].contains(&x_name) { Some(Symbol::T) } else { Symbol::from_key(x_name) };
     let Some(symbol) = symbol else { return Vec::new() };
     let others = |set: usize| {
         let others = Symbol::ALL.into_iter().filter(|other| *other != symbol && *other != Symbol::Seed);
@@ -432,6 +432,12 @@ pub(super) mod tests {
         let sets: Vec<usize> = (0..8).collect();
         assert_eq!(lines(&rows, "V0", &sets, &x), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
         assert!(lines(&rows, "tau_mean", &sets, &x).is_empty() && lines(&rows, "Delta", &sets, &x).is_empty());
+        let mut periods = vec![rows[0].clone(); 3];
+        for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
+            row.parameters.parameters.modulation_period = Some(period);
+        }
+        let x = Values::of(&periods, "x", "frequency").unwrap();
+        assert_eq!(lines(&periods, "frequency", &[0, 1, 2], &x), [vec![2, 0, 1]]);
     }
 
     #[test]
