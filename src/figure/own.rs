@@ -182,7 +182,8 @@ impl Asked<'_> {
                 let count = self.values.words.len();
                 return Err(self.refuse(format!("has {count} words, and {MAX_WORDS} fit an axis; take another column")));
             }
-            return Ok(self.values.categories(&label));
+            let short_label = self.label.is_none().then(|| self.values.short_label());
+            return Ok(self.values.categories(&label).with_short_label(short_label));
         }
         if self.is_log && [self.limits.0, self.limits.1].into_iter().flatten().any(|end| end <= 0.0) {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
@@ -203,7 +204,9 @@ impl Asked<'_> {
                 self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's")
             );
         }
-        Ok(if self.is_log { Axis::logarithmic(&label, low, high) } else { Axis::linear(&label, low, high) })
+        let axis = if self.is_log { Axis::logarithmic } else { Axis::linear };
+        let short_label = self.label.is_none().then(|| axis(&self.values.short_label(), low, high).label);
+        Ok(axis(&label, low, high).with_short_label(short_label).with_enough_numbers())
     }
 }
 
@@ -225,12 +228,7 @@ fn hues(values: &Values) -> Result<Hues, FigureError> {
         let problem = "no set has a value of it".to_owned();
         return Err(FigureError::Option { option: "colour", value: values.column.name.to_string(), problem });
     };
-    let label = if values.column.unit.is_empty() {
-        values.column.name.to_string()
-    } else {
-        format!("{} ({})", values.column.name, values.column.unit)
-    };
-    Ok(Hues::of(&label, values.numbers.iter().copied().flatten(), |value| values.setting(value)))
+    Ok(Hues::of(&values.short_label(), values.numbers.iter().copied().flatten(), |value| values.setting(value)))
 }
 
 /// The sets of each panel and its title.
@@ -380,7 +378,7 @@ pub(super) mod tests {
         let colour = svg(&OwnFigure { colour: Some("Delta".to_owned()), ..figure() });
         assert!(colour.contains(">Δ = 0 m<") && colour.contains(">Δ = 1e-6 m<") && colour.contains(INKS[1]));
         let scale = svg(&OwnFigure { colour: Some("V0".to_owned()), ..figure() });
-        assert!(scale.contains(">V0 (m/s)<") && !scale.contains("V0 = "));
+        assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = "));
         let panels = svg(&OwnFigure { panels: Some("Delta".to_owned()), ..figure() });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0 m<"));
         let limits = svg(&OwnFigure { x_limits: (Some(1e-6), Some(1e-5)), ..figure() });

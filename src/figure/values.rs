@@ -76,15 +76,28 @@ impl Values {
 
     /// Its label on an axis, with the unit.
     pub(super) fn label(&self) -> String {
-        let Column { name, unit, meaning, .. } = &self.column;
+        let Column { name, meaning, .. } = &self.column;
         if name == FREQUENCY_COLUMN {
             return FREQUENCY.to_owned();
         }
         let label = match Symbol::from_key(name) {
-            Some(symbol) => format!("{} {}", capitalised(meaning), symbol_of(symbol)),
+            Some(symbol) => {
+                let what = meaning.split([',', ';']).next().unwrap_or_default();
+                format!("{} {}", capitalised(what), symbol_of(symbol))
+            }
             None if meaning.len() <= LONGEST => format!("{}, {name}", capitalised(meaning)),
             None => name.to_string(),
         };
+        self.with_unit(label)
+    }
+
+    /// The same with the symbol or the name alone.
+    pub(super) fn short_label(&self) -> String {
+        self.with_unit(self.name())
+    }
+
+    fn with_unit(&self, label: String) -> String {
+        let unit = self.column.unit;
         if unit.is_empty() { label } else { format!("{label} ({unit})") }
     }
 
@@ -202,5 +215,8 @@ mod tests {
         assert_eq!(label("V0"), "Drive velocity V₀ (m/s)");
         assert_eq!(label("tau_mean"), "Mean interval, tau_mean (s)");
         assert_eq!(label("startup_p"), "startup_p");
+        assert_eq!(label("Delta"), "Amplitude of the modulation Δ (m)");
+        let short = |name: &str| Values::of(&[], "x", name).unwrap().short_label();
+        assert_eq!(["Delta", "tau_mean", "locked"].map(short), ["Δ (m)", "tau_mean (s)", "locked"]);
     }
 }
