@@ -6,7 +6,7 @@ use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
 use super::threads::ThreadsFlag;
-use super::{output, reduce, signals, time};
+use super::{output, reduce, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::ReduceError;
@@ -124,7 +124,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         if arguments.json {
             output::json(&Report { format: FORMAT, report: &report })?;
         } else {
-            output::pairs(&summary_lines(&report))?;
+            let mut pairs = summary_lines(&report);
+            pairs.extend(status::no_slips(&Results::read(&layout)?));
+            output::pairs(&pairs)?;
         }
         let is_complete = report.jobs_left == 0 && !report.stopped;
         if is_complete && !arguments.no_reduce {
