@@ -369,7 +369,7 @@ pub(super) mod tests {
     #[test]
     fn each_option_changes_what_it_says() {
         let plain = svg(&figure());
-        assert!(plain.contains(">Drive velocity V₀ (m/s)<") && plain.contains(">Mean interval, tau_mean (s)<"));
+        assert!(plain.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && plain.contains(">Mean interval, tau_mean (s)<"));
         let bars = |svg: &str| svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#)).count();
         let no_interval = OwnFigure { y: "eta".to_owned(), ..figure() };
         assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
