@@ -160,8 +160,11 @@ mod tests {
         for table in ["[precision]", "[refine]"] {
             let start = text.find(&format!("# {table}")).unwrap();
             let end = text[start..].find("\n\n").map_or(text.len(), |length| start + length);
-            let table: String =
-                text[start..end].lines().map(|line| format!("{}\n", line.trim_start_matches("# "))).collect();
+            let table: Vec<&str> = text[start..end].lines().map(|line| line.trim_start_matches("# ")).collect();
+            let table = table.join(
+                "
+",
+            );
             let changed = format!("{}{table}{}", &text[..start], &text[end..]);
             let changed =
                 if table.contains("seeds") { changed.replace("seed      =", "# seed      =") } else { changed };

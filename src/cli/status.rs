@@ -96,8 +96,8 @@ fn no_slips_in_words(without: u64, ended: u64) -> Option<String> {
     }
     let jobs = if without == ended { "in any job".to_owned() } else { format!("in {without} of {ended} jobs") };
     Some(format!(
-        "{jobs}: the slider probably slides (see regime in tables/jobs); for stick-slip lower V0 or shorten tau_r, for rare \
-         slips raise give_up_after"
+        "{jobs}: the slider probably slides (see regime in tables/jobs); lower V0 or shorten tau_r, or raise give_up_after \
+         if slips are rare"
     ))
 }
 
