@@ -161,10 +161,7 @@ mod tests {
             let start = text.find(&format!("# {table}")).unwrap();
             let end = text[start..].find("\n\n").map_or(text.len(), |length| start + length);
             let table: Vec<&str> = text[start..end].lines().map(|line| line.trim_start_matches("# ")).collect();
-            let table = table.join(
-                "
-",
-            );
+            let table = table.join("\n");
             let changed = format!("{}{table}{}", &text[..start], &text[end..]);
             let changed =
                 if table.contains("seeds") { changed.replace("seed      =", "# seed      =") } else { changed };
