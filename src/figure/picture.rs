@@ -57,8 +57,9 @@ impl Picture {
 
     /// Its small print, which print leaves to the caption.
     #[must_use]
-    pub fn note(&self) -> &str {
-        &self.note
+    pub fn note(&self) -> String {
+        // Lines may be broken anywhere there.
+        self.note.replace('\u{a0}', " ")
     }
 
     /// Width and height in mm.
