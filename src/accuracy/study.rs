@@ -311,7 +311,7 @@ impl Study {
             report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
             let seeds = self.seeds * if set == 0 { self.first_set_multiple } else { 1 };
-            report("reference ensemble, and the realisations of the others that are not timed");
+            report("reference ensemble, and realisations that are not timed");
             let reference = taylor(ENSEMBLE_TOLERANCE);
             let others = REFERENCE_SEEDS..REFERENCE_SEEDS + REFERENCE_SHARE * seeds;
             let reference = self.slips_of(parameters, reference, others)?;
@@ -353,7 +353,7 @@ impl Study {
         Recording { slips: self.slips, discard: DISCARD, ..Recording::default() }
     }
 
-    /// Slips of these seeds; not timed, so on all threads.
+    /// Slips of these seeds; not timed, so on all threads of the pool.
     fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>, AccuracyError> {
         let slips = |seed: u64| {
             let parameters = Parameters { seed, ..parameters.clone() };

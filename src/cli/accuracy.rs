@@ -3,6 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::sweep::settings_as_sweep;
+use super::threads::ThreadsFlag;
 use crate::accuracy::{
     self, DistanceRow, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study,
     hard_cases, scaling_report, set_in_words, solver_in_words, stability_report, study_report,
@@ -10,35 +11,39 @@ use crate::accuracy::{
 use crate::model::Parameters;
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// A study of more sets than this would take long, and nobody could read it.
+/// More sets would take long, and their tables would be too many to read.
 const MAX_SETS: usize = 12;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Before chaos: errors of the first break times against the tightest tolerance. After chaos: distances of the
-distributions of slips from a reference ensemble, and biases, with bootstrap intervals. And the residual of the
-energy ledger. The event-driven solver counts as two methods, on the grid and in Taylor steps. Cost is CPU time of
-one thread, that of the cheapest realisation; keep the machine free of other work: the spread over realisations,
-which are timed in turn with those of the other solvers, shows how free it was.
+Before trajectories diverge, the first break times are compared with those at the tightest tolerance. After that,
+the distributions of slips are compared with a reference ensemble: their distances and the biases of their means,
+with bootstrap intervals. The energy ledger is checked, too. The event-driven solver counts as two methods, on the
+grid and in Taylor steps.
 
-The study of the paper's parameters is the default. With a sweep file or --set it is about those: which tolerance of
-the event-driven solver biases what, by how much, and what a slip costs.
+The cost is the CPU time of one thread in the cheapest realisation. Realisations of all solvers are timed in turn;
+their spread shows whether other work disturbed the timing, so keep the machine free. --threads is about what is not
+timed.
+
+By default the study takes the paper's parameters. A sweep file or --set chooses others: it then shows what a slip
+costs at each tolerance of the event-driven solver, and by how much the tolerance biases slips.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
   stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
   stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver
-  stickslip accuracy --scaling               what a slip costs with N and Ns, in two minutes; --quick: in seconds
+  stickslip accuracy --scaling               how the cost of a slip grows with N and Ns, in two minutes; --quick: in seconds
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
-    /// Sweep file whose sets and solver to study, in the place of the paper's
+    /// Sweep file whose sets and solver are studied in place of the paper's
     #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "scaling", "hard_cases"])]
     sweep: Option<PathBuf>,
     /// Set a parameter of the model, and study this one set; repeatable
@@ -47,7 +52,7 @@ pub struct Arguments {
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
-    /// Fewer slips, or sizes
+    /// Take fewer slips, or fewer sizes
     #[arg(long)]
     quick: bool,
     /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
@@ -57,11 +62,13 @@ pub struct Arguments {
     /// Slips of each realisation [default: 100, with --quick 6]
     #[arg(long, value_name = "N")]
     slips: Option<u64>,
-    /// Measure what a slip costs with the size of the slider instead
-    #[arg(long, conflicts_with_all = ["hard_cases", "seeds", "slips"])]
+    #[command(flatten)]
+    threads: ThreadsFlag,
+    /// Measure how the cost of a slip grows with the slider instead
+    #[arg(long, conflicts_with_all = ["hard_cases", "seeds", "slips", "threads"])]
     scaling: bool,
     /// Run the hard cases instead
-    #[arg(long, conflicts_with_all = ["quick", "seeds", "slips"])]
+    #[arg(long, conflicts_with_all = ["quick", "seeds", "slips", "threads"])]
     hard_cases: bool,
     /// Print JSON
     #[arg(long)]
@@ -92,7 +99,10 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
         }
     }
-    let findings = study.run(&mut |next| output::report(next))?;
+    let threads = arguments.threads.choose()?.count.map_or(0, NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
+    let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     write_and_print(arguments, &study_report(&study, &findings)?, &study_text(&study, &findings))?;
     Ok(Exit::Done)
 }
@@ -153,8 +163,10 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
 /// What each solver costs at each set, how far its first breaks are off, and by how much it biases the means of slips.
 fn study_text(study: &Study, findings: &Findings) -> String {
     let mut lines = vec![format!(
-        "{}; one thread; CPU time per slip by the cheapest of {} realisations, and the median and dearest as multiples of \
-         it; errors of the first {} breaks: median (largest)",
+        "{}; one thread\n\
+         ms/slip: CPU time in the cheapest of {} realisations; median and dearest: as multiples of it\n\
+         break times: median (largest) error of the first {} breaks; together: breaks and model time until the\n\
+         trajectory leaves that of the reference; ledger: residual of the energy over the work of the drive",
         accuracy::cost::processor(),
         study.seeds,
         study.breaks
@@ -164,11 +176,12 @@ fn study_text(study: &Study, findings: &Findings) -> String {
         lines.extend(cost_table(set, &rows));
         lines.extend(bias_table(findings, &rows));
     }
-    lines.push("\n* extrapolated from the cost of a step; > together as far as the reference reaches".to_owned());
-    lines.push("! zero lies outside of the 95 % interval, as by chance in one of 20".to_owned());
+    lines.push(String::new());
+    lines.extend(legend(findings));
     let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
     lines.push(format!(
-        "of {}, {} biases show, {} W1 and {} KS distances exceed what 95 % of equal distributions stay under",
+        "of {} comparisons with the reference, {} show a bias of the mean; in {} the W1 distance, and in {} the KS distance\n\
+         is larger than in 95 % of comparisons of equal distributions",
         findings.distances.len(),
         exceed(is_biased),
         exceed(|found| found.wasserstein.value > found.wasserstein.floor),
@@ -176,6 +189,30 @@ fn study_text(study: &Study, findings: &Findings) -> String {
     ));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// What the marks mean that occur in the tables.
+fn legend(findings: &Findings) -> Vec<String> {
+    let methods = || findings.methods.iter();
+    let marks = [
+        (methods().any(is_extrapolated), "* extrapolated from the cost of a step"),
+        (methods().any(is_together_throughout), "> or longer: the reference ends here"),
+        (
+            findings.distances.iter().any(|row| is_biased(&row.distances)),
+            "! the 95 % interval excludes zero, which happens by chance in one of 20",
+        ),
+    ];
+    marks.into_iter().filter(|(occurs, _)| *occurs).map(|(_, meaning)| meaning.to_owned()).collect()
+}
+
+/// Whether the cost per slip follows from that of a step.
+const fn is_extrapolated(row: &MethodRow) -> bool {
+    row.cost.timed_slips == 0
+}
+
+/// Whether the breaks agree as far as the reference reaches.
+const fn is_together_throughout(row: &MethodRow) -> bool {
+    row.break_times.together_throughout && row.break_times.together.is_some()
 }
 
 fn is_biased(found: &Distances) -> bool {
@@ -195,10 +232,10 @@ fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
         let errors = row.break_times;
         let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
         let together = errors.together.zip(errors.together_seconds).map(|(breaks, seconds)| {
-            let mark = if errors.together_throughout { ">" } else { "" };
+            let mark = if is_together_throughout(row) { ">" } else { "" };
             format!("{mark}{breaks} breaks, {seconds:.3} s")
         });
-        let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
+        let mark = if is_extrapolated(row) { "*" } else { "" };
         lines.push(format!(
             "{:30}{:>9} {:>7.2} {:>7.2} {:>8.0} {:>18} {:>24} {:>9}",
             solver_in_words(row.solver),
@@ -228,7 +265,7 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
     let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.name(), unit(quantity))).collect();
     let mut lines = vec![
-        format!("bias of the mean of {} slips against {} of the reference", slips.slips, slips.reference_slips),
+        format!("bias of the mean: {} slips compared with {} of the reference", slips.slips, slips.reference_slips),
         format!("{:30}{}", "", cells(heading)),
     ];
     for row in rows {
@@ -252,14 +289,14 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let halves = rows.iter().filter_map(|row| of(row, Quantity::Interval)).map(half);
     if let Some(hidden) = halves.max_by(f64::total_cmp) {
         lines.push(format!(
-            "with this many slips a bias of the interval below {hidden:.1} % may not show; take more --seeds to see smaller ones"
+            "these slips may hide a bias of the interval below {hidden:.1} %; more --seeds show smaller ones"
         ));
     }
     lines
 }
 
 fn scaling_text(findings: &ScalingFindings) -> String {
-    let mut lines = vec![format!("{}; one thread; per slip past start-up", accuracy::cost::processor())];
+    let mut lines = vec![format!("{}; one thread; means per slip after start-up", accuracy::cost::processor())];
     lines.push(format!(
         "\n{:>6} {:>6} {:>9} {:>6} {:>10} {:>10} {:>9} {:>9} {:>9} {:>7} {:>8}",
         "N", "Ns", "tolerance", "slips", "CPU s", "CPU/sim. s", "steps", "breaks", "reattach.", "leaps", "ns/step"
@@ -282,7 +319,7 @@ fn scaling_text(findings: &ScalingFindings) -> String {
     }
     lines.push(format!(
         "\n{:13} {:>9} {:>17} {:>10} {:>9} {:>9} {:>8}",
-        "exponents of", "tolerance", "CPU s", "CPU/sim. s", "steps", "breaks", "ns/step"
+        "exponents in", "tolerance", "CPU s", "CPU/sim. s", "steps", "breaks", "ns/step"
     ));
     for row in &findings.exponents {
         lines.push(format!(
@@ -320,4 +357,45 @@ fn stability_text(rows: &[Stability]) -> String {
     let failed = rows.iter().filter(|row| !row.passed).count();
     lines.push(format!("\n{} of {} runs passed\n", rows.len() - failed, rows.len()));
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accuracy::Cost;
+    use crate::accuracy::breaks::BreakErrors;
+    use crate::solver::Solver;
+    use crate::table::selected::Selected;
+
+    /// The lines below the tables of a study with one solver, of which this number of slips was timed.
+    fn explained(timed_slips: u64, together_throughout: bool) -> String {
+        let parameters = Parameters::default();
+        let row = MethodRow {
+            parameters: Selected::new(parameters.clone()),
+            case: String::new(),
+            solver: Solver::default(),
+            cost: Cost { per_slip: 1e-3, timed_slips, ..Cost::default() },
+            timings: 1,
+            median_per_slip: 1e-3,
+            largest_per_slip: 1e-3,
+            break_times: BreakErrors {
+                together: Some(9),
+                together_seconds: Some(0.1),
+                together_throughout,
+                ..BreakErrors::default()
+            },
+            ledger_residual: None,
+        };
+        let study = Study { sets: vec![parameters], ..Study::quick() };
+        study_text(&study, &Findings { methods: vec![row], distances: Vec::new() })
+    }
+
+    #[test]
+    fn a_mark_is_explained_if_it_occurs() {
+        let (star, further) = ("\n* extrapolated", "\n> or longer");
+        let text = explained(0, true);
+        assert!(text.contains("1.000*") && text.contains(star) && text.contains(further), "{text}");
+        let text = explained(6, false);
+        assert!(!text.contains('*') && !text.contains(further) && !text.contains("\n! "), "{text}");
+    }
 }

@@ -27,8 +27,8 @@ Examples:
 What follows -- goes to sbatch or `hq submit`, and so do options of the script. Program, sweep file and results
 directory must have the same paths on all nodes. Logs are in run/batch of the results directory.
 
-A sweep that needs more than this once: submit the script again, or give --starts 200, so that a worker whose time
-is over is followed by another until all is done. Starts that find nothing to do end at once.")]
+If a sweep needs more time, submit the script again, or give --starts 200: then another worker follows each one
+whose time is over, until all is done. Workers that find nothing to do end at once.")]
 pub struct Arguments {
     /// Batch system
     #[arg(value_enum)]

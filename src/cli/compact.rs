@@ -11,7 +11,7 @@ use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Make few large files of the tables of a results directory, the same bytes whatever its history
+/// Merge the tables of a results directory into a few large files, with the same bytes whatever its history
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

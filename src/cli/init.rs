@@ -96,6 +96,19 @@ slips = {slips}                      # slips to record after start-up; then the 
 {record}
 [solver]
 # tolerance = {tolerance:e}        # target error of displacement, relative to fs/k
+
+# Seeds until the error bars are short enough, in place of seed in [axes]:
+# [precision]
+# of       = \"tau_mean\"           # or mean_friction, locking_index, ...; or a list
+# relative = 0.01                 # largest half-width of the 95 % interval; or absolute = .., in its unit
+# seeds    = {{ from = 8, to = 64 }}
+
+# Further values of V0 between neighbours that differ:
+# [refine]
+# axes = \"V0\"                     # ranges of [axes], such as V0
+# by   = \"locked\"                 # or regime; or a number with threshold = .. or step = ..
+# to   = {{ V0 = 0.05 }}            # smallest distance: a share of the value, as V0 is log
+# sets = 100                      # at most
 ",
         slips = recording.slips,
     )
@@ -131,11 +144,29 @@ mod tests {
         let is_setting = |line: &&str| {
             line.starts_with("# ") && line.contains(" = ") && !line.contains("= none") && !line.contains("where")
         };
-        let settings: Vec<&str> = text.lines().filter(is_setting).collect();
+        // The tables of rounds stand as a whole or not at all.
+        let alone = text.split("\n# Seeds until").next().unwrap();
+        let settings: Vec<&str> = alone.lines().filter(is_setting).collect();
         assert!(settings.len() > 15, "{settings:?}");
         for line in settings {
             let changed = text.replace(line, &line[2..]);
             assert_eq!(Sweep::parse(&changed, Path::new("mine.toml")).unwrap().jobs().count(), 18, "{line}");
+        }
+    }
+
+    #[test]
+    fn the_tables_of_rounds_in_the_template_may_stand() {
+        let text = template("mine");
+        for table in ["[precision]", "[refine]"] {
+            let start = text.find(&format!("# {table}")).unwrap();
+            let end = text[start..].find("\n\n").map_or(text.len(), |length| start + length);
+            let table: Vec<&str> = text[start..end].lines().map(|line| line.trim_start_matches("# ")).collect();
+            let table = table.join("\n");
+            let changed = format!("{}{table}{}", &text[..start], &text[end..]);
+            let changed =
+                if table.contains("seeds") { changed.replace("seed      =", "# seed      =") } else { changed };
+            let sweep = Sweep::parse(&changed, Path::new("mine.toml")).unwrap();
+            assert!(sweep.bounds().is_some(), "{table}");
         }
     }
 

@@ -16,10 +16,10 @@ use std::path::PathBuf;
 Example:
   stickslip run fig3.toml --out first --shard 1/2      on one computer
   stickslip run fig3.toml --out second --shard 2/2     on another
-  stickslip merge first second -o results/fig3         with both directories at one place
+  stickslip merge first second -o results/fig3         with both directories in one place
   stickslip run results/fig3                           runs what is missing, reduces and draws
 
-The sources are not changed. The same command goes on where it was interrupted.")]
+The sources are not changed. After an interruption, the same command continues.")]
 pub struct Arguments {
     /// Results directories of one sweep
     #[arg(value_name = "DIR", required = true)]

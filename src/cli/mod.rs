@@ -21,6 +21,7 @@ mod signals;
 mod simulate;
 mod status;
 mod sweep;
+mod threads;
 mod time;
 mod verify;
 

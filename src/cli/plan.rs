@@ -16,7 +16,7 @@ use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Show what a sweep would run, and what of it is done: jobs, parts, predicted cost. Nothing is written
+/// Show what a sweep would run and what is done: jobs, parts, predicted cost. Nothing is written
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

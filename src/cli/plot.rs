@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Column that colours show: up to six values in the legend, more on a scale
     #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
     colour: Option<String>,
-    /// Column of which each value gets a panel, up to nine
+    /// Column whose values get a panel each, up to nine
     #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
     panels: Option<String>,
     /// Logarithmic axes
@@ -55,10 +55,10 @@ pub struct Arguments {
     /// Formats, separated by commas [default: svg,png]
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<FileFormat>,
-    /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: as the data need; in print one or two columns wide]
+    /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<Size>,
-    /// What the figures are for: a screen, or print with text of 8 pt, 86 or 178 mm wide, 600 dpi
+    /// Style: for a screen, or for print with 8 pt text, 86 or 178 mm wide, 600 dpi, without small print
     #[arg(long, value_enum, default_value_t = Medium::Screen)]
     style: Medium,
 }
@@ -152,14 +152,21 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
     let results = Results::read(&Layout::new(&Disk, directory))?;
     let (layout, look) = (results.layout(), arguments.look(&results));
-    let files = match (arguments.own(), &arguments.output) {
-        (None, _) => draw_all(layout, &look, &arguments.formats())?,
-        (Some(figure), None) => write_own(layout, draw_own(layout, &figure, &look)?, &look, &arguments.formats())?,
-        (Some(figure), Some(file)) => {
-            let format = format_of(file)?;
+    let files = match arguments.own() {
+        None => draw_all(layout, &look, &arguments.formats())?,
+        Some(figure) => {
             let picture = draw_own(layout, &figure, &look)?;
-            output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
-            vec![file.clone()]
+            if look.style == Style::Print {
+                output::report(&format!("for the caption: {}", picture.note()));
+            }
+            match &arguments.output {
+                None => write_own(layout, picture, &look, &arguments.formats())?,
+                Some(file) => {
+                    let format = format_of(file)?;
+                    output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
+                    vec![file.clone()]
+                }
+            }
         }
     };
     if files.is_empty() {

@@ -20,11 +20,11 @@ use std::time::{Duration, Instant};
 Examples:
   stickslip report results/fig3                    writes results/fig3/report.html
   stickslip report results/fig3 -o /tmp/fig3.html  writes it elsewhere
-  stickslip run sweeps/fig3.toml --report          writes it again and again while the run goes on
+  stickslip run sweeps/fig3.toml --report          keeps it up to date during the run
 
-The page needs no network and no other file. It has what was swept, regimes, failed jobs with their commands,
-charts, the table of parameter sets, predicted against measured cost, and versions. Reduced data that are older
-than the tables are made again first.")]
+The page needs no network and no other file. It shows the swept parameters, regimes, failed jobs with
+their commands, charts, the table of parameter sets, predicted and measured cost, and versions. Reduced data that are
+older than the tables are updated first.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]

@@ -1,24 +1,23 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
-use super::exit::{Exit, UsageError};
+use super::exit::Exit;
 use super::planning::Planning;
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
-use super::{output, reduce, signals, time};
+use super::threads::ThreadsFlag;
+use super::{output, reduce, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::ReduceError;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::threads::{self, Threads};
 use crate::run::{Options, RunReport, Shard};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -34,10 +33,10 @@ Examples:
   stickslip run sweeps/fig3.toml --report        with results/fig3/report.html, to watch it in a browser
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
-Started several times, also on several hosts with a common disk, it shares the work.
+Start it several times, also on several hosts with a common disk, to share the work.
 
-Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2 and SIGXCPU keep what is done; the same command resumes from there. Any of them
-again changes nothing, except a second Ctrl-C, which exits at once.
+Ctrl-C, SIGTERM, SIGUSR1, SIGUSR2 and SIGXCPU keep what is done; the same command resumes from there. Further
+signals change nothing, except a second Ctrl-C, which exits at once.
 
 Batch systems say how many threads a job has in SLURM_CPUS_PER_TASK, OMP_NUM_THREADS, NCPUS, NSLOTS or
 LSB_DJOB_NUMPROC; the first that is set counts. `stickslip batch` prints a script that submits a sweep.")]
@@ -52,18 +51,17 @@ pub struct Arguments {
     /// Results directory [default: results/<name of the sweep>, or the one to resume]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads [default: those that the batch system grants, else all cores]
-    #[arg(long, value_name = "N", value_parser = threads::parse)]
-    threads: Option<NonZeroUsize>,
+    #[command(flatten)]
+    threads: ThreadsFlag,
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// End within this time, such as 55m, 1h30m or 1:30:00: start only what ends by then; reduction and figures come on
-    /// top
+    /// End within this time, such as 55m, 1h30m or 1:30:00: start only what ends by then; reduction and figures take
+    /// extra time
     #[arg(long, value_name = "TIME", value_parser = time::parse)]
     walltime: Option<Duration>,
-    /// One of many in a batch queue: end with 0 when others run the rest, or after some work when the time is over, by
-    /// --walltime or by SIGUSR1, SIGUSR2 or SIGXCPU
+    /// Run as one of many workers in a batch queue: exit with 0 also when others run the rest, or when the time is over
+    /// (--walltime, SIGUSR1, SIGUSR2, SIGXCPU) after some work
     #[arg(long)]
     worker: bool,
     /// Run failed jobs again
@@ -72,7 +70,7 @@ pub struct Arguments {
     /// Skip reduction and figures
     #[arg(long, conflicts_with = "report")]
     no_reduce: bool,
-    /// Write report.html, also while the run goes on: a browser that shows it keeps up
+    /// Write report.html and keep it up to date during the run; a browser that shows it reloads it
     #[arg(long)]
     report: bool,
     /// Print the report as JSON
@@ -102,8 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     };
     let root = arguments.out.clone().unwrap_or(default_root);
     output::warn(&sweep.warnings());
-    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))
-        .map_err(|error| UsageError(error.to_string()))?;
+    let threads = arguments.threads.choose()?;
     let options = Options {
         threads: threads.count,
         stop,
@@ -127,7 +124,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         if arguments.json {
             output::json(&Report { format: FORMAT, report: &report })?;
         } else {
-            output::pairs(&summary_lines(&report))?;
+            let mut pairs = summary_lines(&report);
+            pairs.extend(status::no_slips(&Results::read(&layout)?));
+            output::pairs(&pairs)?;
         }
         let is_complete = report.jobs_left == 0 && !report.stopped;
         if is_complete && !arguments.no_reduce {

@@ -29,7 +29,7 @@ use std::time::Instant;
 #[derive(Debug, Args)]
 #[command(after_help = after_help(), group(ArgGroup::new(JOB).multiple(true)))]
 pub struct Arguments {
-    /// Sweep file with exactly one job, in the place of the flags that name one
+    /// Sweep file with exactly one job, in place of the flags that describe one
     #[arg(value_name = "SWEEP.toml", conflicts_with = JOB)]
     sweep: Option<PathBuf>,
     /// Set a parameter of the model; repeatable
@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
-    /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or as it is best
+    /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or whichever is better
     #[arg(long, group = JOB, value_name = "auto|grid|taylor")]
     resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]

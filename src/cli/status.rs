@@ -6,14 +6,14 @@ use super::{output, signals};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::workers::Worker;
-use crate::run::{Failure, Overview, Present};
+use crate::run::{Failure, Overview, Present, Status};
 use crate::table::shown::shown_text;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Show what of a results directory is done, failed and missing, who is at work, and the predicted time left
+/// Show the state of a results directory: jobs done, failed and missing, workers, predicted time left
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -33,7 +33,9 @@ pub struct Arguments {
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let planning = Planning::watch(signals::catch()?, None)?;
-    let status = crate::run::status(&Results::read(&Layout::new(&Disk, &arguments.directory))?)?;
+    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let status = crate::run::status(&results)?;
+    let no_slips = if arguments.json { None } else { no_slips(&results) };
     drop(planning);
     let overview = status.overview;
     if arguments.json {
@@ -57,6 +59,7 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ("time left", left),
         ];
         pairs.extend(status.rounds.as_ref().map(|rounds| ("round", output::rounds(rounds))));
+        pairs.extend(no_slips);
         output::pairs(&pairs)?;
         for Present { worker, last_beat } in &status.workers {
             let Worker { host, process, threads, jobs_per_second, .. } = worker;
@@ -78,4 +81,36 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         Overview { jobs_failed: 1.., .. } => Exit::Failed,
         _ => Exit::Done,
     })
+}
+
+/// A line for people if half of the jobs or more ended without a slip: the likely reason, and what to do. Tables that
+/// cannot be read are for `verify`.
+pub fn no_slips(results: &Results<'_>) -> Option<(&'static str, String)> {
+    let (without, ended) = Status::jobs_without_slips(results).ok()?;
+    no_slips_in_words(without, ended).map(|words| ("no slips", words))
+}
+
+fn no_slips_in_words(without: u64, ended: u64) -> Option<String> {
+    if without == 0 || 2 * without < ended {
+        return None;
+    }
+    let jobs = if without == ended { "in any job".to_owned() } else { format!("in {without} of {ended} jobs") };
+    Some(format!(
+        "{jobs}: the slider probably slides (see regime in tables/jobs); lower V0 or shorten tau_r, or raise give_up_after \
+         if slips are rare"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_said_if_half_of_the_jobs_or_more_do_not_slip() {
+        assert_eq!((no_slips_in_words(0, 0), no_slips_in_words(0, 9), no_slips_in_words(4, 9)), (None, None, None));
+        let words = |without, ended| no_slips_in_words(without, ended).unwrap();
+        assert!(words(5, 9).starts_with("in 5 of 9 jobs: the slider probably slides"));
+        assert!(words(9, 9).starts_with("in any job: the slider") && words(9, 9).contains("lower V0"));
+        assert!(!words(9, 9).contains('\n'));
+    }
 }

@@ -54,9 +54,12 @@ impl Preset {
         Self { name, text }
     }
 
-    /// The first line of the file.
+    /// What the first line of the file says, without a sentence that goes on in the next line.
     fn about(self) -> &'static str {
-        self.text.lines().next().unwrap_or_default().trim_matches(['#', ' ', '.', ',', ':'])
+        let line = self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);
+        let whole =
+            if line.ends_with('.') { line } else { line.rsplit_once([':', '.', ',']).map_or(line, |(whole, _)| whole) };
+        whole.trim_end_matches(['.', ',', ':'])
     }
 
     pub fn sweep(self) -> Result<Sweep, SweepError> {
@@ -145,5 +148,8 @@ mod tests {
             assert_eq!(preset.sweep().unwrap().name(), preset.name);
             assert!((10..130).contains(&preset.about().len()), "{}: {}", preset.name, preset.about());
         }
+        let about = |name: &str| PRESETS.iter().find(|preset| preset.name == name).unwrap().about();
+        assert_eq!(about("size"), "Locking against the number of blocks N");
+        assert!(about("friction-drives").ends_with("eight frequencies"), "the next line says how far");
     }
 }

@@ -12,12 +12,12 @@ use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Check that every file of a results directory is whole and every job is there once, and say what to do if not
+/// Check that all files of a results directory are intact and every job is there exactly once; suggest repairs
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   stickslip verify results/fig3
-  stickslip verify results/fig3 --repair     then `run` makes again what was taken away
+  stickslip verify results/fig3 --repair     then `run` computes what was moved away
 
 Nothing is changed without --repair. Exit code 4: something is damaged.")]
 pub struct Arguments {

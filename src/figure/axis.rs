@@ -9,14 +9,29 @@ enum Scale {
     Logarithmic,
 }
 
+/// How an axis gets more ticks with a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Finer {
+    /// It has those that there are.
+    Never,
+    /// By smaller steps; the numbers are those of the values over this power of ten.
+    Steps(i32),
+    /// By more mantissas in a decade.
+    Mantissas,
+}
+
 /// One axis of a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
     pub(super) label: String,
+    /// The same in short, for frames that have no room for it.
+    short_label: Option<String>,
     pub(super) low: f64,
     pub(super) high: f64,
     scale: Scale,
+    /// What finer ticks would be.
+    finer: Finer,
     /// Ticks with a number.
     pub(super) ticks: Vec<(f64, String)>,
     /// Ticks without.
@@ -25,6 +40,15 @@ pub(super) struct Axis {
 
 /// Ticks with a number on an axis.
 const MAX_TICKS: f64 = 6.0;
+/// Fewest numbers that show the scale of an axis.
+const FEWEST: usize = 3;
+/// Mantissas with a number on logarithmic axes: over several decades, over few, and over so short a range that those give
+/// one or two numbers.
+const MANTISSAS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0]];
+/// Numbers of values within these limits are written out, if they need no more decimals than this; others are multiples of a
+/// power of ten that stands in the label.
+const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
+const MAX_DECIMALS: usize = 3;
 /// Most ticks of any kind: values of which nothing can come have no end of them.
 const MAX_MULTIPLES: usize = 1000;
 /// No quantity is larger than this, nor smaller than its inverse.
@@ -40,7 +64,7 @@ impl Axis {
     pub(super) fn counts(label: &str, high: u32) -> Self {
         let ticks = (0..=high).map(|count| (f64::from(count), count.to_string())).collect();
         let high = f64::from(high) + 0.5;
-        Self { label: label.to_owned(), low: 0.0, high, scale: Scale::Linear, ticks, minor: Vec::new() }
+        Self::fixed(label, (0.0, high), ticks, Vec::new())
     }
 
     /// Linear from `low` to `high` with half as many ticks, for low frames.
@@ -55,13 +79,65 @@ impl Axis {
 
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
         let high = above(low, high);
-        let step = nice_step((high - low) / max_ticks);
-        let decimals = usize::try_from(-exponent(step)).unwrap_or(0);
-        let ticks = multiples(step, low, high).map(|tick| (tick, number(tick, decimals))).collect();
+        let largest = low.abs().max(high.abs());
+        let is_small = largest < WRITTEN_OUT.start && decimals(nice_step((high - low) / max_ticks)) > MAX_DECIMALS;
+        // Thousandths, millionths, thousands, ...: those that units have prefixes for.
+        let is_scaled = is_small || (WRITTEN_OUT.end..LARGEST).contains(&largest);
+        let power = if is_scaled { 3 * exponent(largest).div_euclid(3) } else { 0 };
+        let axis = Self {
+            label: with_power(label, power),
+            short_label: None,
+            low,
+            high,
+            scale: Scale::Linear,
+            finer: Finer::Steps(power),
+            ticks: Vec::new(),
+            minor: Vec::new(),
+        };
+        axis.with_steps(nice_step((high - low) / max_ticks), power)
+    }
+
+    fn with_steps(self, step: f64, power: i32) -> Self {
+        let unit = libm::exp10(f64::from(power));
+        let decimals = decimals(step / unit);
+        let ticks = multiples(step, self.low, self.high).map(|tick| (tick, number(tick / unit, decimals))).collect();
         // A step of 2 is halved, others are cut in five.
         let parts = if (step / libm::exp10(f64::from(exponent(step)))).round() == 2.0 { 2.0 } else { 5.0 };
-        let minor = multiples(step / parts, low, high).collect();
-        Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
+        let minor = multiples(step / parts, self.low, self.high).collect();
+        Self { ticks, minor, ..self }
+    }
+
+    /// The same axis without ticks between its numbers if they would stand close on this length.
+    pub(super) fn without_dense_ticks(self, length: f64) -> Self {
+        const CLOSE: f64 = 5.0;
+        let is_dense = self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length;
+        if is_dense { Self { minor: Vec::new(), ..self } } else { self }
+    }
+
+    pub(super) fn with_short_label(self, short_label: Option<String>) -> Self {
+        Self { short_label, ..self }
+    }
+
+    /// The same axis with three numbers or more, where one or two would not show its scale.
+    pub(super) fn with_enough_numbers(self) -> Self {
+        if self.ticks.len() >= FEWEST {
+            return self;
+        }
+        match self.finer {
+            Finer::Never => self,
+            Finer::Mantissas => {
+                let levels = MANTISSAS.map(|mantissas| self.clone().with_mantissas(mantissas));
+                levels.into_iter().find(|axis| axis.ticks.len() >= FEWEST).unwrap_or(self)
+            }
+            Finer::Steps(power) => {
+                let (few, strip) = (FEWEST as f64, self.minor.is_empty());
+                let step = nice_step((self.high - self.low) / few);
+                let steps = [1.0, 0.5, 0.4, 0.2, 0.1].map(|share| nice_step(share * step));
+                let finer = steps.into_iter().map(|step| self.clone().with_steps(step, power));
+                let found = finer.into_iter().find(|axis| axis.ticks.len() >= FEWEST).unwrap_or(self);
+                if strip { Self { minor: Vec::new(), ..found } } else { found }
+            }
+        }
     }
 
     /// Linear between the round numbers that enclose `low` and `high`.
@@ -74,16 +150,32 @@ impl Axis {
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
-        let decades = libm::log10(high / low);
-        let mantissas: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let axis = Self {
+            label: label.to_owned(),
+            short_label: None,
+            low,
+            high,
+            scale: Scale::Logarithmic,
+            finer: Finer::Mantissas,
+            ticks: Vec::new(),
+            minor: Vec::new(),
+        };
+        axis.with_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)])
+    }
+
+    fn with_mantissas(self, mantissas: &[f64]) -> Self {
+        let Self { low, high, .. } = self;
         // Every decade up to 7 of them, then every second, third, ...
         #[expect(clippy::cast_possible_truncation, reason = "at most some hundred decades")]
-        let every = ((decades / 7.0).ceil() as i32).max(1);
+        let every = ((libm::log10(high / low) / 7.0).ceil() as i32).max(1);
         let number = if low >= 9e-4 && high <= 1.1e4 { plain_power } else { power_of_ten };
         let (mut ticks, mut minor) = (Vec::new(), Vec::new());
         for power in exponent(low)..=exponent(high) {
             let decade = libm::exp10(f64::from(power));
-            for mantissa in (1..10).map(f64::from) {
+            let between = mantissas.iter().copied().filter(|mantissa| mantissa.fract() != 0.0);
+            let mut all: Vec<f64> = (1..10).map(f64::from).chain(between).collect();
+            all.sort_by(f64::total_cmp);
+            for mantissa in all {
                 let value = mantissa * decade;
                 if value < low * (1.0 - 1e-9) || value > high * (1.0 + 1e-9) {
                     continue;
@@ -95,21 +187,32 @@ impl Axis {
                 }
             }
         }
-        Self { label: label.to_owned(), low, high, scale: Scale::Logarithmic, ticks, minor }
+        Self { ticks, minor, ..self }
     }
 
     /// Angles in rad between multiples of π/2.
     pub(super) fn angle(label: &str, low: f64, high: f64) -> Self {
         let ticks = multiples(FRAC_PI_2, low, high).map(|tick| (tick, halves_of_pi(tick))).collect();
         let minor = multiples(FRAC_PI_2 / 3.0, low, high).collect();
-        Self { label: label.to_owned(), low, high, scale: Scale::Linear, ticks, minor }
+        Self::fixed(label, (low, high), ticks, minor)
     }
 
     /// Words at 0, 1, 2, ...
     pub(super) fn categories(label: &str, words: &[&str]) -> Self {
         let ticks = (0..).map(f64::from).zip(words.iter().map(|word| (*word).to_owned())).collect();
         let high = words.len() as f64 - 0.5;
-        Self { label: label.to_owned(), low: -0.5, high, scale: Scale::Linear, ticks, minor: Vec::new() }
+        Self::fixed(label, (-0.5, high), ticks, Vec::new())
+    }
+
+    /// Linear with these ticks.
+    fn fixed(label: &str, (low, high): (f64, f64), ticks: Vec<(f64, String)>, minor: Vec<f64>) -> Self {
+        let label = label.to_owned();
+        Self { label, short_label: None, low, high, scale: Scale::Linear, finer: Finer::Never, ticks, minor }
+    }
+
+    /// Its label where there is little room.
+    pub(super) fn short_label(&self) -> &str {
+        self.short_label.as_deref().unwrap_or(&self.label)
     }
 
     /// Place of a value, 0 at the low end and 1 at the high end.
@@ -194,6 +297,23 @@ fn multiples(step: f64, low: f64, high: f64) -> impl Iterator<Item = f64> {
     (first..=last).take(MAX_MULTIPLES).map(move |multiple| multiple as f64 * step)
 }
 
+/// Decimals that the multiples of a step need.
+fn decimals(step: f64) -> usize {
+    usize::try_from(-exponent(step)).unwrap_or(0)
+}
+
+/// A label for numbers that are those of the values over a power of ten: with it before the unit.
+fn with_power(label: &str, power: i32) -> String {
+    if power == 0 || label.is_empty() {
+        return label.to_owned();
+    }
+    let factor = power_of_ten(1.0, power);
+    match label.rsplit_once(" (") {
+        Some((what, unit)) if unit.ends_with(')') => format!("{what} ({factor} {unit}"),
+        _ => format!("{label} ({factor})"),
+    }
+}
+
 /// With a true minus sign, and none before zero.
 fn number(value: f64, decimals: usize) -> String {
     let digits = format!("{:.decimals$}", value.abs());
@@ -202,7 +322,8 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 fn plain_power(mantissa: f64, power: i32) -> String {
-    number(mantissa * libm::exp10(f64::from(power)), usize::try_from(-power).unwrap_or(0))
+    let more = i32::from(mantissa.fract() != 0.0);
+    number(mantissa * libm::exp10(f64::from(power)), usize::try_from(more - power).unwrap_or(0))
 }
 
 fn power_of_ten(mantissa: f64, power: i32) -> String {
@@ -273,6 +394,38 @@ mod tests {
                 assert!((1..=9).contains(&logarithmic.ticks.len()), "{low} {high}: {:?}", logarithmic.ticks);
             }
         }
+    }
+
+    #[test]
+    fn an_axis_with_one_or_two_numbers_gets_three_or_more() {
+        let enough = |axis: Axis| axis.with_enough_numbers();
+        assert_eq!(labels(&enough(Axis::logarithmic("", 40.0, 125.0))), ["40", "60", "80", "100"]);
+        assert_eq!(labels(&enough(Axis::logarithmic("", 0.012, 0.05))), ["0.015", "0.02", "0.03", "0.04"]);
+        assert_eq!(labels(&enough(Axis::logarithmic("", 0.3, 60.0))), ["0.5", "1", "2", "5", "10", "20", "50"]);
+        assert_eq!(labels(&enough(Axis::sparse("", 0.0, 78.0))), ["0", "20", "40", "60"]);
+        assert!(enough(Axis::few("", 0.0, 78.0)).minor.is_empty());
+        assert_eq!(labels(&enough(Axis::logarithmic("", 1.0, 1e5))).len(), 6, "it has enough");
+        assert_eq!(labels(&enough(Axis::categories("", &["one", "two"]))), ["one", "two"]);
+        for exponent in -12..12 {
+            for (start, span) in [(1.01, 3.2), (2.1, 3.2), (3.3, 10.0), (5.5, 3.2), (9.9, 11.0)] {
+                let low = start * libm::exp10(f64::from(exponent));
+                for axis in [Axis::logarithmic("", low, span * low), Axis::sparse("", low, span * low)] {
+                    let count = enough(axis).ticks.len();
+                    assert!((3..=9).contains(&count), "{low} {span}: {count}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_with_many_zeros_are_over_a_power_of_ten_that_the_label_shows() {
+        let axis = Axis::linear("Amplitude Δ (m)", 0.0, 4e-6);
+        assert_eq!((axis.label.as_str(), labels(&axis)), ("Amplitude Δ (10⁻⁶ m)", vec!["0", "1", "2", "3", "4"]));
+        let axis = Axis::linear("Kd (N/m)", 0.0, 4e7);
+        assert_eq!((axis.label.as_str(), labels(&axis)), ("Kd (10⁶ N/m)", vec!["0", "10", "20", "30", "40"]));
+        assert_eq!(Axis::linear("share", 0.0, 1e-5).label, "share (10⁻⁶)");
+        let axis = Axis::linear("Period T (s)", 0.0, 0.05);
+        assert_eq!((axis.label.as_str(), labels(&axis)[1]), ("Period T (s)", "0.01"));
     }
 
     #[test]

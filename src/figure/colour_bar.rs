@@ -1,9 +1,9 @@
 //! Colour bars: what the colours of a map mean, beside its frame.
 
 use super::axis::Axis;
-use super::frame::Frame;
+use super::frame::{Frame, fitting};
 use super::picture::{Anchor, Sheet};
-use super::style::{AXIS, LEGEND_TEXT, TICK_TEXT, shade};
+use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT, shade};
 use kuva::render::color::Color;
 
 /// Space right of a frame for the bar and its numbers.
@@ -54,6 +54,7 @@ impl<'a> ColourBar<'a> {
             }
         }
         let end = frame.right() + COLOUR_BAR - INSET;
-        sheet.text((end, top - 12.0), self.label, LEGEND_TEXT, Anchor::End);
+        let size = fitting(self.label, LEGEND_TEXT, end - frame.y_label_end() - GAP).unwrap_or(NOTE_TEXT);
+        sheet.text((end, top - 12.0), self.label, size, Anchor::End);
     }
 }

@@ -16,6 +16,11 @@ const MARGIN: f64 = 14.0;
 /// Between the number of a tick and the axis.
 const TICK_GAP: f64 = 8.0;
 
+/// Between the labels of neighbours.
+const LABEL_GAP: f64 = 12.0;
+/// Between a number and the edge of the sheet.
+const EDGE: f64 = 2.0;
+
 /// Space left of a frame for numbers.
 pub(super) const LEFT: f64 = 76.0;
 /// Space right of a frame.
@@ -32,6 +37,8 @@ const HEADING: f64 = 26.0;
 const LEGEND_ROW: f64 = 24.0;
 /// Distance of the lines of small print.
 const NOTE_ROW: f64 = 16.0;
+/// Of the label of the y axis over the frame or its heading.
+const Y_LABEL_RISE: f64 = 13.0;
 /// Shortest side of a frame; a sheet that is asked to be smaller becomes larger.
 const SHORTEST: f64 = 60.0;
 
@@ -70,7 +77,7 @@ impl<'a> Layout<'a> {
 
         let right = total - MARGIN;
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
-        let notes = wrapped(&look.note, right - MARGIN);
+        let notes = if look.style.has_small_print() { wrapped(&look.note, right - MARGIN) } else { Vec::new() };
         let rows = self.heights.len() as f64;
         let heading = if self.has_headings { HEADING } else { 0.0 };
         let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
@@ -83,7 +90,7 @@ impl<'a> Layout<'a> {
         let heights: Vec<f64> = self.heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
         let frames: f64 = heights.iter().sum();
 
-        let mut sheet = Sheet::new(name, look.style, (total, frames + around));
+        let mut sheet = Sheet::new(name, look, (total, frames + around));
         draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
@@ -97,6 +104,7 @@ impl<'a> Layout<'a> {
             row_gap: self.row_gap,
             top,
             heading,
+            end: right,
         };
         (page, sheet)
     }
@@ -126,6 +134,8 @@ pub(super) struct Page {
     row_gap: f64,
     top: f64,
     heading: f64,
+    /// Where texts end.
+    end: f64,
 }
 
 impl Page {
@@ -134,8 +144,14 @@ impl Page {
         let above: f64 = self.heights[..row].iter().map(|height| height + self.row_gap + self.heading).sum();
         let is_alone = self.columns * self.heights.len() == 1;
         let letter = u8::try_from(row * self.columns + column).ok().and_then(|index| b'a'.checked_add(index));
+        let start = |column: usize| MARGIN + column as f64 * (self.width + self.column_gap);
+        // The same in all columns, so that they are labelled alike.
+        let end = if self.columns > 1 { self.end.min(start(column + 1) - LABEL_GAP) } else { self.end };
         Frame {
-            left: LEFT + column as f64 * (self.width + self.column_gap),
+            left: start(column) - MARGIN + LEFT,
+            room: (start(column), end),
+            // Over headings there is one for a row.
+            y_label_end: if self.heading > 0.0 { self.end } else { end },
             top: self.top + above + self.heading,
             width: self.width,
             height: self.heights[row],
@@ -161,6 +177,10 @@ pub(super) struct Frame {
     pub(super) height: f64,
     pub(super) x: Axis,
     pub(super) y: Axis,
+    /// Where the label of the x axis may lie.
+    room: (f64, f64),
+    /// Where that of the y axis ends at the latest.
+    y_label_end: f64,
     heading: f64,
     letter: Option<char>,
     /// Whether it has the numbers and the label of the x axis.
@@ -253,12 +273,14 @@ impl Frame {
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
     pub(super) fn axes(&self, sheet: &mut Sheet) {
         let (right, bottom) = (self.right(), self.bottom());
-        for (value, length) in ticks(&self.x) {
+        let style = sheet.style();
+        let (x_axis, y_axis) = (style.numbered(&self.x, self.width), style.numbered(&self.y, self.height));
+        for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
             sheet.line(vec![(x, self.top), (x, self.top + length)], AXIS);
         }
-        for (value, length) in ticks(&self.y) {
+        for (value, length) in ticks(&y_axis) {
             let y = self.y_of(value);
             sheet.line(vec![(self.left, y), (self.left + length, y)], AXIS);
             sheet.line(vec![(right, y), (right - length, y)], AXIS);
@@ -268,39 +290,48 @@ impl Frame {
             sheet.line(vec![corners[corner], corners[(corner + 1) % 4]], AXIS);
         }
         let height = f64::from(TICK_TEXT);
-        // Where a frame is small, numbers that would meet their neighbours are left out.
+        // Where a frame is small, numbers that would meet their neighbours are left out, and those that would be cut.
         let mut free = f64::INFINITY;
-        for (value, number) in &self.y.ticks {
+        for (value, number) in &y_axis.ticks {
             let y = self.y_of(*value);
             if y <= free {
-                sheet.centred_text((self.left - TICK_GAP, y), number, TICK_TEXT, Anchor::End);
+                let size = fitting(number, TICK_TEXT, LEFT - TICK_GAP - EDGE).unwrap_or(NOTE_TEXT);
+                sheet.centred_text((self.left - TICK_GAP, y), number, size, Anchor::End);
                 free = y - 1.1 * height;
             }
         }
-        let mut free = f64::NEG_INFINITY;
-        for (value, number) in self.x.ticks.iter().filter(|_| self.is_lowest) {
+        let mut free = EDGE;
+        for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
-            if x - half >= free {
+            if x - half >= free && x + half <= sheet.width() - EDGE {
                 sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
             }
         }
-        self.y_label(sheet);
+        let (label, size) = self.y_label();
+        if !label.is_empty() {
+            sheet.text((self.room.0, self.top - self.heading - Y_LABEL_RISE), &label, size, Anchor::Start);
+        }
         if self.is_lowest {
-            let place = (self.left + 0.5 * self.width, bottom + UNDER - 12.0);
-            sheet.text(place, &self.x.label, LABEL_TEXT, Anchor::Middle);
+            let (start, end) = self.room;
+            let (label, size) = fitted_label("", &self.x, end - start);
+            let half = 0.5 * font::width(&label, size);
+            let middle = (self.left + 0.5 * self.width).min(end - half).max(start + half);
+            sheet.text((middle, bottom + UNDER - 12.0), &label, size, Anchor::Middle);
         }
     }
 
-    /// Letter and label of the y axis, above its numbers; the letter of a frame with a heading goes there.
-    fn y_label(&self, sheet: &mut Sheet) {
-        let letter = self.letter.filter(|_| self.heading == 0.0).map(|letter| format!("({letter})"));
-        let parts = [letter.as_deref(), Some(self.y.label.as_str()).filter(|label| !label.is_empty())];
-        let label = parts.into_iter().flatten().collect::<Vec<_>>().join(" ");
-        if !label.is_empty() {
-            let place = (self.left - LEFT + MARGIN, self.top - self.heading - 13.0);
-            sheet.text(place, &label, LABEL_TEXT, Anchor::Start);
-        }
+    /// Letter and label of the y axis, above its numbers, and their size; the letter of a frame with a heading goes there.
+    fn y_label(&self) -> (String, u32) {
+        let letter =
+            self.letter.filter(|_| self.heading == 0.0).map(|letter| format!("({letter}) ")).unwrap_or_default();
+        fitted_label(&letter, &self.y, self.y_label_end - self.room.0)
+    }
+
+    /// Where the label of the y axis ends.
+    pub(super) fn y_label_end(&self) -> f64 {
+        let (label, size) = self.y_label();
+        self.room.0 + font::width(&label, size)
     }
 
     /// What the frame shows, above it, after its letter; at the right end, how much of it.
@@ -309,9 +340,34 @@ impl Frame {
         if let Some(letter) = self.letter {
             sheet.text((self.left - LEFT + MARGIN, y), &format!("({letter})"), LABEL_TEXT, Anchor::Start);
         }
-        sheet.text((self.left, y), text, LEGEND_TEXT, Anchor::Start);
+        let taken = if amount.is_empty() { 0.0 } else { font::width(amount, LEGEND_TEXT) + LABEL_GAP };
+        let end = if amount.is_empty() { self.room.1 } else { self.right() };
+        let (text, size) = fitted(text, LEGEND_TEXT, end - taken - self.left);
+        sheet.text((self.left, y), &text, size, Anchor::Start);
         sheet.text((self.right(), y), amount, LEGEND_TEXT, Anchor::End);
     }
+}
+
+/// The largest size, up to one, at which a text fits a width; `None` if it would be smaller than small print.
+pub(super) fn fitting(text: &str, size: u32, room: f64) -> Option<u32> {
+    (NOTE_TEXT..=size).rev().find(|&size| font::width(text, size) <= room)
+}
+
+/// A text and its size, up to one: smaller where there is little room, and cut at worst.
+fn fitted(text: &str, size: u32, room: f64) -> (String, u32) {
+    if let Some(size) = fitting(text, size, room) {
+        return (text.to_owned(), size);
+    }
+    let mut cut = text.to_owned();
+    while cut.pop().is_some() && font::width(&format!("{cut}…"), NOTE_TEXT) > room {}
+    (format!("{}…", cut.trim_end()), NOTE_TEXT)
+}
+
+/// The label of an axis after a letter, in short where there is little room, and its size.
+fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
+    let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
+    let label = if font::width(&long, LABEL_TEXT) <= room { long } else { short };
+    fitted(label.trim_end(), LABEL_TEXT, room)
 }
 
 /// A short text in a frame, on the ground that it needs to be read.
@@ -353,6 +409,47 @@ mod tests {
             assert!(found.width > 15.0 && found.height > 15.0);
         }
         assert!((drawn(Style::Print, None).width - 86.0).abs() < 1e-9);
+    }
+
+    /// The text elements of a small figure: where each starts and ends, and what it says.
+    fn texts(style: Style, (width, height): (f64, f64), x: &Axis, y: &Axis) -> (f64, Vec<(f64, f64, String)>) {
+        let look = Look { style, size: Some(Size { width, height }), note: "Sweep test".to_owned() };
+        let layout = Layout { columns: 2, column_gap: LEFT, ..Layout::column(300.0, &[200.0], ROW_GAP, RIGHT) };
+        let (page, mut sheet) = layout.page("", &look, &[]);
+        for column in 0..2 {
+            let frame = page.frame(0, column, x.clone(), y.clone());
+            frame.axes(&mut sheet);
+            frame.heading(&mut sheet, "set with a long name, of which much is to be said", "");
+        }
+        (sheet.width(), sheet.texts())
+    }
+
+    #[test]
+    fn labels_and_numbers_of_small_figures_are_neither_cut_nor_overlap() {
+        let long = "Standard deviation of the intervals between slips, tau_sd (s)";
+        let x = Axis::linear(long, 0.0, 1000.0);
+        let y = Axis::logarithmic(long, 3e-9, 8e-9).with_short_label(Some("tau_sd (s)".to_owned()));
+        for size in [(60.0, 40.0), (86.0, 60.0), (178.0, 60.0)] {
+            let (width, texts) = texts(Style::Print, size, &x, &y);
+            assert!(texts.iter().all(|(start, end, _)| *start >= 0.0 && *end <= width), "{width} {texts:?}");
+            let is_label = |text: &str| text.starts_with('(') && text.contains("tau");
+            let kinds: [&dyn Fn(&str) -> bool; 3] =
+                [&is_label, &|text| text.starts_with("Standard"), &|text| text.starts_with("set")];
+            for is_of_kind in kinds {
+                let row: Vec<_> = texts.iter().filter(|(_, _, text)| is_of_kind(text)).collect();
+                assert!(row.len() == 2 && row[0].1 < row[1].0, "{row:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn print_has_no_small_print_and_enough_numbers() {
+        let (x, y) = (Axis::logarithmic("x", 40.0, 125.0), Axis::sparse("y", 0.0, 78.0));
+        let of = |style| texts(style, (120.0, 80.0), &x, &y).1;
+        let has = |texts: &[(f64, f64, String)], wanted: &str| texts.iter().any(|(_, _, text)| text == wanted);
+        let (screen, print) = (of(Style::Screen), of(Style::Print));
+        assert!(has(&screen, "Sweep test") && !has(&print, "Sweep test"));
+        assert!(!has(&screen, "80") && has(&print, "80") && has(&print, "20"), "{print:?}");
     }
 
     #[test]

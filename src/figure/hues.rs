@@ -13,7 +13,6 @@ const WIDE: f64 = 20.0;
 
 /// How the values of a quantity become colours.
 pub(super) struct Hues {
-    label: String,
     kind: Kind,
 }
 
@@ -34,7 +33,7 @@ impl Hues {
         } else {
             Kind::Scale(scale(label, &values))
         };
-        Self { label: label.to_owned(), kind }
+        Self { kind }
     }
 
     /// The ink of a value.
@@ -63,7 +62,7 @@ impl Hues {
     pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
         let Kind::Scale(axis) = &self.kind else { return None };
         let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
-        Some(ColourBar { label: &self.label, colours: SCALE.map(Color::from).to_vec(), ticks })
+        Some(ColourBar { label: &axis.label, colours: SCALE.map(Color::from).to_vec(), ticks })
     }
 
     /// Space that they need right of the frames.

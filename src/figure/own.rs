@@ -7,8 +7,8 @@ use super::hues::Hues;
 use super::legend::{Mark, entry};
 use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
 use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
-use super::values::Values;
 pub use super::values::columns;
+use super::values::{FREQUENCY_COLUMN, Values};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 
@@ -182,7 +182,8 @@ impl Asked<'_> {
                 let count = self.values.words.len();
                 return Err(self.refuse(format!("has {count} words, and {MAX_WORDS} fit an axis; take another column")));
             }
-            return Ok(self.values.categories(&label));
+            let short_label = self.label.is_none().then(|| self.values.short_label());
+            return Ok(self.values.categories(&label).with_short_label(short_label));
         }
         if self.is_log && [self.limits.0, self.limits.1].into_iter().flatten().any(|end| end <= 0.0) {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
@@ -203,7 +204,9 @@ impl Asked<'_> {
                 self.refuse_limits("the lower end must be less than the upper; with one end given, than the data's")
             );
         }
-        Ok(if self.is_log { Axis::logarithmic(&label, low, high) } else { Axis::linear(&label, low, high) })
+        let axis = if self.is_log { Axis::logarithmic } else { Axis::linear };
+        let short_label = self.label.is_none().then(|| axis(&self.values.short_label(), low, high).label);
+        Ok(axis(&label, low, high).with_short_label(short_label).with_enough_numbers())
     }
 }
 
@@ -225,12 +228,7 @@ fn hues(values: &Values) -> Result<Hues, FigureError> {
         let problem = "no set has a value of it".to_owned();
         return Err(FigureError::Option { option: "colour", value: values.column.name.to_string(), problem });
     };
-    let label = if values.column.unit.is_empty() {
-        values.column.name.to_string()
-    } else {
-        format!("{} ({})", values.column.name, values.column.unit)
-    };
-    Ok(Hues::of(&label, values.numbers.iter().copied().flatten(), |value| values.setting(value)))
+    Ok(Hues::of(&values.short_label(), values.numbers.iter().copied().flatten(), |value| values.setting(value)))
 }
 
 /// The sets of each panel and its title.
@@ -262,9 +260,9 @@ fn layout(panels: usize, right: f64) -> Layout<'static> {
     Layout { columns, column_gap: LEFT, has_headings: true, ..Layout::column(PANEL_WIDTH, heights, 26.0, right) }
 }
 
-/// Sets that differ in the x axis alone, if that is a parameter or η, in the order of x.
+/// Sets that differ in the x axis alone, if that is a parameter, η or 1/T, in the order of x.
 fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<usize>> {
-    let symbol = if x_name == "eta" { Some(Symbol::T) } else { Symbol::from_key(x_name) };
+    let symbol = if ["eta", FREQUENCY_COLUMN].contains(&x_name) { Some(Symbol::T) } else { Symbol::from_key(x_name) };
     let Some(symbol) = symbol else { return Vec::new() };
     let others = |set: usize| {
         let others = Symbol::ALL.into_iter().filter(|other| *other != symbol && *other != Symbol::Seed);
@@ -371,7 +369,7 @@ pub(super) mod tests {
     #[test]
     fn each_option_changes_what_it_says() {
         let plain = svg(&figure());
-        assert!(plain.contains(">Drive velocity V₀ (m/s)<") && plain.contains(">Mean interval, tau_mean (s)<"));
+        assert!(plain.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && plain.contains(">Mean interval, tau_mean (s)<"));
         let bars = |svg: &str| svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#)).count();
         let no_interval = OwnFigure { y: "eta".to_owned(), ..figure() };
         assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
@@ -380,7 +378,7 @@ pub(super) mod tests {
         let colour = svg(&OwnFigure { colour: Some("Delta".to_owned()), ..figure() });
         assert!(colour.contains(">Δ = 0 m<") && colour.contains(">Δ = 1e-6 m<") && colour.contains(INKS[1]));
         let scale = svg(&OwnFigure { colour: Some("V0".to_owned()), ..figure() });
-        assert!(scale.contains(">V0 (m/s)<") && !scale.contains("V0 = "));
+        assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = "));
         let panels = svg(&OwnFigure { panels: Some("Delta".to_owned()), ..figure() });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0 m<"));
         let limits = svg(&OwnFigure { x_limits: (Some(1e-6), Some(1e-5)), ..figure() });
@@ -432,6 +430,12 @@ pub(super) mod tests {
         let sets: Vec<usize> = (0..8).collect();
         assert_eq!(lines(&rows, "V0", &sets, &x), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
         assert!(lines(&rows, "tau_mean", &sets, &x).is_empty() && lines(&rows, "Delta", &sets, &x).is_empty());
+        let mut periods = vec![rows[0].clone(); 3];
+        for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
+            row.parameters.parameters.modulation_period = Some(period);
+        }
+        let x = Values::of(&periods, "x", "frequency").unwrap();
+        assert_eq!(lines(&periods, "frequency", &[0, 1, 2], &x), [vec![2, 0, 1]]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::FigureError;
 use super::pdf::pdf;
-use super::style::{BLACK, HALF_DIGIT, Size, Style};
+use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
@@ -16,6 +16,7 @@ const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 pub struct Picture {
     name: String,
     style: Style,
+    note: String,
     scene: Scene,
 }
 
@@ -52,6 +53,13 @@ impl Picture {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Its small print, which print leaves to the caption.
+    #[must_use]
+    pub fn note(&self) -> String {
+        // Lines may be broken anywhere there.
+        self.note.replace('\u{a0}', " ")
     }
 
     /// Width and height in mm.
@@ -120,6 +128,7 @@ impl Picture {
 pub(super) struct Sheet {
     name: String,
     style: Style,
+    note: String,
     scene: Scene,
     clips: usize,
 }
@@ -173,15 +182,39 @@ pub(super) struct Fill {
 }
 
 impl Sheet {
-    pub(super) fn new(name: &str, style: Style, (width, height): (f64, f64)) -> Self {
+    pub(super) fn new(name: &str, look: &Look, (width, height): (f64, f64)) -> Self {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
         scene.text_color = Some(BLACK.to_owned());
-        Self { name: name.to_owned(), style, scene, clips: 0 }
+        Self { name: name.to_owned(), style: look.style, note: look.note.clone(), scene, clips: 0 }
+    }
+
+    pub(super) const fn style(&self) -> Style {
+        self.style
+    }
+
+    pub(super) const fn width(&self) -> f64 {
+        self.scene.width
+    }
+
+    /// Where each text starts and ends, and what it says.
+    #[cfg(test)]
+    pub(super) fn texts(&self) -> Vec<(f64, f64, String)> {
+        let text = |primitive: &Primitive| {
+            let Primitive::Text { x, content, size, anchor, .. } = primitive else { return None };
+            let width = super::font::width(content, *size);
+            let start = match anchor {
+                Anchor::Start => *x,
+                Anchor::Middle => x - 0.5 * width,
+                Anchor::End => x - width,
+            };
+            Some((start, start + width, content.clone()))
+        };
+        self.scene.elements.iter().filter_map(text).collect()
     }
 
     pub(super) fn finish(self) -> Picture {
-        Picture { name: self.name, style: self.style, scene: self.scene }
+        Picture { name: self.name, style: self.style, note: self.note, scene: self.scene }
     }
 
     pub(super) fn line(&mut self, points: Vec<(f64, f64)>, stroke: Stroke) {

@@ -7,6 +7,8 @@ use crate::reduce::SetSummary;
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
 pub(super) const MICROMETRES: f64 = 1e6;
+/// Label of an axis of frequencies.
+pub(super) const FREQUENCY: &str = "Modulation frequency 1/T (Hz)";
 
 /// Parameters other than those of the modulation in which sets differ.
 pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {
@@ -216,7 +218,7 @@ impl Periods {
         let label = match (is_inverse, free) {
             (false, None) => "Modulation period T (s)",
             (false, Some(_)) => "Modulation period T / τ₀",
-            (true, None) => "Modulation frequency 1/T (Hz)",
+            (true, None) => FREQUENCY,
             (true, Some(_)) => "Modulation frequency τ₀ / T",
         };
         let mut axis = Self { grid: Grid::of(vec![1.0]), label, is_inverse, unit: free.unwrap_or(1.0) };

@@ -1,6 +1,7 @@
 //! The look of all figures: paper, sizes of text, strokes, colours. Lengths on a sheet are units, of which a style says how
 //! long they are: text has the same size in every figure, whatever the size of the sheet.
 
+use super::axis::Axis;
 use super::picture::{Dot, Fill, Ink, Stroke};
 use kuva::render::color::Color;
 use std::str::FromStr;
@@ -11,7 +12,7 @@ pub enum Style {
     /// Pages and slides: 192 pixels per inch, as large as the data need.
     #[default]
     Screen,
-    /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch.
+    /// Journals: labels of 8 pt, lines from 0.5 pt, one or two columns wide, 600 pixels per inch; no small print.
     Print,
 }
 
@@ -36,6 +37,19 @@ impl Style {
         match self {
             Self::Screen => 2.0,
             Self::Print => 3.5,
+        }
+    }
+
+    /// Whether parameters stand under figures; a journal has them in the caption.
+    pub(super) const fn has_small_print(self) -> bool {
+        matches!(self, Self::Screen)
+    }
+
+    /// An axis of this length with the numbers that it needs on a small figure, and ticks that can be distinguished.
+    pub(super) fn numbered(self, axis: &Axis, length: f64) -> Axis {
+        match self {
+            Self::Screen => axis.clone(),
+            Self::Print => axis.clone().with_enough_numbers().without_dense_ticks(length),
         }
     }
 
@@ -105,7 +119,7 @@ pub struct Look {
     pub style: Style,
     /// Their size; as the data need if it is not given.
     pub size: Option<Size>,
-    /// Small print under them.
+    /// Small print under them, or in the caption.
     pub note: String,
 }
 

@@ -1,17 +1,32 @@
-//! Columns of the table of sets as numbers for axes, colours and panels: words become places in their order.
+//! Columns of the sets as numbers for axes, colours and panels: words become places in their order. Beside those of the
+//! table there is the frequency, which follows from a parameter.
 
 use super::FigureError;
 use super::axis::Axis;
-use super::sets::{symbol_of, three_digits};
+use super::sets::{FREQUENCY, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
-use crate::table::columns::{Cell, Column, Kind, Row};
+use crate::table::columns::{Cell, Column, Kind, Row, columns};
 
 /// Longest meaning that goes into the label of an axis.
 const LONGEST: usize = 40;
 
-/// A column of the table of sets.
+/// Name of the column of frequencies.
+pub(super) const FREQUENCY_COLUMN: &str = "frequency";
+
+columns! {
+    /// What figures show of a set that the table of sets leaves to its parameters.
+    #[derive(Clone, Copy, Debug)]
+    struct Derived {
+        frequency: Option<f64> = "Hz", "modulation frequency 1/T; null without modulation";
+    }
+}
+
+/// What figures show of a set.
+type Shown<'a> = (&'a SetRow, Derived);
+
+/// A column of the sets.
 pub(super) struct Values {
     pub(super) column: Column,
     /// A number for each set; of a word its place among the words.
@@ -22,10 +37,10 @@ pub(super) struct Values {
     pub(super) words: Vec<String>,
 }
 
-/// The columns of the table of sets.
+/// The columns of the sets that can be drawn.
 #[must_use]
 pub fn columns() -> Vec<Column> {
-    SetRow::columns()
+    Shown::columns()
 }
 
 impl Values {
@@ -61,12 +76,28 @@ impl Values {
 
     /// Its label on an axis, with the unit.
     pub(super) fn label(&self) -> String {
-        let Column { name, unit, meaning, .. } = &self.column;
+        let Column { name, meaning, .. } = &self.column;
+        if name == FREQUENCY_COLUMN {
+            return FREQUENCY.to_owned();
+        }
         let label = match Symbol::from_key(name) {
-            Some(symbol) => format!("{} {}", capitalised(meaning), symbol_of(symbol)),
+            Some(symbol) => {
+                let what = meaning.split([',', ';']).next().unwrap_or_default();
+                format!("{} {}", capitalised(what), symbol_of(symbol))
+            }
             None if meaning.len() <= LONGEST => format!("{}, {name}", capitalised(meaning)),
             None => name.to_string(),
         };
+        self.with_unit(label)
+    }
+
+    /// The same with the symbol or the name alone.
+    pub(super) fn short_label(&self) -> String {
+        self.with_unit(self.name())
+    }
+
+    fn with_unit(&self, label: String) -> String {
+        let unit = self.column.unit;
         if unit.is_empty() { label } else { format!("{label} ({unit})") }
     }
 
@@ -77,8 +108,10 @@ impl Values {
 
     /// Its symbol in the paper, or its name.
     pub(super) fn name(&self) -> String {
-        let name = &self.column.name;
-        Symbol::from_key(name).map_or_else(|| name.to_string(), symbol_of)
+        match &*self.column.name {
+            FREQUENCY_COLUMN => "1/T".to_owned(),
+            name => Symbol::from_key(name).map_or_else(|| name.to_owned(), symbol_of),
+        }
     }
 
     fn word(&self, value: f64) -> String {
@@ -114,7 +147,8 @@ impl Given {
 
 fn number_cells(row: &SetRow) -> Vec<Option<Given>> {
     let mut cells = Vec::new();
-    row.cells(&mut |cell| {
+    let frequency = row.parameters.modulation_period.map(|period| 1.0 / period);
+    (row, Derived { frequency }).cells(&mut |cell| {
         cells.push(match cell {
             Cell::Null => None,
             Cell::Real(real) => Some(Given::Number(real)),
@@ -159,6 +193,16 @@ mod tests {
     }
 
     #[test]
+    fn the_frequency_is_that_of_the_period_and_absent_without_modulation() {
+        let rows = super::super::own::tests::rows(2);
+        let frequency = Values::of(&rows, "x", FREQUENCY_COLUMN).unwrap();
+        assert_eq!(frequency.numbers, [Some(50.0), None]);
+        assert_eq!(frequency.label(), "Modulation frequency 1/T (Hz)");
+        assert_eq!(frequency.setting(50.0), "1/T = 50 Hz");
+        assert!(columns().iter().any(|column| column.name == FREQUENCY_COLUMN && column.unit == "Hz"));
+    }
+
+    #[test]
     fn an_unknown_column_is_named_with_the_nearest() {
         let error = |name: &str| Values::of(&[], "y", name).err().unwrap().to_string();
         assert!(error("tau_men").contains("--y tau_men") && error("tau_men").contains("did you mean tau_mean?"));
@@ -171,5 +215,8 @@ mod tests {
         assert_eq!(label("V0"), "Drive velocity V₀ (m/s)");
         assert_eq!(label("tau_mean"), "Mean interval, tau_mean (s)");
         assert_eq!(label("startup_p"), "startup_p");
+        assert_eq!(label("Delta"), "Amplitude of the modulation Δ (m)");
+        let short = |name: &str| Values::of(&[], "x", name).unwrap().short_label();
+        assert_eq!(["Delta", "tau_mean", "locked"].map(short), ["Δ (m)", "tau_mean (s)", "locked"]);
     }
 }

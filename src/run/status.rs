@@ -3,10 +3,12 @@
 use crate::results::events::RunEvent;
 use crate::results::parts::Unfinished;
 use crate::results::rounds::RoundsSoFar;
+use crate::results::tables::{self, JobOutcome};
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::share::Share;
 use crate::sweep::{Outline, Part};
+use crate::table::columns::columns;
 use serde::Serialize;
 use std::time::SystemTime;
 
@@ -149,6 +151,33 @@ fn overview_and_failures(results: &Results<'_>, max_failures: usize) -> Result<(
     })?;
     overview.jobs_kept = jobs_kept(&share);
     Ok((overview, failures))
+}
+
+columns! {
+    /// How a job ended.
+    struct OutcomeAlone {
+        outcome: JobOutcome;
+    }
+}
+
+impl Status {
+    /// How many jobs of the tables ended without a slip, and how many were run to an end.
+    ///
+    /// # Errors
+    /// When the table of jobs cannot be read.
+    pub fn jobs_without_slips(results: &Results<'_>) -> Result<(u64, u64), ResultsError> {
+        let count = || -> Result<(u64, u64), ResultsError> {
+            let (mut without, mut ended) = (0, 0);
+            for batch in results.layout().dataset(tables::JOBS)?.rows::<OutcomeAlone>() {
+                for OutcomeAlone { outcome } in batch? {
+                    without += u64::from(outcome == JobOutcome::NoSlips);
+                    ended += u64::from(outcome != JobOutcome::Failed);
+                }
+            }
+            Ok((without, ended))
+        };
+        results.layout().read_tables(count)?
+    }
 }
 
 /// Looks through a directory.

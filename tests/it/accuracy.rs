@@ -38,7 +38,7 @@ fn scaling_writes_what_it_prints() {
 #[test]
 fn scaling_takes_no_option_of_the_study() {
     let folder = Folder::new();
-    for option in ["--hard-cases", "--seeds 3", "--slips 3"] {
+    for option in ["--hard-cases", "--seeds 3", "--slips 3", "--threads 3"] {
         let ended = folder.ends(2, &format!("accuracy --scaling {option}"));
         assert!(ended.stderr.contains("cannot be used with"), "{}", ended.stderr);
     }
@@ -82,10 +82,10 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
 fn a_set_of_flags_is_studied_as_text() {
     let folder = Folder::new();
     let flags = "--set N=9 --set Ns=5 --set M=0.006 --set K=7e7 --set Kd=1e8 --set Delta=1e-6 --set frequency=58";
-    let text = folder.ends(0, &format!("accuracy --quick --seeds 1 --slips 3 --out mine {flags}")).stdout;
+    let text = folder.ends(0, &format!("accuracy --quick --seeds 1 --slips 3 --threads 1 --out mine {flags}")).stdout;
     assert!(text.contains("\nV0 = 1e-4 m/s, Delta = 1e-6 m, 1/T = 58 Hz, N = 9, Ns = 5"), "{text}");
     assert!(
-        text.contains("phase (rad)") && text.contains("front_speed (%)") && text.contains(" biases show"),
+        text.contains("phase (rad)") && text.contains("front_speed (%)") && text.contains(" show a bias of the mean"),
         "{text}"
     );
 }

@@ -70,23 +70,28 @@ fn each_option_of_a_figure_changes_what_it_says() {
         fs::read_to_string(folder.path("own.svg")).unwrap()
     };
     let plain = svg("");
-    for text in ["Drive velocity V₀ (m/s)", "Mean interval, tau_mean (s)", "Sweep own"] {
+    for text in ["Drive velocity V₀ (10⁻³ m/s)", "Mean interval, tau_mean (s)", "Sweep own"] {
         assert!(plain.contains(text), "{text}");
     }
     for (options, text) in [
         ("--log xy", ">10⁻⁴<"),
         ("--log y --ylim 1e-4:10", ">10⁻³<"),
         ("--colour Delta", ">Δ = 1e-6 m<"),
-        ("--colour V0", ">V0 (m/s)<"),
+        ("--colour frequency", ">1/T = 90 Hz<"),
+        ("--colour V0", ">V₀ (m/s)<"),
         ("--panels Delta", ">(b)<"),
         ("--xlim 1e-5:1e-4", "not shown: 10 of 16 sets"),
-        ("--xlabel speed", ">speed<"),
+        ("--xlabel speed", ">speed (10⁻³)<"),
         ("--ylabel τ", ">τ<"),
         ("--style print", r#"width="86.00mm""#),
         ("--size 100mmx90mm --style print", r#"width="100.00mm" height="90.00mm""#),
     ] {
         assert!(svg(options).contains(text) && !plain.contains(text), "{options}: {text}");
     }
+    // A journal has the small print in the caption.
+    assert!(!svg("--style print").contains("Sweep own"));
+    let print = folder.ends(0, "plot r --x V0 --y tau_mean -o own.svg --style print");
+    assert!(print.stderr.starts_with("for the caption: Sweep own; N = 3"), "{}", print.stderr);
     // Joined sets, bars and dots have the same numbers in print.
     let dots = |svg: &str| svg.matches("<circle").count() + svg.matches("<use").count();
     assert_eq!(dots(&svg("--style print")), dots(&plain));

@@ -48,7 +48,9 @@ def drag(results: Path) -> Section:
         ", ".join(texts),
         *followed,
     )
-    section.remark(f"Hysteresis, the mean n while T falls less that while T rises: {'; '.join(memories)}.")
+    section.remark(
+        "Hysteresis is the mean n while T falls minus that while T rises.", f"It is {'; '.join(memories)}."
+    )
     return section
 
 
