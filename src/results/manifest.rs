@@ -171,7 +171,7 @@ impl Manifest {
             return Err("it keeps points of other sweeps than the earlier ones");
         }
         if !self.extensions.iter().all(|record| record.part_cost.is_finite() && record.part_cost >= 0.0) {
-            return Err("the cost of a part is none");
+            return Err("the cost of a part makes no sense");
         }
         let is_ordered = |kept: &Vec<RangeInclusive<u64>>| {
             kept.iter().all(|range| range.start() <= range.end())
