@@ -6,7 +6,7 @@ use super::frame::{Frame, Layout, RIGHT};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Picture, Sheet, Stroke};
 use super::scatter::Scatter;
-use super::sets::Grid;
+use super::sets::{ETA, Grid};
 use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetSummary};
@@ -50,7 +50,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummar
     ]);
     let right = if density.is_some() { COLOUR_BAR } else { RIGHT };
     let (page, mut sheet) = Layout::column(WIDTH, HEIGHTS, 0.0, right).page("phi-eta", look, &entries);
-    let x = Axis::logarithmic("η = 2πΔ / (T V₀)", low, high);
+    let x = Axis::logarithmic(ETA, low, high);
     let (low, high) = angle_bounds(slips.ys());
     let frame = page.frame(0, 0, x, Axis::angle("Phase φ (rad)", low, high));
 

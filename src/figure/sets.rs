@@ -9,6 +9,8 @@ const EVEN: f64 = 0.02;
 pub(super) const MICROMETRES: f64 = 1e6;
 /// Label of an axis of frequencies.
 pub(super) const FREQUENCY: &str = "Modulation frequency 1/T (Hz)";
+/// Label of an axis of η.
+pub(super) const ETA: &str = "η = 2πΔ / (T V₀)";
 
 /// Parameters other than those of the modulation in which sets differ.
 pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {

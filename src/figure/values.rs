@@ -3,7 +3,7 @@
 
 use super::FigureError;
 use super::axis::Axis;
-use super::sets::{FREQUENCY, symbol_of, three_digits};
+use super::sets::{ETA, FREQUENCY, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
@@ -77,8 +77,10 @@ impl Values {
     /// Its label on an axis, with the unit.
     pub(super) fn label(&self) -> String {
         let Column { name, meaning, .. } = &self.column;
-        if name == FREQUENCY_COLUMN {
-            return FREQUENCY.to_owned();
+        match &**name {
+            FREQUENCY_COLUMN => return FREQUENCY.to_owned(),
+            "eta" => return ETA.to_owned(),
+            _ => (),
         }
         let label = match Symbol::from_key(name) {
             Some(symbol) => {
@@ -110,6 +112,7 @@ impl Values {
     pub(super) fn name(&self) -> String {
         match &*self.column.name {
             FREQUENCY_COLUMN => "1/T".to_owned(),
+            "eta" => "η".to_owned(),
             name => Symbol::from_key(name).map_or_else(|| name.to_owned(), symbol_of),
         }
     }
@@ -198,6 +201,7 @@ mod tests {
         let frequency = Values::of(&rows, "x", FREQUENCY_COLUMN).unwrap();
         assert_eq!(frequency.numbers, [Some(50.0), None]);
         assert_eq!(frequency.label(), "Modulation frequency 1/T (Hz)");
+        assert_eq!(Values::of(&rows, "x", "eta").unwrap().label(), "η = 2πΔ / (T V₀)");
         assert_eq!(frequency.setting(50.0), "1/T = 50 Hz");
         assert!(columns().iter().any(|column| column.name == FREQUENCY_COLUMN && column.unit == "Hz"));
     }

@@ -16,6 +16,8 @@ from conftest import ROOT
 CHEAP = ("choices", "contacts", "drag", "drag-strong", "velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "speed-against-error.png"}
+#: Figures of one's own: what `stickslip plot` is given, as by scripts/reproduce.
+OWN = {"fig3-precise": "--x eta --y phase_mean --colour V0 --log x"}
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,6 @@ def test_results_that_are_there_give_their_pictures_again(stickslip, tmp_path, s
         pytest.skip(f"{results} is not there; scripts/reproduce {sweep} makes it")
     for folder in ("reduced", "run"):
         shutil.copytree(results / folder, tmp_path / folder)
-    stickslip("plot", tmp_path)
+    stickslip("plot", tmp_path, *OWN.get(sweep, "").split())
     for picture in pictures_of(sweep):
         picture.assert_drawn(tmp_path)
