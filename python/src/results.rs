@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, StartupRow};
+use stickslip::reduce::{BackboneBin, CellRow, HistogramBin, Point, SetInRounds, SetRow, StartupRow};
 use stickslip::results::layout::Layout;
 use stickslip::results::parts::committed_files;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, PrecursorRow, SLIPS, SlipRow};
@@ -63,7 +63,11 @@ pub fn read(
     columns: Option<Vec<String>>,
     join: bool,
 ) -> PyResult<Table> {
+    let layout = Layout::new(&Disk, &directory);
     let own = match table {
+        SetRow::NAME if Results::read(&layout).map_err(Error::from)?.round().is_some() => {
+            (SetRow::NAME, schema::<SetInRounds>())
+        }
         SLIPS => (SLIPS, schema::<SlipRow<'_>>()),
         PRECURSORS => (PRECURSORS, schema::<PrecursorRow<'_>>()),
         JOBS => (JOBS, schema::<JobRow>()),
@@ -73,7 +77,6 @@ pub fn read(
     let found = watched::<_, ()>(
         py,
         |stop, _| {
-            let layout = Layout::new(&Disk, &directory);
             let results = Results::read(&layout)?;
             layout.read_tables(|| wanted.read(&results, stop))?
         },
@@ -87,7 +90,8 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
     fn of<R: TableRow>() -> (&'static str, SchemaRef) {
         (R::NAME, schema::<R>())
     }
-    let all = [of::<SetRow>(), of::<HistogramBin>(), of::<StartupRow>(), of::<BackboneBin>(), of::<Point>()];
+    let all =
+        [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<StartupRow>(), of::<BackboneBin>(), of::<Point>()];
     all.into_iter().find(|(name, _)| *name == table)
 }
 
@@ -140,6 +144,10 @@ impl Wanted {
                     return Err(ResultsError::refused(layout.root(), problem).into());
                 }
                 committed_files(layout, self.table, &layout.dataset(JOBS)?)?
+            }
+            CellRow::NAME if results.sweep().rounds().is_none_or(|rounds| rounds.refinement.is_none()) => {
+                let problem = "has no cells: its sweep file has no [refine]";
+                return Err(ResultsError::refused(layout.root(), problem).into());
             }
             _ => {
                 let file = layout.reduced_file(self.table);

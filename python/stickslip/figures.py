@@ -109,7 +109,7 @@ class Plot:
         axes = axes or _new_axes()
         _scatter(axes, points, "T", "periods")
         for n, colour in zip(_frequent(points), COLOURS, strict=False):
-            of_n = points[points["n"] == n]
+            of_n = points[points["periods"] == n]
             low, high = of_n["T"].min() / 1.25, of_n["T"].max() * 1.25
             axes.plot([low, high], [n, n], color=colour, linewidth=1, zorder=0)
             axes.annotate(f"{n:.0f}", (high, n), (3, 0), textcoords="offset points", color=colour, va="center")
@@ -207,8 +207,8 @@ def _named(one: "pandas.Series") -> str:
 
 def _frequent(points: "pandas.DataFrame") -> list[float]:
     """The n of the most slips, of locked sets if there are any, not too close to each other, in order."""
-    locked = points[points["locked"] & (points["n"] > 0)]
-    counts = (locked if len(locked) else points[points["n"] > 0])["n"].value_counts()
+    locked = points[points["locked"] & (points["periods"] > 0)]
+    counts = (locked if len(locked) else points[points["periods"] > 0])["periods"].value_counts()
     chosen: list[float] = []
     for n in counts.index:
         if len(chosen) < len(COLOURS) and all(max(n, other) >= MIN_RATIO * min(n, other) for other in chosen):

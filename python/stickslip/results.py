@@ -66,6 +66,14 @@ class Results:
         """One row per parameter set, all seeds together: statistics of intervals, phases and friction, with intervals."""
         return self._table("sets", columns)
 
+    def cells(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per cell of a refined grid; `differs` says in which the edge lies, if the sweep has `[refine]`.
+
+        >>> cells = results.cells().to_pandas()
+        >>> cells[cells["differs"]][["x", "x_low", "x_high"]]
+        """
+        return self._table("cells", columns)
+
     def histograms(self, columns: Sequence[str] | None = None) -> Table:
         """One row per bin of the intervals of a set."""
         return self._table("histograms", columns)

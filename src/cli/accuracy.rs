@@ -265,7 +265,10 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
     let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.name(), unit(quantity))).collect();
     let mut lines = vec![
-        format!("bias of the mean: {} slips compared with {} of the reference", slips.slips, slips.reference_slips),
+        format!(
+            "bias of the mean ± 95 % interval: {} slips compared with {} of one reference, so that marks in a column come together",
+            slips.slips, slips.reference_slips
+        ),
         format!("{:30}{}", "", cells(heading)),
     ];
     for row in rows {

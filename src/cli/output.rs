@@ -63,8 +63,8 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
     let over = if rounds.is_over { "the last" } else { "not the last" };
     let sets = format!("{} ({over}): {} done, {sets_open} open", rounds.round, count(sets_done, "set"));
     let capped = [
-        (sets_capped > 0).then(|| format!("; {sets_capped} miss the target with the most seeds")),
-        (cells_capped > 0).then(|| format!("; {} still differ at the most sets", count(cells_capped, "cell"))),
+        (sets_capped > 0).then(|| format!("; {} with all seeds allowed, above the target", count(sets_capped, "set"))),
+        (cells_capped > 0).then(|| format!("; {} left undivided, at the limit of sets", count(cells_capped, "cell"))),
     ];
     capped.into_iter().flatten().fold(sets, |text, more| text + &more)
 }

@@ -96,8 +96,8 @@ fn no_slips_in_words(without: u64, ended: u64) -> Option<String> {
     }
     let jobs = if without == ended { "in any job".to_owned() } else { format!("in {without} of {ended} jobs") };
     Some(format!(
-        "{jobs}: the slider probably slides (see regime in tables/jobs); lower V0 or shorten tau_r, or raise give_up_after \
-         if slips are rare"
+        "{jobs}: the slider slides, or slips are too rare (see regime and slip_share in tables/jobs); lower V0, shorten tau_r, \
+         or raise give_up_after"
     ))
 }
 
@@ -109,7 +109,7 @@ mod tests {
     fn it_is_said_if_half_of_the_jobs_or_more_do_not_slip() {
         assert_eq!((no_slips_in_words(0, 0), no_slips_in_words(0, 9), no_slips_in_words(4, 9)), (None, None, None));
         let words = |without, ended| no_slips_in_words(without, ended).unwrap();
-        assert!(words(5, 9).starts_with("in 5 of 9 jobs: the slider probably slides"));
+        assert!(words(5, 9).starts_with("in 5 of 9 jobs: the slider slides"));
         assert!(words(9, 9).starts_with("in any job: the slider") && words(9, 9).contains("lower V0"));
         assert!(!words(9, 9).contains('\n'));
     }

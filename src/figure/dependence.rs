@@ -67,6 +67,9 @@ pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     };
     let present: Vec<Quantity> =
         QUANTITIES.into_iter().filter(|quantity| sets.iter().any(|set| (quantity.value)(set).is_some())).collect();
+    if present.is_empty() {
+        return None;
+    }
     let names = lines.iter().map(|line| modulation(&line[0].parameters));
     let entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
     let columns = present.len().min(2);

@@ -75,7 +75,7 @@ columns! {
         onset: f64 = "s", "time of the largest shear force since the previous slip's end";
         interval: Option<f64> = "s", "time since the previous onset";
         modulation: Modulation;
-        periods as "n": Option<u64> = "", "interval in periods T_onset, rounded; null without modulation";
+        periods: Option<u64> = "", "interval in periods T_onset, rounded; null without modulation";
         phase: Option<f64> = "rad", "phase of the onset against the modulation";
         peak_force: f64 = "N", "shear force at the onset";
         drop: f64 = "N", "peak force minus the least shear force during the slip";

@@ -31,7 +31,7 @@ pub use point::{MAX_POINTS, Point, RampStage};
 pub use read::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
-pub use rounds::RoundOfSet;
+pub use rounds::{RoundOfSet, SetInRounds};
 pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
 pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
 pub use statistic::StatisticValue;

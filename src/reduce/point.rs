@@ -52,7 +52,7 @@ columns! {
             "where on the ramp of the modulation the onset lies: up, down, after; null without a ramp";
         onset: f64 = "s", "time of the onset";
         interval: Option<f64> = "s", "time since the previous onset";
-        periods as "n": Option<u64> = "", "interval in periods T, rounded";
+        periods: Option<u64> = "", "interval in periods T, rounded";
         phase: Option<f64> = "rad", "phase of the onset against the modulation";
         is_locked as "locked": bool = "", "whether the set of the slip is locked";
     }

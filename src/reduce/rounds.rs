@@ -28,7 +28,8 @@ impl Table for RoundOfSet {
 
 columns! {
     /// A set of a sweep in rounds.
-    pub(super) struct SetInRounds {
+    #[derive(Debug)]
+    pub struct SetInRounds {
         set: SetRow;
         round: RoundOfSet;
     }

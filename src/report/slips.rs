@@ -19,7 +19,7 @@ const COLUMNS: [&str; 14] = [
     "interval",
     "T_onset",
     "Delta_onset",
-    "n",
+    "periods",
     "phase",
     "peak_force",
     "drop",

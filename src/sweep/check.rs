@@ -116,7 +116,7 @@ impl Sweep {
         let odd = worst(Quantity::Eta, &|eta| eta != 0.0 && !USUAL_ETA.contains(&eta));
         let fast = fast.map(|velocity| {
             format!(
-                "V0 = {} m/s is no drive for stick-slip; 100 micrometres per second are V0 = 1e-4",
+                "V0 = {} m/s is far too fast for stick-slip; 100 micrometres per second are V0 = 1e-4",
                 Shortest(velocity)
             )
         });

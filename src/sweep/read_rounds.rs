@@ -70,7 +70,7 @@ pub(super) const REFINE: &Keys = &[
         "Largest distance of neighbours on each axis: in its unit if it is linear, as a share of the value if it is `log`",
         "> 0, less than on the axis",
     ),
-    ("sets", "Sets of the sweep at most", "whole, up to 100000; at least those of the axes as they stand"),
+    ("sets", "Largest number of sets of the sweep", "whole, up to 100000; at least those of the axes as they stand"),
 ];
 
 /// Whether there can be values between those of a quantity.

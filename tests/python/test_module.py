@@ -130,7 +130,7 @@ def test_every_table_is_that_of_its_files(results, opened):
 
 def test_units_are_everywhere(opened):
     slips = opened.slips(join=True)
-    units = {"V0": "m/s", "interval": "s", "phase": "rad", "Kd": "N/m", "mean_friction": "N", "n": ""}
+    units = {"V0": "m/s", "interval": "s", "phase": "rad", "Kd": "N/m", "mean_friction": "N", "periods": ""}
     assert {name: slips.units[name] for name in units} == units
     assert pa.table(slips).schema.field("Kd").metadata[b"unit"] == b"N/m"
     assert pa.schema(slips).field("Kd").metadata[b"description"] == slips.meaning["Kd"].encode()

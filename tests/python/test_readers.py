@@ -47,7 +47,7 @@ def test_a_reader_finds_the_units(results, reader):
     in_fields = {field.name: field.metadata[b"unit"].decode() for field in fields}
     units = reader.units(results)
     assert units == in_fields
-    assert (units["V0"], units["interval"], units["phase"], units["n"]) == ("m/s", "s", "rad", "")
+    assert (units["V0"], units["interval"], units["phase"], units["periods"]) == ("m/s", "s", "rad", "")
 
 
 @pytest.mark.parametrize("table, rows", [("slips", SLIPS), ("jobs", JOBS), ("precursors", None)])

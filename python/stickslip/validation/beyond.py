@@ -38,7 +38,7 @@ def drag(results: Path) -> Section:
         slips = slips.assign(
             is_up=slips["onset"] < slips["ramp_time"], bin=numpy.digitize(slips["T_onset"], edges[1:-1])
         )
-        means = slips.groupby(["seed", "bin", "is_up"])["n"].mean().unstack()
+        means = slips.groupby(["seed", "bin", "is_up"])["periods"].mean().unstack()
         whole = mean((means[False] - means[True]).groupby("seed").mean())
         memory = "a small memory" if whole.excludes_zero() else "no memory"
         memories.append(f"{whole.text(3)} at {amplitude}, {memory}")

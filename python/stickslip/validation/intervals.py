@@ -251,12 +251,12 @@ def stress_drops(results: Path) -> Section:
 
     def left(rows: pandas.DataFrame) -> float:
         """The s.d. in N of the drops at given τ: about a line within each n, so that no curve of the whole is left."""
-        return pandas.concat([beside_line(those) for _, those in rows.groupby("n")]).std()
+        return pandas.concat([beside_line(those) for _, those in rows.groupby("periods")]).std()
 
     of_tau = {"without modulation": jackknife(common, still)}
     locked, chances, spreads = [], [], []
     for frequency in FREQUENCIES:
-        rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="n")
+        rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="periods")
         free = still.assign(n=(still["interval"] * frequency).round())
         of_tau[f"at {frequency} Hz"] = jackknife(common, rows)
         locked.append(jackknife(left, rows))
