@@ -9,7 +9,7 @@ use super::read_rounds::{Keys, PRECISION, REFINE, is_refinable};
 use super::rounds::MAX_SETS;
 use super::statistic::STATISTICS;
 use crate::model::{BreakOn, Description, Parameters, Value};
-use crate::observe::{Recording, RecordingKey};
+use crate::observe::{Recording, RecordingKey, Regime};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use serde_json::{Map, Value as Json, json};
 use std::ops::Bound;
@@ -233,6 +233,7 @@ fn refine() -> Json {
             json!({ "anyOf": [quantity, { "type": "array", "items": quantity, "minItems": 1, "uniqueItems": true }] }),
         ),
         ("by", json!({ "enum": STATISTICS.map(|known| known.key).to_vec() })),
+        ("value", json!({ "anyOf": [{ "enum": Regime::ALL.map(Regime::word) }, { "type": "integer", "minimum": 0 }] })),
         ("threshold", json!({ "type": "number" })),
         ("step", step.clone()),
         ("to", closed(quantities.iter().map(|key| (*key, step.clone())))),
@@ -248,7 +249,8 @@ mod tests {
 
     #[test]
     fn documented_keys_are_those_of_precision_and_refinement() {
-        for (heading, keys) in [("## [precision]", PRECISION), ("## [refine]", REFINE)] {
+        for (heading, keys, schema) in [("## [precision]", PRECISION, precision()), ("## [refine]", REFINE, refine())] {
+            assert!(keys.iter().all(|(key, ..)| schema["properties"].get(key).is_some()), "{heading}: {schema}");
             let row = |(key, meaning, allowed): &(&str, &str, &str)| format!("| `{key}` | {meaning} | {allowed} |\n");
             let rows: String = keys.iter().map(row).collect();
             assert_rows_documented(

@@ -69,7 +69,7 @@ def test_a_log_that_cannot_be_replayed_is_rejected_with_the_reason(log):
         assert found.returncode == 2 and str(file) in found.stderr
         return found.stderr
 
-    assert "--k and --fs" in rejected(log, "--k", 1e6)
+    assert "--ki and --fs" in rejected(log, "--ki", 1e6)
     assert "--N and --Ns" in rejected(log, "--N", 8)
     assert "give --N, --Ns, --M" in rejected(changed(log, lambda table: table, metadata={}))
     assert "cannot be read as a contact log" in rejected(changed(log, lambda table: table.drop_columns(["threshold"])))

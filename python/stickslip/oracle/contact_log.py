@@ -30,7 +30,7 @@ class Parameters:
     M: float
     K: float
     Kd: float
-    k: float
+    ki: float
     fs: float
     gamma: float
     V0: float
@@ -82,7 +82,7 @@ class Parameters:
     @property
     def reach(self) -> float:
         """Contact reach f_s/k, in m: the unit in which displacements are judged."""
-        return self.fs / self.k
+        return self.fs / self.ki
 
     def phase(self, time: float) -> float:
         """Phase of the modulation at a time in s, in rad, without whole periods."""
@@ -141,9 +141,9 @@ class ContactLog:
 
     def check(self, given: Parameters) -> None:
         """Rejects a log that contradicts the model or itself, whatever the motion: see the messages."""
-        expected = given.k * np.sqrt(self.threshold / given.fs)
+        expected = given.ki * np.sqrt(self.threshold / given.fs)
         if np.any(np.abs(self.stiffness / expected - 1) > 1e-12):
-            raise LogError("stiffness is not k sqrt(f_i/f_s): are --k and --fs those of the run?")
+            raise LogError("stiffness is not k sqrt(f_i/f_s): are --ki and --fs those of the run?")
         if np.any(np.diff(self.time) < 0):
             raise LogError(f"row {np.argmax(np.diff(self.time) < 0) + 1}: time runs backward")
         attached = np.zeros((given.N, given.Ns), dtype=bool)

@@ -42,7 +42,7 @@ class Integration:
         first = parameters.contacts
         self.reattachments = list(np.flatnonzero(~log.is_break[first:]) + first)
         self.time, self.state = 0.0, np.zeros(2 * parameters.N)
-        stiffest = 4 * parameters.coupling + parameters.Kd + 2 * parameters.Ns * parameters.k
+        stiffest = 4 * parameters.coupling + parameters.Kd + 2 * parameters.Ns * parameters.ki
         fastest = np.sqrt(stiffest / parameters.mass)
         self.absolute_tolerance = RELATIVE_TOLERANCE * parameters.reach * np.repeat([1.0, fastest], parameters.N)
 
