@@ -257,7 +257,7 @@ def stress_drops(results: Path) -> Section:
     locked, chances, spreads = [], [], []
     for frequency in FREQUENCIES:
         rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="periods")
-        free = still.assign(n=(still["interval"] * frequency).round())
+        free = still.assign(periods=(still["interval"] * frequency).round())
         of_tau[f"at {frequency} Hz"] = jackknife(common, rows)
         locked.append(jackknife(left, rows))
         chances.append(jackknife(left, free))
