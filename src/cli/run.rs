@@ -124,9 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         if arguments.json {
             output::json(&Report { format: FORMAT, report: &report })?;
         } else {
-            let mut pairs = summary_lines(&report);
-            pairs.extend(status::no_slips(&Results::read(&layout)?));
-            output::pairs(&pairs)?;
+            output::pairs(&summary_lines(&report))?;
         }
         let is_complete = report.jobs_left == 0 && !report.stopped;
         if is_complete && !arguments.no_reduce {
@@ -176,7 +174,9 @@ fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
     };
     let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
     if !arguments.json {
-        output::pairs(&reduce::summary_lines(&summary, layout))?;
+        let mut pairs = reduce::summary_lines(&summary, layout);
+        pairs.extend(status::no_slips(&results));
+        output::pairs(&pairs)?;
         for path in &figures {
             output::print(&format!("figure  {}\n", shown(path)))?;
         }

@@ -200,7 +200,7 @@ fn run_and_status_say_in_the_same_words_that_nothing_slips() {
         ("none", "[1e-4, 2e-4]", None),
     ] {
         folder.write("sweep.toml", &format!("name = \"{name}\"\n[axes]\nV0 = {velocities}\n[record]\nslips = 3\n"));
-        let run = line(&folder.ends(0, &format!("run sweep.toml --no-reduce --out {name}")).stdout);
+        let run = line(&folder.ends(0, &format!("run sweep.toml --out {name}")).stdout);
         assert_eq!(run, line(&folder.ends(0, &format!("status {name}")).stdout));
         match (run, expected) {
             (Some(found), Some(start)) => assert!(found.starts_with(start) && found.contains("lower V0"), "{found}"),

@@ -335,3 +335,23 @@ def test_the_stubs_are_those_of_the_module(tmp_path):
     environment = {**os.environ, "MYPY_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_sweeps_in_rounds_have_cells_and_say_whether_targets_are_met(tmp_path, opened):
+    rounds = module.run(
+        {
+            "name": "rounds",
+            "model": {"N": 3, "Ns": 4},
+            "axes": {"V0": {"log": [1e-4, 2e-4], "points": 2}},
+            "record": {"slips": 2},
+            "precision": {"of": "mean_friction", "relative": 0.5, "seeds": {"from": 2, "to": 3}},
+            "refine": {"axes": "V0", "by": "mean_friction", "step": 1e-9, "to": {"V0": 0.5}, "sets": 3},
+        },
+        tmp_path / "rounds",
+        progress=False,
+    )
+    cells, sets = pa.table(rounds.cells()), pa.table(rounds.sets())
+    assert cells["x"].to_pylist() == ["V0", "V0"] and "differs" in cells.column_names
+    assert len(sets) == 3 and {"first_round", "seeds", "target_met"} <= set(sets.column_names)
+    with pytest.raises(module.ResultsError, match="refine"):
+        opened.cells()
