@@ -6,9 +6,16 @@
 //! about the mean of all, summed up to the lag at which truncation error and noise balance (his automatic window, S =
 //! 1.5), and corrected for the bias of a mean estimated from the same values. Counting pairs makes it exact for short
 //! jobs, too: a job of one slip has none.
+//!
+//! Anticorrelated values, such as the intervals of locked slips, have a more precise mean than independent ones. In a
+//! few jobs anticorrelation is mostly noise, and it counts for nothing. From [`MANY_JOBS`] on, the sums of the jobs,
+//! which are independent, show it without a window.
 
 /// Wolff's S: ratio of the decay time of the correlation to its integrated time.
 const DECAY: f64 = 1.5;
+
+/// Jobs from which the spread of their sums counts: it is known to 30 %.
+const MANY_JOBS: usize = 24;
 
 /// Values of a quantity with D components, in the order of slips, and where jobs begin.
 #[derive(Clone, Debug, Default)]
@@ -85,8 +92,20 @@ impl<const D: usize> Sequences<D> {
             total,
             independent,
             correlated: correlated.times(n / (n - weight)),
+            least: self.spread_of_sums().unwrap_or(independent),
             spread: independent.trace() * independent.trace() / freedom,
         }
+    }
+
+    /// Covariance of the sum by the spread of the sums of jobs; `None` for fewer than [`MANY_JOBS`].
+    fn spread_of_sums(&self) -> Option<Matrix<D>> {
+        let jobs = self.starts.len();
+        let sums = self.jobs().map(|job| {
+            let mut sum = [0.0; D];
+            job.iter().for_each(|value| add(&mut sum, value));
+            [sum]
+        });
+        (jobs >= MANY_JOBS).then(|| Self::of(sums).products(0).times(jobs as f64 / (jobs as f64 - 1.0)))
     }
 
     /// Sum of the symmetrised products of values a lag apart within jobs.
@@ -160,13 +179,16 @@ pub(super) struct Estimate<const D: usize> {
     independent: Matrix<D>,
     /// Covariance of the sum with autocorrelation.
     correlated: Matrix<D>,
+    /// What its covariance is at least: that of independent values, or less where the sums of many jobs show it.
+    least: Matrix<D>,
     /// Square of the trace of `independent` per degree of freedom.
     spread: f64,
 }
 
 impl<const D: usize> Default for Estimate<D> {
     fn default() -> Self {
-        Self { count: 0, total: [0.0; D], independent: Matrix::default(), correlated: Matrix::default(), spread: 0.0 }
+        let none = Matrix::default();
+        Self { count: 0, total: [0.0; D], independent: none, correlated: none, least: none, spread: 0.0 }
     }
 }
 
@@ -177,13 +199,14 @@ impl<const D: usize> Estimate<D> {
         add(&mut self.total, &other.total);
         self.independent.add(&other.independent, 1.0);
         self.correlated.add(&other.correlated, 1.0);
+        self.least.add(&other.least, 1.0);
         self.spread += other.spread;
     }
 
     /// The same with a known covariance of the sum: `variance` in every direction.
     pub(super) fn with_known_variance(mut self, variance: f64) -> Self {
         (0..D).for_each(|index| self.independent.0[index][index] = variance);
-        self.correlated = self.independent;
+        (self.correlated, self.least) = (self.independent, self.independent);
         self
     }
 
@@ -197,11 +220,11 @@ impl<const D: usize> Estimate<D> {
         (self.count > 0).then(|| self.total.map(|sum| sum / self.count as f64))
     }
 
-    /// Variance of the mean along a unit vector. Never below that of independent values, so that anticorrelation, which
-    /// is mostly noise where values are few, makes no interval narrower.
+    /// Variance of the mean along a unit vector. Below that of independent values only if the sums of many jobs agree.
     pub(super) fn variance(&self, direction: &[f64; D]) -> f64 {
-        let squared = self.count as f64 * self.count as f64;
-        self.independent.along(direction).max(self.correlated.along(direction)) / squared
+        let [independent, correlated, least] =
+            [&self.independent, &self.correlated, &self.least].map(|covariance| covariance.along(direction));
+        independent.min(least).max(correlated) / (self.count as f64 * self.count as f64)
     }
 
     /// Variance of the mean over that of independent values, n/n_eff >= 1.
@@ -262,6 +285,29 @@ mod tests {
         assert!(average_inflation(0.0, 16, 240) < 1.05);
         assert!(average_inflation(0.0, 2, 15) < 1.25);
         assert_eq!(Sequences::of([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0].map(|x| [x])]).estimate().effective(), Some(6.0));
+    }
+
+    #[test]
+    fn intervals_of_anticorrelated_values_cover_where_jobs_are_many_and_cover_more_where_they_are_few() {
+        // Phases of locked slips vary about one value: the intervals between them are their differences.
+        let covered = |jobs: usize, length: usize| {
+            const REPETITIONS: u64 = 2000;
+            let holds = |repetition| {
+                let mut draws = Draws::new(repetition);
+                let mut of_job = || {
+                    let phases: Vec<f64> = (0..=length).map(|_| draws.normal()).collect();
+                    phases.windows(2).map(|pair| [pair[1] - pair[0]]).collect::<Vec<_>>()
+                };
+                let interval = Sequences::of((0..jobs).map(|_| of_job())).estimate().interval().unwrap();
+                interval.low <= 0.0 && 0.0 <= interval.high
+            };
+            100.0 * (0..REPETITIONS).filter(|&repetition| holds(repetition)).count() as f64 / REPETITIONS as f64
+        };
+        for (jobs, length) in [(24, 4), (24, 20), (60, 4), (200, 10)] {
+            let found = covered(jobs, length);
+            assert!((93.0..97.5).contains(&found), "{jobs} x {length}: {found}");
+        }
+        assert!(covered(10, 20) > 99.0);
     }
 
     #[test]
