@@ -102,7 +102,9 @@ impl<const D: usize> Sequences<D> {
         let jobs = self.starts.len();
         let sums = self.jobs().map(|job| {
             let mut sum = [0.0; D];
-            job.iter().for_each(|value| add(&mut sum, value));
+            for value in job {
+                add(&mut sum, value);
+            }
             [sum]
         });
         (jobs >= MANY_JOBS).then(|| Self::of(sums).products(0).times(jobs as f64 / (jobs as f64 - 1.0)))
