@@ -135,11 +135,15 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         let axes: Vec<String> = report.axes.iter().map(|axis| format!("{} ({})", axis.keys, axis.points)).collect();
         let directory =
             report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
+        let (choice, which) = match report.at_most {
+            Some(_) => (", from which the rounds choose", "in the first round, to which the numbers below refer"),
+            None => ("", "after conditions and duplicates"),
+        };
         let mut pairs = vec![
             ("sweep", report.name),
             ("axes", if axes.is_empty() { "none: a single point".to_owned() } else { axes.join(" x ") }),
-            ("grid points", report.points.to_string()),
-            ("jobs", format!("{} after conditions and duplicates", report.jobs)),
+            ("grid points", format!("{}{choice}", report.points)),
+            ("jobs", format!("{} {which}", report.jobs)),
             ("parts", report.parts.to_string()),
             ("slips to record", report.slips.to_string()),
             ("predicted CPU time", output::duration(totals.cost)),
@@ -147,8 +151,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         ];
         if let Some(Bounds { sets, jobs, predicted_cost }) = report.at_most {
             let cost = output::duration(predicted_cost);
-            let bounds = format!("the first of several; in all at most {sets} sets, {jobs} jobs, {cost} of CPU time");
-            pairs.push(("round", bounds));
+            pairs.push(("all rounds", format!("at most {sets} sets, {jobs} jobs, {cost} of CPU time")));
         }
         pairs.push(("directory", directory));
         output::pairs(&pairs)?;

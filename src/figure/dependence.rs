@@ -183,6 +183,19 @@ mod tests {
     }
 
     #[test]
+    fn quantities_without_values_get_no_panel_and_sets_without_slips_no_figure() {
+        let slides =
+            |set: SetSummary| SetSummary { tau_mean: None, tau_deviation: None, resultant_length: None, ..set };
+        let mut sets = [0.0, 0.0137, 0.137].map(|dfs| slides(spread(dfs, 1e-6)));
+        let svg = dependence(&sets, &Look::default()).unwrap().svg();
+        assert!(svg.contains("Locking index") && !svg.contains("Mean interval"));
+        for set in &mut sets {
+            set.locking_index = None;
+        }
+        assert!(dependence(&sets, &Look::default()).is_none());
+    }
+
+    #[test]
     fn the_breaking_rule_is_an_axis_of_words() {
         let tension = |amplitude| {
             let plain = set(amplitude, 0.02, 4.0);

@@ -87,7 +87,7 @@ impl Values {
                 let what = meaning.split([',', ';']).next().unwrap_or_default();
                 format!("{} {}", capitalised(what), symbol_of(symbol))
             }
-            None if meaning.len() <= LONGEST => format!("{}, {name}", capitalised(meaning)),
+            None if meaning.len() <= LONGEST => capitalised(meaning),
             None => name.to_string(),
         };
         self.with_unit(label)
@@ -217,7 +217,7 @@ mod tests {
     fn labels_have_symbols_and_units() {
         let label = |name: &str| Values::of(&[], "x", name).unwrap().label();
         assert_eq!(label("V0"), "Drive velocity V₀ (m/s)");
-        assert_eq!(label("tau_mean"), "Mean interval, tau_mean (s)");
+        assert_eq!(label("tau_mean"), "Mean interval (s)");
         assert_eq!(label("startup_p"), "startup_p");
         assert_eq!(label("Delta"), "Amplitude of the modulation Δ (m)");
         let short = |name: &str| Values::of(&[], "x", name).unwrap().short_label();

@@ -99,9 +99,9 @@ columns! {
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals";
-        tau_25: Option<f64> = "s", "25 % quantile";
-        tau_50: Option<f64> = "s", "median";
-        tau_75: Option<f64> = "s", "75 % quantile";
+        tau_25: Option<f64> = "s", "25 % quantile of the intervals";
+        tau_50: Option<f64> = "s", "median of the intervals";
+        tau_75: Option<f64> = "s", "75 % quantile of the intervals";
         tau_95: Option<f64> = "s", "95 % quantile";
         periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
         periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";

@@ -70,7 +70,7 @@ fn each_option_of_a_figure_changes_what_it_says() {
         fs::read_to_string(folder.path("own.svg")).unwrap()
     };
     let plain = svg("");
-    for text in ["Drive velocity V₀ (10⁻³ m/s)", "Mean interval, tau_mean (s)", "Sweep own"] {
+    for text in ["Drive velocity V₀ (10⁻³ m/s)", "Mean interval (s)", "Sweep own"] {
         assert!(plain.contains(text), "{text}");
     }
     for (options, text) in [

@@ -3,14 +3,19 @@
 import re
 import subprocess
 import sys
+import tomllib
 
 import numpy
 import pandas
 import pytest
 from conftest import ROOT
 
+import stickslip as module
 from stickslip import statistics
 from stickslip.validation import beyond, document, friction, intervals, kinematics, phase
+
+
+PAGE = ROOT / "docs" / "validation.md"
 
 
 @pytest.mark.parametrize(
@@ -94,8 +99,40 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
     assert not (tmp_path / "validation.md").exists()
 
 
+#: The sweeps whose results the document needs.
+SWEEPS = (
+    "fig2 fig3 friction friction-drives fronts drag drag-strong locking-map staircase size contacts disorder stiff-drive"
+    " choices startup stochasticity energies"
+).split()
+
+
+def short(sweep):
+    """The sweep with coarse ranges, half of long lists, and few seeds and slips."""
+    for key, axis in sweep["axes"].items():
+        if isinstance(axis, list) and len(axis) > 6:
+            sweep["axes"][key] = axis[::2]
+        elif "points" in axis:
+            axis["points"] = min(axis["points"], 13 if key == "eta" else 6)
+    sweep["axes"]["seed"]["count"] = min(sweep["axes"]["seed"]["count"], 2)
+    if "max_time" not in sweep["record"]:
+        sweep["record"]["slips"] = min(sweep["record"]["slips"], 6)
+    return sweep
+
+
+def test_every_section_is_written_from_real_tables(stickslip, tmp_path):
+    for name in SWEEPS:
+        sweep = tomllib.loads((ROOT / "sweeps" / f"{name}.toml").read_text())
+        module.run(short(sweep), tmp_path / name, progress=False)
+    (tmp_path / "eq1").mkdir()
+    stickslip("simulate", ROOT / "sweeps" / "eq1.toml", "--profile", tmp_path / "eq1" / "profile.parquet")
+    command = [sys.executable, "-m", "stickslip.validation", tmp_path, "--to", tmp_path / "validation.md"]
+    subprocess.run(command, cwd=ROOT, check=True)
+    headings = [re.findall(r"^##+ .*", page.read_text(), re.M) for page in (tmp_path / "validation.md", PAGE)]
+    assert headings[0] == headings[1]
+
+
 def test_the_document_holds_every_section_and_no_number_is_missing():
-    text = (ROOT / "docs" / "validation.md").read_text()
+    text = PAGE.read_text()
     verdicts, sections = text.split("\n## ", 1)
     for number in range(1, 13):
         assert f"| {number}. " in verdicts
@@ -107,7 +144,7 @@ def test_the_document_holds_every_section_and_no_number_is_missing():
 
 
 def test_the_readme_counts_the_verdicts():
-    verdicts = (ROOT / "docs" / "validation.md").read_text().split("\n## ")[0]
+    verdicts = PAGE.read_text().split("\n## ")[0]
     rows = re.findall(r"^\| (\d+)\. [^|]*\| ([^|]*) \|", verdicts, re.M)
     kinds = {
         "hold": ("holds",),
@@ -132,5 +169,5 @@ def test_sentences_begin_on_lines_of_their_own_and_long_ones_are_wrapped():
     section = document.Section("title", "source")
     section.item("Four.", "word " * 30)
     assert [len(line) for line in section.markdown().splitlines()[-3:]] == [7, 116, 36]
-    text = (ROOT / "docs" / "validation.md").read_text()
+    text = PAGE.read_text()
     assert all(len(line) <= document.WIDTH for line in text.splitlines() if not line.startswith("|"))
