@@ -35,6 +35,12 @@ impl Cost {
     pub fn extrapolated(self, steps_per_slip: f64) -> Self {
         Self { per_slip: self.per_step * steps_per_slip, steps_per_slip, ..self }
     }
+
+    /// Whether the cost per slip follows from that of a step.
+    #[must_use]
+    pub const fn is_extrapolated(&self) -> bool {
+        self.timed_slips == 0
+    }
 }
 
 /// Name of the processor as the operating system gives it, and the architecture.

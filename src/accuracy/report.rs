@@ -139,7 +139,8 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     const WORK: &str = "CPU time per slip (s)";
     const NOTE: &str = "W₁: first Wasserstein distance between a method's distribution and that of the reference, over what \
                         equal distributions stay under in 95 of 100 samples; bars: 95 %. \
-                        Errors of break times: median, bars up to the largest. * Cost extrapolated from that of a step.";
+                        Errors of break times: median, bars up to the largest.";
+    const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
     let breaks = lines(&findings.methods, set, |row| {
         let (error, largest) = (row.break_times.median?, row.break_times.largest?);
         Some(WorkPrecision { error, uncertainty: Some((error, largest)), work: row.cost.per_slip })
@@ -156,8 +157,10 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     }
     panels.retain(|panel| !panel.lines.is_empty());
     let others = other_settings(set).map(|(key, value)| format!(", {key} = {value}"));
+    let mut mine = findings.methods.iter().filter(|row| unmodulated(&row.parameters) == *set);
+    let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) { EXTRAPOLATED } else { "" };
     let look = Look {
-        note: format!("V0 = {:e} m/s{}. {NOTE}", set.drive_velocity, others.collect::<String>()),
+        note: format!("V0 = {:e} m/s{}. {NOTE}{extrapolated}", set.drive_velocity, others.collect::<String>()),
         ..Look::default()
     };
     Ok(work_precision(WORK, &panels, &look)?)
@@ -182,7 +185,7 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
             Some(_) if is_one => "Δ > 0".to_owned(),
             Some(period) => format!("Δ = {:e} m, {:.4} Hz", row.parameters.modulation_amplitude, 1.0 / period),
         };
-        let mark = if row.cost.timed_slips == 0 { "*" } else { "" };
+        let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", method_in_words(row.solver));
         match lines.iter_mut().find(|line| line.method == method && line.drive == drive) {
             Some(line) => line.points.push(point),

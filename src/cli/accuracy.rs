@@ -195,7 +195,7 @@ fn study_text(study: &Study, findings: &Findings) -> String {
 fn legend(findings: &Findings) -> Vec<String> {
     let methods = || findings.methods.iter();
     let marks = [
-        (methods().any(is_extrapolated), "* extrapolated from the cost of a step"),
+        (methods().any(|row| row.cost.is_extrapolated()), "* extrapolated from the cost of a step"),
         (methods().any(is_together_throughout), "> or longer: the reference ends here"),
         (
             findings.distances.iter().any(|row| is_biased(&row.distances)),
@@ -203,11 +203,6 @@ fn legend(findings: &Findings) -> Vec<String> {
         ),
     ];
     marks.into_iter().filter(|(occurs, _)| *occurs).map(|(_, meaning)| meaning.to_owned()).collect()
-}
-
-/// Whether the cost per slip follows from that of a step.
-const fn is_extrapolated(row: &MethodRow) -> bool {
-    row.cost.timed_slips == 0
 }
 
 /// Whether the breaks agree as far as the reference reaches.
@@ -235,7 +230,7 @@ fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
             let mark = if is_together_throughout(row) { ">" } else { "" };
             format!("{mark}{breaks} breaks, {seconds:.3} s")
         });
-        let mark = if is_extrapolated(row) { "*" } else { "" };
+        let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         lines.push(format!(
             "{:30}{:>9} {:>7.2} {:>7.2} {:>8.0} {:>18} {:>24} {:>9}",
             solver_in_words(row.solver),
