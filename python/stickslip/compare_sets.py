@@ -22,7 +22,7 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
     slips, jobs = ([rows[rows["set_id"] == set_id] for set_id in (first, second)] for rows in (slips, jobs))
     found = {"interval": difference(*slips, "interval")}
     if all(rows["T"].notna().any() for rows in slips):
-        found["locking_index"] = difference(*slips, "periods", locking_index)
+        found["locking_index"] = difference(*slips, "tau_over_T", locking_index)
     return found | {"mean_friction": difference(*jobs, "mean_friction")}
 
 

@@ -105,16 +105,16 @@ class Plot:
     def intervals(self, axes: "Axes | None" = None) -> "Axes":
         """Intervals in periods, tau/T, against the period T (s), with a line for each of the most frequent n (Fig. 3c)."""
         points = self._slips("interval")
-        points = points.assign(periods=points["interval"] / points["T"])
+        points = points.assign(tau_over_T=points["interval"] / points["T"])
         axes = axes or _new_axes()
-        _scatter(axes, points, "T", "periods")
+        _scatter(axes, points, "T", "tau_over_T")
         for n, colour in zip(_frequent(points), COLOURS, strict=False):
             of_n = points[points["periods"] == n]
             low, high = of_n["T"].min() / 1.25, of_n["T"].max() * 1.25
             axes.plot([low, high], [n, n], color=colour, linewidth=1, zorder=0)
             axes.annotate(f"{n:.0f}", (high, n), (3, 0), textcoords="offset points", color=colour, va="center")
             of_n = of_n[of_n["locked"]]
-            axes.plot(of_n["T"], of_n["periods"], ".", color=colour, markersize=MARKER)
+            axes.plot(of_n["T"], of_n["tau_over_T"], ".", color=colour, markersize=MARKER)
         label = r"Slip interval $\tau/T$; coloured: near $n$"
         axes.set(xscale="log", yscale="log", xlabel="Modulation period $T$ (s)", ylabel=label)
         axes.legend(loc="best", markerscale=1.5)

@@ -31,10 +31,10 @@ class Sweep:
 
     @cache
     def slips(self) -> pandas.DataFrame:
-        """The slips with all parameters of their jobs, and `frequency` = 1/T in Hz and `periods` = interval/T."""
+        """The slips with all parameters of their jobs, and `frequency` = 1/T in Hz and `tau_over_T` = interval/T."""
         jobs, slips = self.table("jobs"), self.table("slips")
         slips = slips.merge(jobs[["job_id", *jobs.columns.difference(slips.columns)]], on="job_id")
-        return slips.assign(frequency=(1 / slips["T"]).round(6), periods=slips["interval"] / slips["T"])
+        return slips.assign(frequency=(1 / slips["T"]).round(6), tau_over_T=slips["interval"] / slips["T"])
 
 
 def read(path: Path, remedy: str) -> pandas.DataFrame:

@@ -89,7 +89,7 @@ def test_jackknife_intervals_cover_the_truth_as_often_as_they_claim():
 def test_the_locking_index_of_a_set_is_that_of_its_slips(results):
     sweep = Sweep(results)
     reduced = sweep.reduced("sets").set_index("set_id")["locking_index"].dropna()
-    found = sweep.slips().dropna(subset="periods").groupby("set_id")["periods"].apply(statistics.locking_index)
+    found = sweep.slips().dropna(subset="periods").groupby("set_id")["tau_over_T"].apply(statistics.locking_index)
     assert len(reduced) == 1
     # The same sums in another order.
     pd.testing.assert_series_equal(found, reduced, rtol=1e-12, check_names=False)

@@ -114,7 +114,7 @@ def stretches(holds: pandas.Series) -> str:
 
 def median_periods(slips: pandas.DataFrame) -> tuple[pandas.Series, pandas.Series]:
     """Median of τ/T by T, and whether it is on a step: within 0.05 of a whole number."""
-    medians = slips.groupby("T")["periods"].median()
+    medians = slips.groupby("T")["tau_over_T"].median()
     return medians, (medians - medians.round()).abs() < 0.05
 
 

@@ -140,9 +140,9 @@ def integer_multiples(results: Path) -> Section:
     slips, precursors = sweep.slips(), sweep.table("precursors")
     still = without_modulation(slips)
     modulated = [select(slips, frequency=frequency, Delta=1e-6).dropna(subset="periods") for frequency in FREQUENCIES]
-    indices = [jackknife(lambda rows: locking_index(rows["periods"]), rows) for rows in modulated]
+    indices = [jackknife(lambda rows: locking_index(rows["tau_over_T"]), rows) for rows in modulated]
     unmodulated = [locking_index(still["interval"] * frequency) for frequency in FREQUENCIES]
-    near = [share(near_whole(rows["periods"]), rows["seed"]) for rows in modulated]
+    near = [share(near_whole(rows["tau_over_T"]), rows["seed"]) for rows in modulated]
     section.check(
         "τ locks",
         "locking index > 0.7",
@@ -194,7 +194,7 @@ def many_periods(results: Path) -> Section:
     slips = sweep.slips().merge(sweep.reduced("sets")[["set_id", "locked"]], on="set_id")
     slips = slips[(slips["eta"] >= 1) & slips["interval"].notna()]
     expected = {eta: random_load_share(eta) for eta in slips["eta"].unique()}
-    slips = slips.assign(near=near_whole(slips["periods"]), expected=slips["eta"].map(expected))
+    slips = slips.assign(near=near_whole(slips["tau_over_T"]), expected=slips["eta"].map(expected))
     whole, locked = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["locked"]]))
     section.check(
         "",
