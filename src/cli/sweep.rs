@@ -16,7 +16,7 @@ pub struct Preset {
     pub text: &'static str,
 }
 
-const PRESETS: [Preset; 30] = [
+const PRESETS: [Preset; 31] = [
     Preset::new("choices", include_str!("../../sweeps/choices.toml")),
     Preset::new("contacts", include_str!("../../sweeps/contacts.toml")),
     Preset::new("disorder", include_str!("../../sweeps/disorder.toml")),
@@ -46,6 +46,7 @@ const PRESETS: [Preset; 30] = [
     Preset::new("stochasticity", include_str!("../../sweeps/stochasticity.toml")),
     Preset::new("tongue-4", include_str!("../../sweeps/tongue-4.toml")),
     Preset::new("tongues", include_str!("../../sweeps/tongues.toml")),
+    Preset::new("tongues-fine", include_str!("../../sweeps/tongues-fine.toml")),
     Preset::new("velocity", include_str!("../../sweeps/velocity.toml")),
 ];
 
