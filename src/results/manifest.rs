@@ -18,15 +18,18 @@ use crate::table::checksum;
 use crate::table::columns::Table;
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown_text;
+use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Version of the manifest and of the layout around it. 6: it has rounds.
 const FORMAT: u32 = 6;
 /// Name of the folder in which a manifest is staged; only the holder of the lock of the same name writes there.
 pub(super) const WRITER: &str = "manifest";
+/// How often other hosts may clear that folder while a manifest is staged.
+const MAX_CLEARINGS: u32 = 100;
 
 /// The file `run/manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -127,18 +130,25 @@ impl Manifest {
 
     /// Writes the manifest, and copies of the sweep files beside it.
     pub(super) fn write(&self, layout: &Layout<'_>) -> Result<(), ResultsError> {
-        let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
+        let mut files = Vec::new();
         for (extension, record) in self.extensions.iter().enumerate() {
             if let Some(text) = record.round_text(layout, extension)? {
-                commit.stage_bytes(&layout.round(extension), text.as_bytes())?;
+                files.push((layout.round(extension), text));
             }
-            commit.stage_bytes(&layout.sweep(extension), record.sweep.as_bytes())?;
+            files.push((layout.sweep(extension), record.sweep.clone()));
         }
         let path = layout.manifest();
         let text = checksum::to_json(self).map_err(|error| ResultsError::damaged(&path, error.to_string()))?;
         // Last, so that a manifest never names a sweep that is not there.
-        commit.stage_bytes(&path, text.as_bytes())?;
-        Ok(commit.publish()?)
+        files.push((path, text));
+        // Where each host has locks of its own, others that begin clear the staging folder, each of them once.
+        let mut clearings = 0;
+        loop {
+            match publish(layout, &files) {
+                Err(error) if error.is_missing() && clearings < MAX_CLEARINGS => clearings += 1,
+                ended => return Ok(ended?),
+            }
+        }
     }
 
     /// Whether the parts of both have the same jobs and the same bytes.
@@ -262,4 +272,13 @@ pub(super) fn read_text(layout: &Layout<'_>, path: &Path) -> Result<String, Resu
         Err(error) if error.is_no_file() => Err(ResultsError::damaged(path, error.source.to_string())),
         bytes => String::from_utf8(bytes?).map_err(|error| ResultsError::damaged(path, error.to_string())),
     }
+}
+
+/// Puts files with these texts in their places, in this order.
+fn publish(layout: &Layout<'_>, files: &[(PathBuf, String)]) -> Result<(), StorageError> {
+    let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
+    for (path, text) in files {
+        commit.stage_bytes(path, text.as_bytes())?;
+    }
+    commit.publish()
 }

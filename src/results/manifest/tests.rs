@@ -34,6 +34,30 @@ impl<F: FnOnce() + Send> OverDisk for Shared<F> {
     }
 }
 
+/// The same where each run has locks of its own, as on hosts that mount a disk without locks.
+struct SharedWithoutLocks<F>(Shared<F>);
+
+impl<F: FnOnce() + Send> OverDisk for SharedWithoutLocks<F> {
+    fn before(&self, access: Access) -> io::Result<()> {
+        self.0.before(access)
+    }
+    fn try_lock(&self, file: &Path) -> Result<Lock, StorageError> {
+        Disk.lock(&file.with_extension("own"))
+    }
+}
+
+#[test]
+fn runs_with_locks_of_their_own_that_begin_at_once_both_begin() {
+    for operation in 0..60 {
+        let root = tempfile::tempdir().unwrap();
+        let open = |disk: &dyn Storage| Results::open(&Layout::new(disk, root.path()), &sweep(TWO_SEEDS)).map(drop);
+        let other = Mutex::new(Some(|| open(&Disk).unwrap()));
+        let shared = SharedWithoutLocks(Shared { other, operations_left: AtomicUsize::new(operation) });
+        open(&shared).unwrap_or_else(|error| panic!("operation {operation}: {error}"));
+        open(&Disk).unwrap();
+    }
+}
+
 fn sweep(text: &str) -> Sweep {
     Sweep::parse(&format!("name = \"test\"\n{text}"), Path::new("test.toml")).unwrap()
 }
