@@ -22,12 +22,7 @@ pub enum RequestError {
     #[error(
         "sweep {name}: has {jobs} jobs, and one can be simulated; give each axis one value, or use `stickslip run`"
     )]
-    NotOneJob {
-        /// Name of the sweep.
-        name: String,
-        /// Its jobs.
-        jobs: usize,
-    },
+    NotOneJob { name: String, jobs: usize },
     /// The time between samples is no time.
     #[error("sample {0}: must be a finite number > 0, in s")]
     BadSample(f64),
@@ -45,7 +40,6 @@ pub enum RequestError {
 pub type Written = Vec<(String, String)>;
 
 /// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
-#[must_use]
 pub fn sweep_text(model: &Written, record: &BTreeMap<RecordingKey, String>, solver: &Written) -> String {
     let recorded = |key| match (key, record.get(&key)) {
         (_, Some(value)) => Some(value.as_str()),
@@ -64,7 +58,6 @@ pub fn sweep_text(model: &Written, record: &BTreeMap<RecordingKey, String>, solv
 }
 
 /// The mistakes in such a text, as those in what it was made from, which has neither sections nor lines.
-#[must_use]
 pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
     let problems = mistakes.iter().map(|Mistake { problem, .. }| {
         let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));
@@ -76,9 +69,6 @@ pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
 }
 
 /// The job of a sweep that has one.
-///
-/// # Errors
-/// When it has others.
 pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
     let mut jobs = sweep.jobs();
     match (jobs.next(), jobs.count()) {
@@ -99,15 +89,11 @@ pub struct Request {
     pub map: bool,
     /// Displacement of every block at the end.
     pub profile: bool,
-    /// Every contact event.
     pub contacts: bool,
 }
 
 impl Request {
     /// Makes sure that what is recorded fits into memory.
-    ///
-    /// # Errors
-    /// When there would be too many samples, or the time between them is none.
     pub fn check(&self, parameters: &Parameters, recording: &Recording) -> Result<(), RequestError> {
         let sample = self.sample;
         if !(sample > 0.0 && sample.is_finite()) {
@@ -126,20 +112,15 @@ impl Request {
 /// What was recorded beside slips; empty where nothing asked for it.
 #[derive(Clone, Debug, Default)]
 pub struct Records {
-    /// Samples of the trace.
     pub trace: Vec<TraceRow>,
     /// Cells of the map, instant by instant.
     pub map: Vec<MapRow>,
-    /// Blocks at the end.
     pub profile: Vec<ProfileRow>,
     /// Contact events, in order.
     pub contacts: Vec<ContactEvent>,
 }
 
 /// Simulates a job, and records what is asked for. The slips are those of a run of the sweep, to the bit.
-///
-/// # Errors
-/// When the simulation cannot continue, or is interrupted.
 pub fn simulate(
     sweep: &Sweep,
     parameters: &Parameters,

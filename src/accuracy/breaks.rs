@@ -87,7 +87,6 @@ impl<'a> Comparison<'a> {
         Self { reference, counted, errors: vec![f64::NAN; breaks], due: 0, apart: None, now: 0.0 }
     }
 
-    /// The errors so far.
     pub fn errors(&self) -> BreakErrors {
         let mut made: Vec<f64> = self.errors[..self.counted].iter().copied().filter(|error| !error.is_nan()).collect();
         made.sort_by(f64::total_cmp);

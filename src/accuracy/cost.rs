@@ -19,7 +19,6 @@ columns! {
 
 impl Cost {
     /// The cost of a run with these slips. Without any, that per slip is infinite.
-    #[must_use]
     pub fn of(cpu_seconds: f64, run: &Summary, slips: u64) -> Self {
         Self {
             per_simulated_second: cpu_seconds / run.end_time,
@@ -31,20 +30,17 @@ impl Cost {
     }
 
     /// The same if a slip takes this number of steps.
-    #[must_use]
     pub fn extrapolated(self, steps_per_slip: f64) -> Self {
         Self { per_slip: self.per_step * steps_per_slip, steps_per_slip, ..self }
     }
 
     /// Whether the cost per slip follows from that of a step.
-    #[must_use]
     pub const fn is_extrapolated(&self) -> bool {
         self.timed_slips == 0
     }
 }
 
 /// Name of the processor as the operating system gives it, and the architecture.
-#[must_use]
 pub fn processor() -> String {
     let description = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let field = |key: &str| {

@@ -85,7 +85,6 @@ columns! {
 
 /// Distances of a sample from a reference, both in the order of slips; `None` if one is empty. Comparisons with
 /// different keys have independent random numbers.
-#[must_use]
 pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distances> {
     if sample.is_empty() || reference.is_empty() {
         return None;
@@ -114,7 +113,6 @@ fn differences(sample: &[f64], reference: &[f64]) -> [f64; 4] {
     [wasserstein, kolmogorov, mean(sample) - mean(reference), deviation(sample) - deviation(reference)]
 }
 
-/// Mean of a sample.
 pub(super) fn mean(sample: &[f64]) -> f64 {
     sample.iter().sum::<f64>() / sample.len() as f64
 }

@@ -35,7 +35,6 @@ const SEEDS: u64 = 24;
 /// What a case must lead to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expected {
-    /// It reaches its end.
     Ends,
     /// Parameters or solver are refused, in a message that contains this.
     Refused(&'static str),
@@ -43,7 +42,6 @@ enum Expected {
     Stops(&'static str),
 }
 
-/// One case.
 #[derive(Clone, Debug)]
 pub struct HardCase {
     /// What breaks a naive code; cases that share it form a group.
@@ -139,7 +137,6 @@ impl HardCase {
     }
 
     /// What differs from the defaults, in words.
-    #[must_use]
     pub fn name(&self) -> String {
         let words: Vec<String> =
             self.settings.iter().map(|(symbol, value)| format!("{} = {value}", symbol.key())).collect();
@@ -147,7 +144,6 @@ impl HardCase {
     }
 
     /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
-    #[must_use]
     pub fn run(&self) -> Vec<Stability> {
         let Solver::EventDriven { tolerance, .. } = self.solver else { return vec![self.row(self.solver, None)] };
         let audited = self.row(Solver::EventDriven { tolerance, resolve: Resolve::Taylor }, None);
@@ -291,7 +287,6 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
 }
 
 /// Every case, group by group.
-#[must_use]
 pub fn hard_cases() -> Vec<HardCase> {
     use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, Ki, L, M, N, Ns, Seed, T, TauR, V0};
     use Value::{Count, Real};

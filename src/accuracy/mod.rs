@@ -38,24 +38,11 @@ use std::sync::atomic::AtomicBool;
 /// A study that cannot be made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum AccuracyError {
-    /// A simulation cannot continue.
     #[error("{case}, seed {seed}, {solver}: {source}")]
-    Simulation {
-        /// Its parameters, in words.
-        case: String,
-        /// Realisation.
-        seed: u64,
-        /// Method and setting.
-        solver: String,
-        /// The cause.
-        source: SimulationError,
-    },
+    Simulation { case: String, seed: u64, solver: String, source: SimulationError },
     /// Slips are compared, and there are none.
     #[error("{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide")]
-    NoSlips {
-        /// Its parameters, in words.
-        case: String,
-    },
+    NoSlips { case: String },
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
@@ -68,7 +55,6 @@ pub enum AccuracyError {
 }
 
 /// The method of a solver in words; the event-driven one by how it resolves motion, where that is set.
-#[must_use]
 pub const fn method_in_words(solver: Solver) -> &'static str {
     match solver {
         Solver::EventDriven { resolve: Resolve::Auto, .. } => "event-driven",
@@ -79,7 +65,6 @@ pub const fn method_in_words(solver: Solver) -> &'static str {
 }
 
 /// A solver and its setting in words.
-#[must_use]
 pub fn solver_in_words(solver: Solver) -> String {
     let method = method_in_words(solver);
     match solver {
@@ -89,7 +74,6 @@ pub fn solver_in_words(solver: Solver) -> String {
 }
 
 /// The drive of a set in words, and what else differs from the defaults.
-#[must_use]
 pub fn set_in_words(parameters: &Parameters) -> String {
     let modulation = parameters.modulation_period.map_or_else(
         || "Delta = 0".to_owned(),

@@ -15,13 +15,9 @@ use crate::table::storage::{Disk, Storage, StoredFile};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Version of the JSON.
 const FORMAT: u32 = 4;
 
 /// The findings of a study, with a figure for the sets that differ in the modulation alone.
-///
-/// # Errors
-/// When a figure cannot be drawn.
 pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>, AccuracyError> {
     let settings = json!({
         "seeds": study.seeds,
@@ -45,9 +41,6 @@ pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<
 }
 
 /// A scaling, with its figure.
-///
-/// # Errors
-/// When the figure cannot be drawn.
 pub fn scaling_report(findings: &ScalingFindings) -> Result<Report<'_>, AccuracyError> {
     let mut report =
         Report::new("scaling", json!({})).table("sizes", &findings.sizes).table("exponents", &findings.exponents);
@@ -55,8 +48,6 @@ pub fn scaling_report(findings: &ScalingFindings) -> Result<Report<'_>, Accuracy
     Ok(report)
 }
 
-/// The hard cases.
-#[must_use]
 pub fn stability_report(cases: &[Stability]) -> Report<'_> {
     Report::new("hard-cases", json!({})).table("cases", cases)
 }
@@ -69,7 +60,6 @@ pub struct Report<'a> {
     /// Name of the file of the JSON.
     name: &'static str,
     json: Value,
-    /// Names and files.
     tables: Vec<(&'static str, TableFile<'a>)>,
     pictures: Vec<(String, Picture)>,
 }
@@ -95,16 +85,11 @@ impl<'a> Report<'a> {
         self
     }
 
-    /// Settings and all rows.
-    #[must_use]
     pub fn json(&self) -> &Value {
         &self.json
     }
 
     /// Writes everything into a folder, over what an earlier command left there; returns the files.
-    ///
-    /// # Errors
-    /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
         Disk.ensure_folder(folder)?;
         let staging = folder.join("staging");
@@ -166,7 +151,6 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     Ok(work_precision(WORK, &panels, &look)?)
 }
 
-/// A set without modulation.
 fn unmodulated(set: &Parameters) -> Parameters {
     let Parameters { modulation_amplitude, modulation_period, .. } = Parameters::default();
     Parameters { modulation_amplitude, modulation_period, ..set.clone() }

@@ -17,7 +17,6 @@ const START_UP: u64 = 2;
 /// Least slips that are timed.
 const MIN_SLIPS: u64 = 2;
 
-/// What to run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scaling {
     /// Numbers of blocks N, with the default contacts per block.
@@ -33,7 +32,6 @@ pub struct Scaling {
 /// What grows: the number of blocks, and of contacts per block.
 pub const SIZES: [Symbol; 2] = [Symbol::N, Symbol::Ns];
 
-/// What grows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Size;
 
@@ -79,7 +77,6 @@ impl Table for Exponents {
         "One row per what grows and tolerance: exponents of the powers of it that fit the rows of `scaling` best";
 }
 
-/// All that is found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScalingFindings {
     /// Size by size, tolerance by tolerance.
@@ -90,7 +87,6 @@ pub struct ScalingFindings {
 
 impl Scaling {
     /// Over factors of sixteen, which takes minutes.
-    #[must_use]
     pub fn full() -> Self {
         Self {
             blocks: vec![70, 140, 280, 560, 1120],
@@ -101,12 +97,10 @@ impl Scaling {
     }
 
     /// Over factors of four, which takes seconds.
-    #[must_use]
     pub fn quick() -> Self {
         Self { blocks: vec![70, 140, 280], contacts_per_block: vec![20, 80], contacts: 30_000, ..Self::full() }
     }
 
-    /// The sizes, each once.
     fn cases(&self) -> Vec<Parameters> {
         let wide = self.blocks.iter().map(|&blocks| Parameters { blocks, ..Parameters::default() });
         let dense = self.contacts_per_block.iter();
@@ -126,9 +120,6 @@ impl Scaling {
     }
 
     /// Runs it; `report` gets a line before each size.
-    ///
-    /// # Errors
-    /// When a simulation cannot continue.
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<ScalingFindings, AccuracyError> {
         let mut sizes = Vec::new();
         for parameters in &self.cases() {
@@ -144,7 +135,6 @@ impl Scaling {
     }
 }
 
-/// Times slips past start-up.
 fn timed(parameters: &Parameters, tolerance: f64, slips: u64) -> Result<SizeRow, AccuracyError> {
     let solver = Solver::event_driven(tolerance);
     let realisation = Realisation { parameters, solver, in_words: size_in_words };
@@ -212,7 +202,6 @@ fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     (spread > 0.0).then(|| common / spread)
 }
 
-/// The size in words.
 fn size_in_words(parameters: &Parameters) -> String {
     format!("N = {}, Ns = {}", parameters.blocks, parameters.contacts_per_block)
 }

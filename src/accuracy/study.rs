@@ -21,9 +21,7 @@ use std::ops::Range;
 
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
 const MODULATION: (f64, f64) = (1e-6, 58.0);
-/// Slips discarded as start-up.
 const DISCARD: u64 = 5;
-/// Slips that are audited.
 const AUDITED_SLIPS: u64 = 2;
 /// Tolerance of the reference ensemble.
 const ENSEMBLE_TOLERANCE: f64 = 1e-10;
@@ -32,12 +30,10 @@ const REFERENCE_SEEDS: u64 = 1_000_000;
 /// Seeds of the reference ensemble for each one of a method: more, so that its own error matters less.
 const REFERENCE_SHARE: u64 = 2;
 
-/// What to run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
     /// Sets of parameters, with seed 0.
     pub sets: Vec<Parameters>,
-    /// Solvers and their settings.
     pub solvers: Vec<Solver>,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
@@ -52,7 +48,6 @@ pub struct Study {
     pub followed_breaks: usize,
     /// Lowest drive velocity at which a fixed step runs its ensemble, and its breaks, in m/s.
     pub fixed_step_slips_from: f64,
-    /// See [`Study::fixed_step_slips_from`].
     pub fixed_step_breaks_from: f64,
     /// Steps over which a fixed step is timed below that velocity.
     pub timed_steps: u64,
@@ -60,7 +55,6 @@ pub struct Study {
 
 impl Study {
     /// The full study, which takes minutes.
-    #[must_use]
     pub fn full() -> Self {
         Self {
             sets: [1e-4, 1e-5, 1e-6].into_iter().flat_map(plain_and_modulated).collect(),
@@ -81,7 +75,6 @@ impl Study {
     }
 
     /// A quick one, which takes a minute.
-    #[must_use]
     pub fn quick() -> Self {
         Self {
             seeds: 4,
@@ -95,7 +88,6 @@ impl Study {
     }
 
     /// The same at other sets, with tolerances of the event-driven solver and this one instead.
-    #[must_use]
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
         let (mut time_steps, mut on_the_grid, mut in_taylor_steps) =
             (Vec::new(), vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6], vec![1e-3, 1e-4, 1e-6, 1e-8]);
@@ -132,7 +124,6 @@ const fn taylor(tolerance: f64) -> Solver {
     Solver::EventDriven { tolerance, resolve: Resolve::Taylor }
 }
 
-/// The drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveAlone;
 
@@ -163,7 +154,6 @@ impl Table for MethodRow {
     const MEANING: &'static str = "One row per set of parameters and solver setting";
 }
 
-/// A quantity of slips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Interval τ, in s.
@@ -181,12 +171,9 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them.
     pub const ALL: [Self; 6] =
         [Self::Interval, Self::Phase, Self::Drop, Self::PeakForce, Self::Duration, Self::FrontSpeed];
 
-    /// Its name in tables.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         self.column().0
     }
@@ -195,7 +182,6 @@ impl Quantity {
         slips.iter().filter_map(self.column().1).collect()
     }
 
-    /// Name and values.
     const fn column(self) -> (&'static str, fn(&Slip) -> Option<f64>) {
         match self {
             Self::Interval => ("interval", |slip| slip.interval),
@@ -241,13 +227,11 @@ impl Table for DistanceRow {
 pub struct Findings {
     /// Set by set, solver by solver.
     pub methods: Vec<MethodRow>,
-    /// Likewise, quantity by quantity.
     pub distances: Vec<DistanceRow>,
 }
 
 impl Findings {
     /// How far a distribution is from the reference, for the solver and set of a row.
-    #[must_use]
     pub fn distances_of(&self, row: &MethodRow, quantity: Quantity) -> Option<&Distances> {
         let same = |other: &&DistanceRow| {
             other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
@@ -293,9 +277,6 @@ impl Ensemble {
 
 impl Study {
     /// Runs it; `report` gets a line before each stage.
-    ///
-    /// # Errors
-    /// When a simulation cannot continue.
     pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
         let mut findings = Findings::default();
         for (set, parameters) in self.sets.iter().enumerate() {

@@ -52,7 +52,6 @@ mod tests {
     use super::super::{DistanceRow, Exponents, MethodRow, SizeRow, Stability};
     use crate::table::columns::{Column, Table};
 
-    /// Its name and columns.
     fn described<T: Table>() -> (&'static str, Vec<Column>) {
         (T::NAME, T::columns())
     }

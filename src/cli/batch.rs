@@ -77,14 +77,12 @@ fn time_in_queue(text: &str) -> Result<Duration, String> {
     if time < MIN_TIME { Err("must be at least 1m".to_owned()) } else { Ok(time) }
 }
 
-/// What both scripts hold.
 struct Submission<'a> {
     name: &'a str,
     workers: u32,
     starts: u32,
     threads: NonZeroUsize,
     time: Duration,
-    /// Folder of the logs.
     logs: String,
     /// The command of a worker, as a shell reads it.
     command: String,

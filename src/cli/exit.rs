@@ -8,18 +8,14 @@ use crate::solver::SimulationError;
 use crate::sweep::SweepError;
 use crate::table::file::DatasetError;
 
-/// How the program ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
-    /// All is done.
     Done = 0,
-    /// Jobs failed.
     Failed = 1,
     /// The command line, a sweep file or a directory does not fit.
     Usage = 2,
     /// Stopped early; the same command resumes.
     Stopped = 3,
-    /// Data are damaged.
     Damaged = 4,
 }
 

@@ -95,7 +95,6 @@ impl Progress {
         }
     }
 
-    /// A line that stays.
     fn say(&self, line: &str) {
         if self.is_terminal {
             self.bar.suspend(|| output::report(line));

@@ -48,7 +48,6 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
     Ok(())
 }
 
-/// A reduction in brief.
 pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'static str, String)> {
     let text = |path: &Path| shown(path).to_string();
     vec![

@@ -115,7 +115,6 @@ pub fn number(text: &str) -> Result<String, &'static str> {
     real(text).map(|real| if real.is_nan() { "nan".to_owned() } else { format!("{real:?}") })
 }
 
-/// A real number.
 pub fn real(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_| "must be a number")
 }

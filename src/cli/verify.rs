@@ -58,7 +58,6 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     Ok(if verification.whole || arguments.repair { Exit::Done } else { Exit::Damaged })
 }
 
-/// What repairs a directory.
 fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
     let (root, mut commands) = (output::quoted_path(layout.root()), Vec::new());
     if with_repair && verification.wants_repair() {

@@ -2,7 +2,6 @@
 
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
-/// How values become places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
     Linear,
@@ -32,9 +31,7 @@ pub(super) struct Axis {
     scale: Scale,
     /// What finer ticks would be.
     finer: Finer,
-    /// Ticks with a number.
     pub(super) ticks: Vec<(f64, String)>,
-    /// Ticks without.
     pub(super) minor: Vec<f64>,
 }
 
@@ -204,7 +201,6 @@ impl Axis {
         Self::fixed(label, (-0.5, high), ticks, Vec::new())
     }
 
-    /// Linear with these ticks.
     fn fixed(label: &str, (low, high): (f64, f64), ticks: Vec<(f64, String)>, minor: Vec<f64>) -> Self {
         let label = label.to_owned();
         Self { label, short_label: None, low, high, scale: Scale::Linear, finer: Finer::Never, ticks, minor }

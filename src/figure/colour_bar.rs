@@ -15,7 +15,6 @@ const INSET: f64 = 14.0;
 /// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
 pub(super) const OVERLAP: f64 = 0.5;
 
-/// What a bar shows.
 pub(super) struct ColourBar<'a> {
     pub(super) label: &'a str,
     /// Colours of equal height, from below.

@@ -25,7 +25,6 @@ const OFFSETS: [f64; 2] = [-0.12, 0.12];
 /// A slip under a ramp, in SI.
 #[derive(Clone, Copy, Debug)]
 struct Slip {
-    /// Index of its stage.
     stage: usize,
     /// T or Δ at the onset.
     modulation: f64,

@@ -15,9 +15,6 @@ const MAX_SETS: usize = 100_000;
 /// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
 ///
 /// Returns the files, in the order in which they were written.
-///
-/// # Errors
-/// When the reduced data are not there, are damaged, or a figure does not fit its size or cannot be written.
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>, FigureError> {
     let _alone = alone(layout, WRITER)?;
     check_reduced(layout)?;
@@ -51,9 +48,6 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 }
 
 /// Draws a figure of one's own from the sets of a results directory; writes nothing.
-///
-/// # Errors
-/// When the reduced data are not there or are damaged, or the figure does not fit them or its size.
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
     check_reduced(layout)?;
     let rows: Vec<SetRow> = read_reduced(layout)?;
@@ -64,9 +58,6 @@ pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<
 }
 
 /// Puts a figure into `figures/`, in these formats.
-///
-/// # Errors
-/// When a file cannot be written.
 pub fn write_own(
     layout: &Layout<'_>,
     picture: Picture,

@@ -3,7 +3,6 @@
 use std::sync::LazyLock;
 use ttf_parser::{Face, GlyphId};
 
-/// Its file.
 pub(super) fn file() -> &'static [u8] {
     dejavu::sans::regular()
 }

@@ -46,7 +46,6 @@ const SHORTEST: f64 = 60.0;
 #[derive(Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) columns: usize,
-    /// Width of each column.
     pub(super) width: f64,
     pub(super) column_gap: f64,
     /// Heights of the rows, from above.
@@ -134,7 +133,6 @@ pub(super) struct Page {
     row_gap: f64,
     top: f64,
     heading: f64,
-    /// Where texts end.
     end: f64,
 }
 

@@ -56,46 +56,24 @@ use std::path::PathBuf;
 pub enum FigureError {
     /// There is nothing to draw.
     #[error("figure {figure}: there are no {what} to draw")]
-    Empty {
-        /// Name of the figure.
-        figure: &'static str,
-        /// What is missing.
-        what: &'static str,
-    },
+    Empty { figure: &'static str, what: &'static str },
     /// A file of a picture cannot be made.
     #[error("figure {figure}: cannot be turned into {}: {reason}", format.extension().to_uppercase())]
-    Encoding {
-        /// Name of the figure.
-        figure: String,
-        /// The format.
-        format: Format,
-        /// The reason.
-        reason: String,
-    },
+    Encoding { figure: String, format: Format, reason: String },
     /// A figure does not fit the size that is asked for.
     #[error("--size: figure {figure} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print", size.width.ceil(), size.height.ceil())]
-    TooSmall {
-        /// Name of the figure.
-        figure: String,
-        /// Its least size.
-        size: Size,
-    },
+    TooSmall { figure: String, size: Size },
     /// An option of a figure of one's own does not fit the data.
     #[error("--{option} {value}: {problem}")]
     Option {
-        /// The option.
         option: &'static str,
-        /// Its value, as given.
         value: String,
         /// What is wrong, and what to do.
         problem: String,
     },
     /// There are no reduced data.
     #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", shown(directory))]
-    NotReduced {
-        /// The results directory.
-        directory: PathBuf,
-    },
+    NotReduced { directory: PathBuf },
     /// The reduced data cannot be read.
     #[error("{0}; if it is missing or damaged, reduce the tables again")]
     Reduced(#[from] DatasetError),

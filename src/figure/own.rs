@@ -19,7 +19,6 @@ const MAX_COLUMNS: usize = 3;
 const MAX_PANELS: usize = 9;
 const PANEL_WIDTH: f64 = 260.0;
 const PANEL_HEIGHTS: [f64; MAX_COLUMNS] = [220.0; MAX_COLUMNS];
-/// Words on an axis.
 const MAX_WORDS: usize = 12;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
@@ -64,9 +63,6 @@ struct Asked<'a> {
 }
 
 /// Draws a dot for each set; sets that differ in a parameter on the x axis alone are joined by a line.
-///
-/// # Errors
-/// When a column is unknown, does not fit what it is to be shown as, or no set is left.
 pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
     let [x, y] = [("x", &figure.x), ("y", &figure.y)].map(|(option, name)| Values::of(rows, option, name));
     let (x, y) = (x?, y?);
@@ -282,7 +278,6 @@ fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<u
     lines
 }
 
-/// How sets are drawn.
 struct Drawn<'a> {
     x: &'a Values,
     y: &'a Values,

@@ -159,7 +159,6 @@ impl Page<'_> {
         self.content.show(Str(&codes)).end_text();
     }
 
-    /// The file.
     fn write(self, font: &[u8], width: f32, height: f32) -> Result<Vec<u8>, String> {
         let mut next = (1..).map(Ref::new);
         let mut id = || next.next().ok_or("there are too many objects");

@@ -12,7 +12,6 @@ use kuva::render::render::{Primitive, Scene};
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
-/// A finished figure.
 pub struct Picture {
     name: String,
     style: Style,
@@ -25,20 +24,16 @@ pub struct Picture {
 pub enum Format {
     /// Vectors, for the browser and for changes by hand.
     Svg,
-    /// Pixels.
     Png,
-    /// Vectors, for papers.
     Pdf,
 }
 
 impl Format {
-    /// All of them.
     pub const ALL: [Self; 3] = [Self::Svg, Self::Png, Self::Pdf];
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
 
     /// What its files end in.
-    #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Svg => "svg",
@@ -50,29 +45,23 @@ impl Format {
 
 impl Picture {
     /// Its name; its files have the same.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Its small print, which print leaves to the caption.
-    #[must_use]
     pub fn note(&self) -> String {
         // Lines may be broken anywhere there.
         self.note.replace('\u{a0}', " ")
     }
 
     /// Width and height in mm.
-    #[must_use]
     pub fn size(&self) -> Size {
         let [width, height] = [self.scene.width, self.scene.height].map(|side| self.style.millimetres(side));
         Size { width, height }
     }
 
     /// The figure in a format.
-    ///
-    /// # Errors
-    /// When it cannot be encoded.
     pub fn encoded(&self, format: Format) -> Result<Vec<u8>, FigureError> {
         match format {
             Format::Svg => Ok(self.svg().into_bytes()),
@@ -81,8 +70,6 @@ impl Picture {
         }
     }
 
-    /// The figure as SVG.
-    #[must_use]
     pub fn svg(&self) -> String {
         let svg = SvgBackend::new().render_scene(&self.scene);
         if self.style == Style::Screen {
@@ -101,9 +88,6 @@ impl Picture {
     }
 
     /// The figure as a PDF file of one page.
-    ///
-    /// # Errors
-    /// When it cannot be encoded.
     pub fn pdf(&self) -> Result<Vec<u8>, FigureError> {
         pdf(&self.scene, self.style.points()).map_err(|reason| FigureError::Encoding {
             figure: self.name.clone(),
@@ -113,9 +97,6 @@ impl Picture {
     }
 
     /// The figure as a PNG file.
-    ///
-    /// # Errors
-    /// When it cannot be encoded.
     pub fn png(&self) -> Result<Vec<u8>, FigureError> {
         RasterBackend::new()
             .with_scale(self.style.pixels())
@@ -141,7 +122,6 @@ pub(super) fn snapped(place: f64) -> f64 {
 /// An opaque colour, `#rrggbb`.
 pub(super) type Ink = &'static str;
 
-/// A line's look.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke {
     pub(super) ink: Ink,
@@ -160,7 +140,6 @@ impl Stroke {
     }
 }
 
-/// A disc's look.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dot {
     pub(super) ink: Ink,
@@ -174,7 +153,6 @@ impl Dot {
     }
 }
 
-/// A surface's look.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fill {
     pub(super) ink: Ink,

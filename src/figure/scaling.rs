@@ -20,20 +20,15 @@ pub type Line = (String, Vec<(f64, f64)>);
 /// What grows with a size of the slider.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Growth {
-    /// What the size is.
     pub label: String,
     /// CPU times per slip, in s.
     pub costs: Vec<Line>,
-    /// Counts per slip.
     pub counts: Vec<Line>,
 }
 
 type LinesOf = fn(&Growth) -> &[Line];
 
 /// Draws a column of two panels for each size: costs above, counts below. Names are those of the last.
-///
-/// # Errors
-/// When there is nothing to draw.
 pub fn scaling(growths: &[Growth], look: &Look) -> Result<Picture, FigureError> {
     let columns = growths.len();
     let heights = &[280.0; 2];

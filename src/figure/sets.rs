@@ -24,7 +24,6 @@ pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {
 /// Sets that differ in the modulation alone.
 pub(super) struct Modulations<'a> {
     pub(super) modulated: Vec<&'a SetSummary>,
-    /// A set without modulation.
     pub(super) free: Option<&'a SetSummary>,
     /// Amplitudes of the modulated sets in m, ascending.
     pub(super) amplitudes: Vec<f64>,
@@ -154,7 +153,6 @@ impl Grid {
         Self { values, is_linear: false }
     }
 
-    /// Cells around all values.
     pub(super) fn cells(&self) -> impl Iterator<Item = (f64, f64)> {
         (0..self.values.len()).map(|index| self.cell(index))
     }

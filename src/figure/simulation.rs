@@ -35,7 +35,6 @@ const POINTS_PER_PERIOD: f64 = 40.0;
 pub struct AttachedMap<'a> {
     /// Instants in s, evenly spaced, ascending.
     pub times: &'a [f64],
-    /// Blocks.
     pub blocks: usize,
     /// Attached contacts over contacts, for every block at the first instant, then at the second, ...
     pub fractions: &'a [f64],
@@ -46,7 +45,6 @@ pub struct AttachedMap<'a> {
 /// What is shown of a simulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Simulation<'a> {
-    /// Its parameters.
     pub parameters: &'a Parameters,
     /// Shear force in N against time in s, if it is shown.
     pub trace: Option<&'a [(f64, f64)]>,
@@ -57,9 +55,6 @@ pub struct Simulation<'a> {
 }
 
 /// Draws what is given: the shear force against time, the map, or the map under the force; above them the modulation.
-///
-/// # Errors
-/// When what is given has fewer than two instants, or the map does not have one fraction per instant and block.
 pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture, FigureError> {
     let Simulation { parameters, trace, map, onsets } = *shown;
     let look = &look.with_note(&format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed));

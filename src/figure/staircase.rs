@@ -60,7 +60,6 @@ pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     Some(sheet.finish())
 }
 
-/// The axis of τ/T.
 fn intervals_axis(ratios: impl Iterator<Item = f64> + Clone) -> Option<Axis> {
     let label = "Slip interval τ / T, median";
     let (low, high) = bounds(ratios.clone())?;
@@ -94,7 +93,6 @@ const fn dot(ink: Ink) -> Dot {
     Dot::solid(ink, 3.0)
 }
 
-/// Quartiles of τ/T.
 fn quartiles(set: &SetSummary) -> Option<[f64; 3]> {
     let period = set.parameters.modulation_period?;
     Some(set.tau_quartiles?.map(|tau| tau / period))

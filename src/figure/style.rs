@@ -24,7 +24,6 @@ const COLUMNS: [f64; 2] = [86.0, 178.0];
 const MAX_ONE_COLUMN: f64 = 800.0;
 
 impl Style {
-    /// Points per unit.
     pub(super) const fn points(self) -> f64 {
         match self {
             Self::Screen => 0.75,
@@ -67,7 +66,6 @@ impl Style {
     }
 }
 
-/// Size of a figure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     /// Width in mm.
@@ -112,10 +110,8 @@ impl FromStr for Size {
     }
 }
 
-/// How figures are drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
-    /// What they are for.
     pub style: Style,
     /// Their size; as the data need if it is not given.
     pub size: Option<Size>,
@@ -125,13 +121,11 @@ pub struct Look {
 
 impl Look {
     /// The usual look of the figures of a sweep with this name.
-    #[must_use]
     pub fn of_sweep(name: &str) -> Self {
         Self { note: format!("Sweep {name}"), ..Self::default() }
     }
 
     /// The same look with more small print.
-    #[must_use]
     pub fn with_note(&self, more: &str) -> Self {
         let between = if self.note.is_empty() || more.is_empty() { "" } else { "; " };
         Self { note: format!("{}{between}{more}", self.note), ..self.clone() }
@@ -144,24 +138,18 @@ pub(super) const TICK_TEXT: u32 = 16;
 pub(super) const LABEL_TEXT: u32 = 18;
 /// Size of legends, and of labels in frames.
 pub(super) const LEGEND_TEXT: u32 = 15;
-/// Size of small print.
 pub(super) const NOTE_TEXT: u32 = 12;
 /// The digits' middle over their base line, over the size of the text.
 pub(super) const HALF_DIGIT: f64 = 0.36;
 
 /// Black for axes and text.
 pub(super) const BLACK: Ink = "#000000";
-/// For small print.
 pub(super) const DARK_GREY: Ink = "#555555";
 /// For data in the background.
 pub(super) const GREY: Ink = "#8c8c8c";
-/// For grid lines.
 pub(super) const LIGHT_GREY: Ink = "#b8b8b8";
-/// The ground.
 pub(super) const WHITE: Ink = "#ffffff";
-/// The paper's theory.
 pub(super) const RED: Ink = "#d62020";
-/// The paper's averages.
 pub(super) const BLUE: Ink = "#1f55c4";
 /// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
 pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
@@ -176,7 +164,6 @@ pub(super) const AXIS: Stroke = Stroke::solid(BLACK, 1.2);
 pub(super) const GRID: Stroke = Stroke::solid(LIGHT_GREY, 1.0);
 /// What the data are compared with.
 pub(super) const REFERENCE: Stroke = Stroke::dashed(GREY, 1.4, (6.0, 4.0));
-/// Error bars.
 pub(super) const BAR_WIDTH: f64 = 1.6;
 /// A range that is pointed out.
 pub(super) const STRIPE: Fill = Fill { ink: LIGHT_GREY, opacity: 0.35 };
@@ -188,7 +175,6 @@ pub(super) const fn curve(ink: Ink) -> Stroke {
     Stroke::solid(ink, 1.6)
 }
 
-/// A statistic.
 pub(super) const fn dot(ink: Ink) -> Dot {
     Dot::solid(ink, RADIUS)
 }

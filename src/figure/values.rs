@@ -38,7 +38,6 @@ pub(super) struct Values {
 }
 
 /// The columns of the sets that can be drawn.
-#[must_use]
 pub fn columns() -> Vec<Column> {
     Shown::columns()
 }

@@ -22,7 +22,6 @@ struct Pattern {
     has_holes: bool,
 }
 
-/// Patterns, drive by drive.
 const PATTERNS: [Pattern; 2] =
     [Pattern { dashes: None, has_holes: false }, Pattern { dashes: Some((5.0, 3.0)), has_holes: true }];
 
@@ -46,18 +45,14 @@ impl WorkPrecision {
 /// A method under one drive, setting by setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MethodLine {
-    /// Name of the method.
     pub method: String,
-    /// Name of the drive.
     pub drive: String,
     /// In the order of settings.
     pub points: Vec<WorkPrecision>,
 }
 
-/// One kind of error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorPanel {
-    /// What the error is.
     pub label: String,
     /// The largest error that chance alone gives, > 0, if it gives any.
     pub by_chance: Option<f64>,
@@ -73,9 +68,6 @@ impl ErrorPanel {
 
 /// Draws panels side by side, one for each kind of error, with a line per method and drive through its settings in the
 /// given order; values that are not > 0 are left out.
-///
-/// # Errors
-/// When a panel, or the figure, has nothing left.
 pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture, FigureError> {
     let empty = || FigureError::Empty { figure: NAME, what: "errors and costs" };
     let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);

@@ -61,7 +61,6 @@ struct Draw {
 
 impl Disorder {
     /// The disorder of a set of parameters.
-    #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         let contacts = parameters.blocks * parameters.contacts_per_block;
         Self {

@@ -66,7 +66,6 @@ impl Ramp {
 
 impl Drive {
     /// The drive of a set of parameters, in its first cycle.
-    #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         let period = parameters.modulation_period.unwrap_or(0.0);
         let ramp = Ramp::new(parameters);
@@ -100,20 +99,17 @@ impl Drive {
     }
 
     /// Whether the modulation is on.
-    #[must_use]
     pub fn is_modulated(&self) -> bool {
         self.amplitude > 0.0
     }
 
     /// η of the cycle in force, see [`eta`].
-    #[must_use]
     pub fn eta(&self) -> f64 {
         eta(self.angular_frequency, self.amplitude, self.velocity)
     }
 
     /// Phase of the modulation at a time in s, in (-2π, 2π) rad; reduced before scaling, so that it stays exact in long
     /// runs.
-    #[must_use]
     pub fn phase(&self, time: f64) -> f64 {
         if self.is_modulated() { TAU * ((time - self.cycle_start) / self.period).fract() } else { 0.0 }
     }

@@ -13,7 +13,6 @@
 use super::{Drive, Parameters};
 
 /// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
-#[must_use]
 pub fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
     drive.stiffness * (drive.motion(time).0 - trailing_edge)
 }
@@ -30,7 +29,6 @@ pub struct ContactSums {
 /// Accelerations x'' of the blocks, in m/s²: the equation of motion, term by term.
 ///
 /// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at `time`.
-#[must_use]
 pub fn acceleration(
     parameters: &Parameters,
     drive: &Drive,
@@ -60,7 +58,6 @@ pub struct StiffnessMatrix {
 
 impl StiffnessMatrix {
     /// The matrix for `contacts[j]` N/m of attached contacts at block j, with the driving spring.
-    #[must_use]
     pub fn new(parameters: &Parameters, contacts: &[f64]) -> Self {
         let coupling = parameters.coupling_stiffness();
         let last = contacts.len() - 1;
@@ -77,7 +74,6 @@ impl StiffnessMatrix {
     }
 
     /// The matrix with every contact attached, at its mean stiffness.
-    #[must_use]
     pub fn intact(parameters: &Parameters) -> Self {
         Self::new(parameters, &vec![parameters.block_contact_stiffness(); parameters.blocks])
     }
@@ -99,7 +95,6 @@ impl StiffnessMatrix {
 
     /// The eigenvalue with the given index, counted from the smallest, by bisection to the last bit, in N/m; infinite
     /// if an entry has overflowed.
-    #[must_use]
     pub fn eigenvalue(&self, index: usize) -> f64 {
         let widest = self.diagonal.iter().fold(0.0_f64, |most, d| most.max(*d)) + 2.0 * self.coupling.abs();
         if !widest.is_finite() {
@@ -116,7 +111,6 @@ impl StiffnessMatrix {
     }
 
     /// Solves S y = f e_1 for y_1 = y of the trailing edge and returns f/y_1, in N/m: the stiffness seen there.
-    #[must_use]
     pub fn end_stiffness(&self) -> f64 {
         let last = self.diagonal.len() - 1;
         self.diagonal[..last]
@@ -127,13 +121,11 @@ impl StiffnessMatrix {
 }
 
 /// Largest angular frequency of the intact slider, in rad/s.
-#[must_use]
 pub fn largest_frequency(parameters: &Parameters) -> f64 {
     (StiffnessMatrix::intact(parameters).eigenvalue(parameters.blocks - 1) / parameters.block_mass()).sqrt()
 }
 
 /// Largest stable time step 2/ω_max of an explicit leapfrog scheme on the intact slider, in s.
-#[must_use]
 pub fn stability_limit(parameters: &Parameters) -> f64 {
     2.0 / largest_frequency(parameters)
 }

@@ -29,7 +29,6 @@
 
 use std::ops::Bound;
 
-/// Description of one field.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// Key in files, flags and tables.
@@ -50,7 +49,6 @@ pub struct Description {
 
 impl Description {
     /// The allowed values with the rule beside other fields.
-    #[must_use]
     pub fn requirement(&self) -> String {
         if self.rule.is_empty() { self.allowed.to_owned() } else { format!("{}, {}", self.allowed, self.rule) }
     }
@@ -154,7 +152,6 @@ macro_rules! fields {
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$variant),+];
 
             /// Key, unit, meaning and range.
-            #[must_use]
             pub const fn description(self) -> $crate::model::Description {
                 match self {$(
                     Self::$variant => $crate::model::Description {
@@ -176,19 +173,16 @@ macro_rules! fields {
             }
 
             /// Key in files, flags and tables.
-            #[must_use]
             pub const fn key(self) -> &'static str {
                 self.description().key
             }
 
             /// The field with this key.
-            #[must_use]
             pub fn from_key(key: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|field| field.key() == key)
             }
 
             /// The canonical form of a value that the field can take by itself: equal values have equal bits.
-            #[must_use]
             pub fn checked(self, value: $crate::model::Value) -> Option<$crate::model::Value> {
                 use $crate::model::value::FieldType;
                 use std::ops::RangeBounds;
@@ -202,7 +196,6 @@ macro_rules! fields {
 
         impl $Struct {
             /// The value of a field.
-            #[must_use]
             pub fn get(&self, field: $Key) -> $crate::model::Value {
                 match field {$(
                     $Key::$variant => $crate::model::value::FieldType::to_value(&self.$field),

@@ -15,7 +15,6 @@ use std::array;
 pub enum Change {
     /// It attached, unstressed.
     Attach,
-    /// It broke.
     Break,
 }
 
@@ -30,7 +29,6 @@ pub struct ContactEvent {
     pub contact: usize,
     /// Life of the contact: 0 is the initial attachment.
     pub generation: u32,
-    /// Attached or broke.
     pub change: Change,
     /// Displacement of the block, in m.
     pub displacement: f64,
@@ -137,7 +135,6 @@ pub struct Interface {
 
 impl Interface {
     /// All contacts attached and unstressed at displacement 0, each in generation 0.
-    #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         let blocks = parameters.blocks;
         let rows_per_block = parameters.contacts_per_block.div_ceil(LANES);
@@ -183,21 +180,18 @@ impl Interface {
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.
     #[inline(always)]
-    #[must_use]
     pub fn next_reattachment(&self) -> f64 {
         self.reattachments.next().map_or(f64::INFINITY, Due::time)
     }
 
     /// Block of the next reattachment, if any contact is detached.
     #[inline(always)]
-    #[must_use]
     pub fn next_reattachment_block(&self) -> Option<usize> {
         self.reattachments.next().map(Due::block)
     }
 
     /// Time in s and block of the next reattachment, if it is due by a time in s.
     #[inline(always)]
-    #[must_use]
     pub fn next_reattachment_by(&self, time: f64) -> Option<(f64, usize)> {
         self.reattachments.next().map(|due| (due.time(), due.block())).filter(|(due, _)| *due <= time)
     }
@@ -319,7 +313,6 @@ impl Interface {
     }
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.
-    #[must_use]
     pub fn elastic_energy(&self, displacements: &[f64]) -> f64 {
         let of_row = |displacement: f64, row: &ContactRow| -> [f64; LANES] {
             array::from_fn(|lane| {

@@ -4,7 +4,6 @@
 use std::array;
 use std::ops::{Deref, DerefMut};
 
-/// Lanes of a row.
 pub(crate) const LANES: usize = 8;
 
 /// Eight doubles in one cache line.

@@ -58,7 +58,6 @@ const MAX_RAMPED_PERIODS: f64 = 1e9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{} = {value}: must be {}", .symbol.key(), .symbol.description().requirement())]
 pub struct ParameterError {
-    /// The parameter.
     pub symbol: Symbol,
     /// The refused value, as given.
     pub value: String,
@@ -66,18 +65,12 @@ pub struct ParameterError {
 
 impl Parameters {
     /// Sets one parameter. Whole reals are accepted for counts and whole numbers for reals.
-    ///
-    /// # Errors
-    /// When the kind of value does not fit the symbol. The range is checked by [`Parameters::validated`].
     pub fn set(&mut self, symbol: Symbol, value: Value) -> Result<(), ParameterError> {
         self.put(symbol, value).ok_or_else(|| ParameterError { symbol, value: value.to_string() })
     }
 
     /// Checks every range and rule and brings the values into canonical form: without modulation there is no period, and
     /// no negative zero.
-    ///
-    /// # Errors
-    /// Names the first parameter that is out of range, its value and what is allowed.
     pub fn validated(mut self) -> Result<Self, ParameterError> {
         for symbol in Symbol::ALL {
             let value = self.get(symbol);
@@ -120,50 +113,42 @@ impl Parameters {
     }
 
     /// Mass of one block m = M/N, in kg.
-    #[must_use]
     pub fn block_mass(&self) -> f64 {
         self.slider_mass / self.blocks as f64
     }
 
     /// Stiffness `K_int = (N-1) K` between neighbouring blocks, in N/m.
-    #[must_use]
     pub fn coupling_stiffness(&self) -> f64 {
         (self.blocks - 1) as f64 * self.slider_stiffness
     }
 
     /// Stiffness `K_s = k N_s` of the intact contacts of one block, in N/m.
-    #[must_use]
     pub fn block_contact_stiffness(&self) -> f64 {
         self.contact_stiffness * self.contacts_per_block as f64
     }
 
     /// Contact reach `f_s/k`, in m: how far a block moves until a mean contact breaks. The scale of every tolerance.
-    #[must_use]
     pub fn contact_reach(&self) -> f64 {
         self.mean_threshold / self.contact_stiffness
     }
 
     /// Angular frequency 2π/T of the modulation, in rad/s; 0 when it is off.
-    #[must_use]
     pub fn modulation_frequency(&self) -> f64 {
         self.modulation_period.map_or(0.0, |period| TAU / period)
     }
 
     /// The largest angular frequency of the modulation on its ramp, in rad/s; 0 when it is off.
-    #[must_use]
     pub fn largest_modulation_frequency(&self) -> f64 {
         self.turning_period.map_or(0.0, |period| TAU / period).max(self.modulation_frequency())
     }
 
     /// η of the modulation, see [`eta`](super::theory::eta).
-    #[must_use]
     pub fn eta(&self) -> f64 {
         eta(self.modulation_frequency(), self.modulation_amplitude, self.drive_velocity)
     }
 
     /// Wave crossing time `t_c = N sqrt(m/K_int)`, in s: no front spans a longer gap between breaks. For one block, its
     /// period 2π sqrt(m/(`K_s` + `K_d`)).
-    #[must_use]
     pub fn wave_crossing_time(&self) -> f64 {
         if self.blocks == 1 {
             TAU * (self.block_mass() / (self.block_contact_stiffness() + self.drive_stiffness)).sqrt()

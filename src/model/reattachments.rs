@@ -39,7 +39,6 @@ impl Due {
     }
 }
 
-/// The reattachments to come.
 #[derive(Clone, Debug)]
 pub(super) struct Reattachments {
     contacts_per_block: usize,

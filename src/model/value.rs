@@ -6,7 +6,6 @@ use std::str::FromStr;
 /// Largest integer that a double, and so every reader of a table, holds exactly.
 const MAX_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
 
-/// When a contact breaks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BreakOn {
     /// When the magnitude of its force reaches the threshold, pulled forward or backward.
@@ -18,7 +17,6 @@ pub enum BreakOn {
 
 impl BreakOn {
     /// The word used in files and flags.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Magnitude => "magnitude",
@@ -42,9 +40,7 @@ pub enum Value {
     Count(u64),
     /// A quantity in SI units.
     Real(f64),
-    /// Yes or no.
     Flag(bool),
-    /// The rule for breaking.
     BreakOn(BreakOn),
     /// A value that is not there, such as a period while the modulation is off.
     Absent,
@@ -52,7 +48,6 @@ pub enum Value {
 
 impl Value {
     /// A count or a quantity as a double.
-    #[must_use]
     pub const fn number(self) -> Option<f64> {
         match self {
             Self::Count(count) => Some(count as f64),
@@ -62,7 +57,6 @@ impl Value {
     }
 
     /// A letter for the kind, and bits that differ where canonical values of a kind do. Part of every job id.
-    #[must_use]
     pub const fn bits(self) -> (u8, u64) {
         match self {
             Self::Count(count) => (b'n', count),

@@ -5,7 +5,6 @@ use crate::model::Parameters;
 use crate::solver::{Limits, SimulationError, Solver, Summary, simulate, simulate_audited};
 use std::sync::atomic::AtomicBool;
 
-/// What a job measured.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     /// Slips past start-up, in order.
@@ -32,16 +31,12 @@ impl Measurements {
     }
 
     /// How the slider moved; `None` without averages.
-    #[must_use]
     pub fn regime(&self) -> Option<Regime> {
         self.averages.map(|averages| Regime::at(averages.slip_share))
     }
 }
 
 /// Simulates one realisation and measures what is to be recorded. The result is a function of the first three arguments.
-///
-/// # Errors
-/// When the simulation cannot continue, or is interrupted.
 pub fn measure(
     parameters: &Parameters,
     recording: &Recording,

@@ -33,7 +33,6 @@ const GIVE_UP_PERIODS: f64 = 2.0;
 
 impl Recording {
     /// Time without a slip after which a job ends, in s.
-    #[must_use]
     pub fn give_up_time(&self, parameters: &Parameters) -> f64 {
         let Some(distance) = self.give_up_after else {
             let periods = [parameters.modulation_period, parameters.turning_period];
@@ -58,7 +57,6 @@ impl Recording {
 
 impl RecordingKey {
     /// The flag of `stickslip simulate`, without its dashes; none for what has an effect in the tables of a sweep only.
-    #[must_use]
     pub fn flag(self) -> Option<String> {
         match self {
             Self::Precursors => None,

@@ -20,18 +20,14 @@ pub enum Regime {
     StickSlip,
     /// It slips for most of the time.
     Mixed,
-    /// It does not stick.
     Sliding,
 }
 
 impl Regime {
-    /// All of them.
     pub const ALL: [Self; 3] = [Self::StickSlip, Self::Mixed, Self::Sliding];
     /// Least share of time within slips of the mixed regime, and of sliding.
     pub const MIN_SHARES: [f64; 2] = [0.5, 0.95];
 
-    /// Its word in tables.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::StickSlip => "stick-slip",
@@ -41,7 +37,6 @@ impl Regime {
     }
 
     /// The regime at a share of time within slips.
-    #[must_use]
     pub fn at(slip_share: f64) -> Self {
         let [mixed, sliding] = Self::MIN_SHARES;
         if slip_share < mixed {

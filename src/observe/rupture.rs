@@ -11,14 +11,12 @@ pub struct Rupture {
     pub first_block: usize,
     /// Time of the last break so far, in s.
     pub last_time: f64,
-    /// Breaks.
     pub size: u64,
     /// The furthest block with a break, from 0.
     pub reach: usize,
     /// Blocks with a break, in the order of their first break, and its time in s.
     pub fronts: Vec<(usize, f64)>,
     broken: Vec<bool>,
-    /// Contacts attached before it.
     pub attached_before: u64,
     /// Fewest contacts attached so far.
     pub least_attached: u64,
@@ -42,7 +40,6 @@ impl Rupture {
         rupture
     }
 
-    /// Adds a break.
     pub fn include(&mut self, event: &ContactEvent) {
         self.last_time = event.time;
         self.size += 1;

@@ -6,9 +6,7 @@ use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
 /// Several observers of one run; the first decides when it has seen enough.
 pub struct Observers<'a> {
-    /// The observer that decides.
     pub lead: &'a mut dyn Observer,
-    /// Those that follow.
     pub others: Vec<&'a mut dyn Observer>,
 }
 
@@ -81,12 +79,10 @@ pub struct Trace {
     contacts: f64,
     attached: u64,
     sampling: Sampling,
-    /// The samples so far.
     pub rows: Vec<TraceRow>,
 }
 
 impl Trace {
-    /// Samples every `spacing` s.
     pub fn new(parameters: &Parameters, spacing: f64) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
         let drive = Drive::new(parameters);
@@ -142,7 +138,6 @@ pub struct AttachedMap {
 }
 
 impl AttachedMap {
-    /// Samples every `spacing` s.
     pub fn new(parameters: &Parameters, spacing: f64) -> Self {
         Self {
             contacts_per_block: parameters.contacts_per_block as f64,
@@ -198,7 +193,6 @@ pub struct Profile {
 
 impl Profile {
     /// The profile of a slider.
-    #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         Self { spacing: parameters.slider_length / parameters.blocks as f64, rows: Vec::new() }
     }
@@ -292,7 +286,6 @@ tables! {
 /// An observer that keeps every contact event in order.
 #[derive(Clone, Debug, Default)]
 pub struct ContactLog {
-    /// The events so far.
     pub events: Vec<ContactEvent>,
 }
 

@@ -32,13 +32,11 @@ impl Modulation {
     }
 
     /// η at the onset, under a drive at this velocity in m/s; 0 without modulation.
-    #[must_use]
     pub fn eta(&self, drive_velocity: f64) -> f64 {
         self.period.map_or(0.0, |period| eta(TAU / period, self.amplitude, drive_velocity))
     }
 
     /// Number n of periods nearest to an interval in s; `None` without modulation.
-    #[must_use]
     pub fn periods(&self, interval: f64) -> Option<u64> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "intervals are > 0")]
         self.period.map(|period| (interval / period).round() as u64)
@@ -136,7 +134,6 @@ impl Peak {
 /// An instant, and what has been counted up to it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Instant {
-    /// In s.
     time: f64,
     /// Shear force, in N.
     force: f64,
@@ -211,7 +208,6 @@ struct Active {
     /// Least force so far, and up to the last break, in N.
     least: f64,
     least_at_last_break: f64,
-    /// First and last break.
     first: Instant,
     last: Instant,
     /// Whether the shear force was rising at the onset.

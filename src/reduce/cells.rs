@@ -165,9 +165,7 @@ fn class(value: StatisticValue, contrast: &Contrast) -> (String, Option<f64>) {
 
 /// The cells of a sweep.
 pub struct Cells<'a> {
-    /// The sweep.
     pub sweep: &'a Sweep,
-    /// How it is refined.
     pub refinement: &'a Refinement,
     /// The sets that its rounds have run.
     pub known: &'a BTreeMap<u64, &'a SetRow>,

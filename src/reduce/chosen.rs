@@ -26,7 +26,6 @@ pub struct ChosenSet {
     pub number: u64,
     /// Number of its jobs, failed ones included.
     pub jobs: u64,
-    /// Its statistics.
     pub row: SetRow,
 }
 
@@ -39,9 +38,6 @@ struct Jobs {
 }
 
 /// Reduces the sets of the jobs that `choose` gives a number, in the order of the numbers: one for each set.
-///
-/// # Errors
-/// When a table is damaged or cannot be read.
 pub fn reduce_chosen(
     results: &Results<'_>,
     choose: impl Fn(&Parameters) -> Option<u64>,
@@ -112,7 +108,6 @@ pub(crate) fn row_of(parameters: &Parameters, jobs: &[crate::observe::Measuremen
     slips.finish(set).row
 }
 
-/// Reduces these sets.
 fn reduce_sets(files: Dataset<'_>, sets: Vec<Jobs>) -> Result<Vec<ChosenSet>, DatasetError> {
     let mut slips: HashMap<String, BTreeMap<u64, Vec<Slip>>> = HashMap::new();
     for Jobs { set_id, by_seed, .. } in &sets {

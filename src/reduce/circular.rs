@@ -41,7 +41,6 @@ impl Estimate<2> {
 }
 
 /// The representative of an angle in (`top` - 2π, `top`], in rad.
-#[must_use]
 pub fn wrap(angle: f64, top: f64) -> f64 {
     let wrapped = angle - TAU * ((angle - top) / TAU).ceil();
     // Rounding may end just outside.
@@ -54,7 +53,6 @@ const MAX_SADDLE_POINT: u64 = 50;
 
 /// p-value of the Rayleigh test for `count` angles with a mean resultant length of 0 to 1. Accurate to 10 % down to
 /// 1e-4 (15 % for three angles near p = 0.16).
-#[must_use]
 pub fn rayleigh_probability(count: u64, length: f64) -> f64 {
     let n = count as f64;
     match count {
@@ -102,7 +100,6 @@ fn saddle_tail(n: f64, from: f64) -> f64 {
 struct VonMises {
     /// Its mean resultant length A = I1/I0.
     length: f64,
-    /// dA/dκ.
     slope: f64,
     /// ln I0(κ) - κ A.
     log_normal: f64,

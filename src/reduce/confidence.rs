@@ -11,9 +11,7 @@ pub const CONFIDENCE: f64 = 0.95;
 /// The ends of a 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Lower end.
     pub low: f64,
-    /// Upper end.
     pub high: f64,
 }
 
@@ -55,7 +53,6 @@ impl Interval {
 
 impl Moments {
     /// Of the mean of independent values; `None` for fewer than two.
-    #[must_use]
     pub fn interval(&self) -> Option<Interval> {
         let n = self.count() as f64;
         Some(Interval::about(self.mean()?, self.deviation()? / n.sqrt(), n - 1.0))

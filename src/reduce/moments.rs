@@ -9,7 +9,6 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Adds a value.
     pub fn push(&mut self, value: f64) {
         self.count += 1;
         let before = value - self.mean;
@@ -17,20 +16,16 @@ impl Moments {
         self.squares += before * (value - self.mean);
     }
 
-    /// Number of values.
-    #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
 
     /// Mean; `None` without values.
-    #[must_use]
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.mean)
     }
 
     /// Standard deviation of the sample (n - 1); `None` for fewer than two values.
-    #[must_use]
     pub fn deviation(&self) -> Option<f64> {
         (self.count > 1).then(|| (self.squares / (self.count - 1) as f64).sqrt())
     }
@@ -43,7 +38,6 @@ impl Extend<f64> for Moments {
 }
 
 /// Quantile of sorted values, interpolated linearly (NumPy's default); `None` without values.
-#[must_use]
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;

@@ -10,7 +10,6 @@ pub const MAX_POINTS: u64 = 20_000;
 pub enum RampStage {
     /// On the way to the turning point.
     Up,
-    /// On the way back.
     Down,
     /// When the ramp is over.
     After,

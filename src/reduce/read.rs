@@ -9,7 +9,6 @@ use crate::table::file::{Dataset, DatasetError};
 
 /// A set as figures need it. Quantities are SI; `None` where there is nothing to average.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[allow(missing_docs, reason = "those without a word are described in `SetRow`")]
 pub struct SetSummary {
     pub set_id: String,
     /// The seed is the default.
@@ -32,7 +31,6 @@ pub struct SetSummary {
 /// A statistic and, where it is known, its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistic {
-    /// The statistic.
     pub value: f64,
     /// Lower and upper end of the interval.
     pub interval: Option<(f64, f64)>,
@@ -45,14 +43,12 @@ impl Statistic {
     }
 
     /// Scaled by a factor > 0, as into another unit.
-    #[must_use]
     pub fn times(self, factor: f64) -> Self {
         let interval = self.interval.map(|(low, high)| (factor * low, factor * high));
         Self { value: factor * self.value, interval }
     }
 
     /// Lower and upper end of what is known to belong to it: the interval, or the value alone.
-    #[must_use]
     pub fn ends(self) -> [f64; 2] {
         self.interval.map_or([self.value; 2], |(low, high)| [low.min(self.value), high.max(self.value)])
     }
@@ -79,18 +75,12 @@ impl From<SetRow> for SetSummary {
 }
 
 /// The rows of a reduced table, such as [`Point`](super::Point).
-///
-/// # Errors
-/// When the file is not there or is damaged.
 pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, DatasetError> {
     let batches = Dataset::new(layout.storage, vec![layout.reduced_file(R::NAME)]).rows();
     Ok(batches.collect::<Result<Vec<Vec<R>>, _>>()?.into_iter().flatten().collect())
 }
 
 /// The sets with at least one interval or a regime, in order, if there are at most `max` of them; else none.
-///
-/// # Errors
-/// When the file is not there or is damaged.
 pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetSummary>, DatasetError> {
     let mut sets = Vec::new();
     for batch in Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>() {

@@ -58,17 +58,13 @@ pub enum ReduceError {
 /// What a reduction found, in brief.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReductionSummary {
-    /// [`SUMMARY_FORMAT`].
     pub format: u32,
     /// Jobs run to an end.
     pub jobs: u64,
-    /// Jobs that failed.
     pub failed_jobs: u64,
-    /// Parameter sets.
     pub sets: u64,
     /// Sets with modulation whose phases are locked.
     pub locked_sets: u64,
-    /// Slips.
     pub slips: u64,
     /// Points kept for scatter figures.
     pub points: u64,
@@ -78,9 +74,7 @@ pub struct ReductionSummary {
 
 /// Reduces the tables of a results directory to `reduced/{sets,histograms,startup,backbone,points}.parquet`, over those
 /// of an earlier reduction, with the sweep that was asked for last in their footers.
-///
-/// # Errors
-/// When there is no job, a table is damaged, or the reduced data cannot be written; earlier reduced files stay whole.
+/// On an error, earlier reduced files stay whole.
 pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary, ReduceError> {
     reduce_by(results, MAX_SLIPS)
 }
@@ -368,7 +362,6 @@ mod tests {
         }
     }
 
-    /// A directory without tables.
     fn without_jobs() -> (tempfile::TempDir, Results<'static>) {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();

@@ -140,7 +140,6 @@ fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
     sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
 }
 
-/// A symmetric matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Matrix<const D: usize>([[f64; D]; D]);
 
@@ -175,7 +174,6 @@ impl<const D: usize> Matrix<D> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<const D: usize> {
     count: u64,
-    /// Sum of the values.
     total: [f64; D],
     /// Covariance of the sum if the values were independent.
     independent: Matrix<D>,
@@ -212,7 +210,6 @@ impl<const D: usize> Estimate<D> {
         self
     }
 
-    /// Number of values.
     pub(super) const fn count(&self) -> u64 {
         self.count
     }

@@ -32,7 +32,6 @@ pub struct SetJobs {
     pub parameters: Parameters,
     /// Jobs that were run to an end.
     pub finished: u64,
-    /// Jobs that failed.
     pub failed: u64,
     /// Slips that the jobs recorded.
     pub slips: u64,
@@ -50,7 +49,6 @@ pub struct SetJobs {
 
 impl SetJobs {
     /// A set without jobs so far.
-    #[must_use]
     pub fn new(set_id: String, parameters: Parameters) -> Self {
         let none = Moments::default();
         Self {
@@ -148,7 +146,6 @@ impl Table for SetRow {
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
     slips: Vec<SlipStats>,
-    /// Where jobs begin.
     starts: Vec<usize>,
     below: u64,
     drop: Moments,
@@ -291,7 +288,6 @@ fn estimate<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats)
 /// A set whose slips are all there.
 #[derive(Clone, Debug)]
 pub(super) struct FinishedSet {
-    /// Its statistics.
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
@@ -299,7 +295,6 @@ pub(super) struct FinishedSet {
     pub(super) phases: Estimate<2>,
     /// Its load phases, for η < 1.
     pub(super) loads: Estimate<2>,
-    /// Slips under the back-bone.
     pub(super) below: u64,
     /// Its first slips against the later ones.
     pub(super) startup: Vec<StartupRow>,

@@ -11,7 +11,6 @@ pub enum StatisticValue {
     Number(f64),
     /// A flag or a word.
     Class(String),
-    /// No value.
     Nothing,
 }
 
@@ -23,7 +22,6 @@ impl StatisticValue {
 
 impl SetRow {
     /// What a column holds, by its name; nothing if there is no such column.
-    #[must_use]
     pub fn statistic(&self, column: &str) -> StatisticValue {
         let wanted = Self::columns().iter().position(|known| known.name == column);
         let (mut position, mut value) = (0, StatisticValue::Nothing);
@@ -44,7 +42,6 @@ impl SetRow {
 
     /// The half-width of the interval of the least precise statistic over its target: 1 or less if all are as precise as
     /// is wanted. `None` if none of them has a value.
-    #[must_use]
     pub fn error_over_target(&self, precision: &Precision) -> Option<f64> {
         let errors = precision.statistics.iter().filter_map(|statistic| {
             let value = self.statistic(statistic.key).number()?;

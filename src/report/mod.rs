@@ -38,7 +38,6 @@ pub enum ReportError {
     /// The directory cannot be looked through.
     #[error(transparent)]
     Results(#[from] ResultsError),
-    /// A file operation failed.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// The content cannot be put into the page.
@@ -49,9 +48,6 @@ pub enum ReportError {
 /// The report of a directory as HTML. Reduces the tables first if they are newer than the reduced data.
 ///
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
-///
-/// # Errors
-/// When there are no jobs, or a table or log cannot be read.
 pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String, ReportError> {
     if !is_reduced(results.layout())? {
         reduce(results)?;
@@ -61,9 +57,6 @@ pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String, 
 }
 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.
-///
-/// # Errors
-/// As [`page`], and when the file cannot be written; an earlier one stays whole.
 pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf, ReportError> {
     let (layout, page) = (results.layout(), page(results, refresh)?);
     let _alone = alone(layout, WRITER)?;

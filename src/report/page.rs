@@ -29,7 +29,6 @@ pub enum EncodingError {
     /// It has no form as JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// It cannot be compressed.
     #[error(transparent)]
     Compression(#[from] io::Error),
 }

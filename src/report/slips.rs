@@ -46,7 +46,6 @@ columns! {
 pub(super) struct Slips {
     /// Every so many slips one is shown.
     every: u64,
-    /// Number of those shown.
     rows: usize,
     columns: Vec<Described>,
     /// Of each job with a slip that is shown: the place of its set, and its seed.

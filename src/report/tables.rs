@@ -32,7 +32,6 @@ impl From<Column> for Described {
     }
 }
 
-/// Rows, column by column.
 #[derive(Debug, Serialize)]
 pub(super) struct Columns {
     columns: Vec<Described>,
@@ -74,12 +73,10 @@ fn rounded(real: f64) -> f64 {
 /// How many sets of which kind there are.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Census {
-    /// All sets.
     pub sets: u64,
     locked: u64,
     /// By regime; those without a finished job under an empty name.
     regimes: BTreeMap<&'static str, u64>,
-    /// Slips of all sets.
     pub slips: u64,
 }
 

@@ -20,22 +20,16 @@ pub struct Claims<'a> {
     own: HashSet<String>,
 }
 
-/// How a claim stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing<'a> {
     /// Nobody has it: this generation can be made.
     Free(u64),
-    /// This worker has it.
     Own,
     /// Another has it that lives.
     Taken(&'a str),
 }
 
 impl<'a> Claims<'a> {
-    /// Lists the claims.
-    ///
-    /// # Errors
-    /// When they cannot be listed.
     pub fn list(results: &'a Results<'a>, member: &'a Member<'a>) -> Result<Self, StorageError> {
         results.layout().ensure_folder(&results.layout().claims())?;
         let mut claims = Self { results, member, generations: HashMap::new(), own: HashSet::new() };
@@ -43,10 +37,6 @@ impl<'a> Claims<'a> {
         Ok(claims)
     }
 
-    /// Lists them again.
-    ///
-    /// # Errors
-    /// As [`Claims::list`].
     pub fn refresh(&mut self) -> Result<(), StorageError> {
         let names = self.results.layout().storage.list(&self.results.layout().claims())?;
         for name in &names {
@@ -61,15 +51,11 @@ impl<'a> Claims<'a> {
     }
 
     /// The last generation of a claim, as far as is known; `None` if nobody has claimed it.
-    #[must_use]
     pub fn last(&self, what: &str) -> Option<u64> {
         self.generations.get(what).copied()
     }
 
     /// How a claim stands among workers that live.
-    ///
-    /// # Errors
-    /// When it cannot be read.
     pub fn standing<'l>(&self, what: &str, living: &'l BTreeMap<String, Living>) -> Result<Standing<'l>, StorageError> {
         if self.own.contains(what) {
             return Ok(Standing::Own);
@@ -84,9 +70,6 @@ impl<'a> Claims<'a> {
     }
 
     /// Makes a claim; false if another was first.
-    ///
-    /// # Errors
-    /// When it cannot be made.
     pub fn take(&mut self, what: &str, generation: u64) -> Result<bool, ResultsError> {
         let layout = self.results.layout();
         let path = layout.claims().join(format!("{what}.{generation}"));

@@ -25,9 +25,6 @@ pub struct Commit<'a> {
 
 impl<'a> Commit<'a> {
     /// Begins in a staging folder of a directory.
-    ///
-    /// # Errors
-    /// When the folder cannot be made.
     pub fn begin(layout: &Layout<'a>, staging: &Path) -> Result<Self, StorageError> {
         layout.ensure_folder(staging)?;
         let token = format!("{:016x}", own_number());
@@ -35,9 +32,6 @@ impl<'a> Commit<'a> {
     }
 
     /// Creates the next file, which is to be written, and synced, before it goes to its target.
-    ///
-    /// # Errors
-    /// When it cannot be created.
     pub fn stage(&mut self, target: &Path) -> Result<StoredFile, StorageError> {
         let staged = self.next_staged(target);
         self.storage.create(&staged)
@@ -53,9 +47,6 @@ impl<'a> Commit<'a> {
     }
 
     /// Stages a small file of which all bytes are known.
-    ///
-    /// # Errors
-    /// When it cannot be written.
     pub fn stage_bytes(&mut self, target: &Path, bytes: &[u8]) -> Result<(), StorageError> {
         let mut file = self.stage(target)?;
         file.write(bytes)?;
@@ -63,18 +54,13 @@ impl<'a> Commit<'a> {
     }
 
     /// Stages a file that lies elsewhere and is to stay there.
-    ///
-    /// # Errors
-    /// When it cannot be linked or copied.
     pub(super) fn stage_link(&mut self, from: &Path, target: &Path) -> Result<(), StorageError> {
         let staged = self.next_staged(target);
         self.storage.link(from, &staged)
     }
 
     /// Moves the staged files to their targets, in the order in which they were staged.
-    ///
-    /// # Errors
-    /// When a move fails; the files before it are in their places.
+    /// If a move fails, the files before it are in their places.
     pub fn publish(mut self) -> Result<(), StorageError> {
         for (staged, target) in &self.staged {
             self.storage.rename(staged, target)?;
@@ -104,9 +90,6 @@ pub(super) fn own_number() -> u64 {
 /// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
 /// file system without locks lets in all, and nothing is removed: their files are then whole, but may be of one and of the
 /// other.
-///
-/// # Errors
-/// When another does not end within minutes, or a file operation fails.
 pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
     layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);

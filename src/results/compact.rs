@@ -33,18 +33,13 @@ const PARTS_PER_FILE: u64 = 512;
 /// How long the tables that were replaced stay, unless the next compaction comes first.
 pub(crate) const GRACE: Duration = Duration::from_mins(1);
 
-/// What a compaction made.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Compacted {
-    /// Whether anything was changed.
     pub changed: bool,
     /// Parts in the compacted files.
     pub parts: u64,
-    /// Jobs in them.
     pub jobs: u64,
-    /// Files of all tables.
     pub files: u64,
-    /// Their bytes.
     pub bytes: u64,
     /// Parts with failed jobs, which keep their own files.
     pub failed_parts: u64,
@@ -85,9 +80,6 @@ struct CompactionPlan {
 
 impl Results<'_> {
     /// Compacts the parts that are done and have no failed jobs.
-    ///
-    /// # Errors
-    /// When a shard is being run, something is damaged, or the file system cannot do it. The tables are then as before.
     pub fn compact(&self) -> Result<Compacted, ResultsError> {
         self.compact_by(PARTS_PER_FILE)
     }

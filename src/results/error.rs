@@ -23,7 +23,6 @@ pub enum ErrorKind {
 /// A results directory that cannot be used or changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ResultsError {
-    /// Whose fault it is.
     pub kind: ErrorKind,
     /// The file or the directory.
     pub path: PathBuf,
@@ -41,7 +40,6 @@ impl ResultsError {
         Self::new(ErrorKind::Refused, path, problem)
     }
 
-    /// Another process has it.
     pub fn busy(path: &Path, problem: impl Into<String>) -> Self {
         Self::new(ErrorKind::Busy, path, problem)
     }

@@ -22,19 +22,14 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub enum RunEvent {
     /// A run knows what is to be done.
     Started {
-        /// Name of the host.
         host: String,
-        /// Id of the process.
         process: u32,
-        /// Program and version.
         program: String,
         /// Shard, as `K/N`.
         shard: String,
         /// Other workers that are there.
         others: usize,
-        /// Threads.
         threads: usize,
-        /// Jobs to run.
         jobs: u64,
         /// Jobs that are there already.
         jobs_there: u64,
@@ -43,9 +38,7 @@ pub enum RunEvent {
     },
     /// The next round of a sweep that decides for itself has begun.
     RoundBegun {
-        /// Jobs that it runs.
         jobs: u64,
-        /// Their predicted cost.
         predicted_cost: f64,
         /// How far the rounds are.
         #[serde(flatten)]
@@ -53,51 +46,37 @@ pub enum RunEvent {
     },
     /// A job is done, though not yet committed.
     JobDone {
-        /// Slips recorded.
         slips: usize,
-        /// Predicted cost.
         predicted_cost: f64,
     },
-    /// A job takes long.
     JobTakesLong {
         /// The command that does the same, to look at it alone.
         command: String,
-        /// Predicted cost.
         predicted_cost: f64,
-        /// Wall time so far.
         wall: f64,
     },
-    /// Time passes.
     Tick,
     /// What other workers have committed since the run began.
     OthersDone {
-        /// Number of jobs.
         jobs: u64,
         /// Predicted cost of these jobs.
         predicted_cost: f64,
     },
     /// A job failed; the others continue.
     JobFailed {
-        /// Its id.
         job_id: String,
-        /// Why.
         reason: String,
         /// The command that does the same, to look at it alone.
         command: String,
-        /// Predicted cost.
         predicted_cost: f64,
     },
-    /// A part is committed.
     PartCommitted {
-        /// Its name.
         part: String,
         /// Jobs that were run for it.
         jobs: usize,
-        /// Those that failed.
         failed: usize,
         /// Predicted cost of these jobs.
         predicted_cost: f64,
-        /// Their measured cost.
         measured_cost: f64,
         /// Sum of their wall times.
         wall: f64,
@@ -110,20 +89,16 @@ pub enum RunEvent {
     Finished(RunReport),
     /// The run ends with an error.
     Error {
-        /// The error.
         error: String,
     },
     /// The rows of a committed part were damaged and taken away, so that it is run again.
     PartQuarantined {
-        /// Its name.
         part: String,
     },
     /// A part was taken over from another directory.
     PartMerged {
-        /// Its name.
         part: String,
     },
-    /// Parts were compacted.
     Compacted {
         /// Names of the files of the jobs table.
         files: Vec<String>,
@@ -141,7 +116,6 @@ pub struct RunReport {
     pub jobs_left: u64,
     /// Jobs finished of parts that are not done; they are kept.
     pub jobs_spilled: u64,
-    /// Parts committed.
     pub parts_committed: u64,
     /// Whether the run was stopped, or its time did not suffice, before all was done.
     pub stopped: bool,
@@ -162,7 +136,6 @@ pub struct RunReport {
 
 impl RunEvent {
     /// The event with which a run begins.
-    #[must_use]
     pub fn started(
         shard: String,
         others: usize,
@@ -193,11 +166,9 @@ struct Line {
     event: RunEvent,
 }
 
-/// Fallback host name.
 pub(super) const UNKNOWN_HOST: &str = "unknown";
 
 /// Name of this host, or "unknown".
-#[must_use]
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
@@ -214,17 +185,11 @@ pub struct Log(StoredFile);
 
 impl Log {
     /// Brings what was written to the disk, where other hosts see it.
-    ///
-    /// # Errors
-    /// When it cannot be brought there.
     pub fn sync(&mut self) -> Result<(), StorageError> {
         self.0.sync()
     }
 
     /// Appends an event, if it is one that the log keeps.
-    ///
-    /// # Errors
-    /// When it cannot be written.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
         if !event.is_logged() {
             return Ok(());
@@ -243,10 +208,6 @@ pub(super) enum Kept {
 }
 
 impl Results<'_> {
-    /// Begins a log.
-    ///
-    /// # Errors
-    /// When it cannot be created, or the directory is not the one that was opened.
     pub fn begin_log(&self) -> Result<Log, ResultsError> {
         self.check_place()?;
         let folder = self.layout().logs();
@@ -260,9 +221,6 @@ impl Results<'_> {
 
     /// Goes through all events that are logged, in order of the beginnings of their runs. What a killed run left
     /// half-written is passed over, and so is what is no file.
-    ///
-    /// # Errors
-    /// When a log cannot be read.
     pub fn events(&self, mut visit: impl FnMut(RunEvent)) -> Result<(), StorageError> {
         let (folder, storage) = (self.layout().logs(), self.layout().storage);
         for name in storage.list(&folder)? {
@@ -288,9 +246,6 @@ impl Results<'_> {
     }
 
     /// Wall time over predicted cost of all parts in the logs; `None` before the first.
-    ///
-    /// # Errors
-    /// When a log cannot be read.
     pub fn pace(&self) -> Result<Option<f64>, StorageError> {
         let (mut predicted, mut measured) = (0.0, 0.0);
         self.events(|event| {

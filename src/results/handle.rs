@@ -29,9 +29,7 @@ pub struct Results<'a> {
 
 impl<'a> Results<'a> {
     /// Opens the directory of a sweep: begins it, resumes it, or extends it.
-    ///
-    /// # Errors
-    /// When the directory holds something else, or cannot be read or written. Nothing is written if it is refused.
+    /// Nothing is written if the directory is refused.
     pub fn open(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let before = Found::look(layout, sweep, 0)?;
         let results = Self::new(layout, before.extensions(sweep));
@@ -62,17 +60,11 @@ impl<'a> Results<'a> {
     }
 
     /// The directory of a sweep as a run would find it; nothing is written.
-    ///
-    /// # Errors
-    /// When the directory holds something else, or cannot be read.
     pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         Ok(Self::new(layout, Found::look(layout, sweep, 0)?.extensions(sweep)))
     }
 
     /// Reads a directory as it is.
-    ///
-    /// # Errors
-    /// When it is no results directory, belongs to other versions, or is damaged.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout))?;
         manifest::refuse(layout, &manifest.difference(&Manifest::new(&extensions)), "use the program that wrote it")?;
@@ -85,9 +77,6 @@ impl<'a> Results<'a> {
 
     /// Makes sure that the directory is still the one that was opened. Another that has taken its place belongs to other
     /// sweeps, so rows of these must not get into it.
-    ///
-    /// # Errors
-    /// When it is not, or cannot be read.
     pub fn check_place(&self) -> Result<(), ResultsError> {
         let found = Manifest::read(&self.layout)?;
         let text = self.sweep().text();
@@ -110,40 +99,32 @@ impl<'a> Results<'a> {
 
     /// Moves staged files to their targets, if the directory is still in its place. Should it be moved after this check,
     /// the staged files, which lie in it, are not found.
-    ///
-    /// # Errors
-    /// As [`Results::check_place`] and [`Commit::publish`].
     pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
         self.check_place()?;
         Ok(commit.publish()?)
     }
 
     /// Where it and everything in it lie.
-    #[must_use]
     pub const fn layout(&self) -> &Layout<'a> {
         &self.layout
     }
 
     /// What was run here, one sweep after the other.
-    #[must_use]
     pub fn extensions(&self) -> &[Extension] {
         &self.extensions
     }
 
     /// The sweep that was asked for last.
-    #[must_use]
     pub fn sweep(&self) -> &Sweep {
         &self.extensions[self.extensions.len() - 1].sweep
     }
 
     /// All jobs in their parts.
-    #[must_use]
     pub fn plan(&self) -> Plan<'_> {
         Plan::new(&self.extensions)
     }
 
     /// What the footers of table files with rows of an extension hold.
-    #[must_use]
     pub fn footer(&self, extension: usize) -> Footer {
         let sweep = &self.extensions[extension].sweep;
         Footer::default().with_sweep(sweep.name(), sweep.text())
@@ -156,22 +137,17 @@ impl<'a> Results<'a> {
     }
 
     /// Whether a job of a part is one of the sweep that was asked for last; results of others are kept.
-    #[must_use]
     pub fn wants(&self, part: &Part, job: &Job) -> bool {
         part.extension + 1 == self.extensions.len() || self.sweep().contains(&job.parameters)
     }
 
     /// The id of a job of a part.
-    #[must_use]
     pub fn job_id(&self, part: &Part, position: usize) -> String {
         self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters).to_string()
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
     /// folder, and the sync after it leaves names that are seen but would not survive a power cut.
-    ///
-    /// # Errors
-    /// When a folder cannot be synced.
     pub fn sync_names(&self) -> Result<(), StorageError> {
         for above in self.layout.root().ancestors().skip(1) {
             // Most are not ours, and who made the folders in them synced them if that is possible at all.

@@ -25,7 +25,6 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-/// Folder of the tables.
 const TABLES: &str = "tables";
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
@@ -39,13 +38,11 @@ pub(super) const COMPACTION: &str = "compact";
 pub(super) const MERGER: &str = "merge";
 /// Folder beside them that holds the tables which the last compaction replaced.
 pub(super) const REPLACED: &str = "replaced";
-/// Names of its folders.
 pub const RUN_FOLDERS: [&str; 7] = ["staging", "lock", "log", "workers", "claims", "spill", "batch"];
 
 /// Paths within a results directory, and the storage on which it lies.
 #[derive(Clone)]
 pub struct Layout<'a> {
-    /// The storage.
     pub storage: &'a dyn Storage,
     root: PathBuf,
 }
@@ -58,57 +55,40 @@ impl fmt::Debug for Layout<'_> {
 
 impl<'a> Layout<'a> {
     /// The layout under a directory.
-    #[must_use]
     pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
         Self { storage, root: root.to_owned() }
     }
 
     /// The directory of a sweep, unless another is chosen.
-    #[must_use]
     pub fn default_root(sweep: &Sweep) -> PathBuf {
         Path::new(RESULTS).join(sweep.name())
     }
 
-    /// The directory.
-    #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Folder of the tables.
-    #[must_use]
     pub fn tables(&self) -> PathBuf {
         self.root.join(TABLES)
     }
 
-    /// Folder of a table.
-    #[must_use]
     pub fn table(&self, name: &str) -> PathBuf {
         self.tables().join(name)
     }
 
     /// The files of a table whose names are those of parts, as they are now.
-    ///
-    /// # Errors
-    /// When the folder cannot be listed.
     pub(super) fn table_files(&self, name: &str) -> Result<impl Iterator<Item = TableFile> + use<>, StorageError> {
         let names = self.storage.list(&self.table(name))?;
         Ok(names.into_iter().filter_map(|name| TableFile::of_path(name.as_ref())))
     }
 
     /// All files of a table as they are now.
-    ///
-    /// # Errors
-    /// As [`Dataset::of_folder`].
     pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, DatasetError> {
         Dataset::of_folder(self.storage, &self.table(name))
     }
 
     /// Reads the directory; again as often as a compaction has put others in the place of the tables meanwhile, since files
     /// that were listed before may then not be found, or as a run has added a sweep.
-    ///
-    /// # Errors
-    /// When the directory cannot be looked up.
     pub fn read_tables<T>(&self, mut read: impl FnMut() -> T) -> Result<T, StorageError> {
         loop {
             let before = self.generation()?;
@@ -126,9 +106,6 @@ impl<'a> Layout<'a> {
 
     /// The copies of the sweep files, in order, as the folder lists them: a network file system may not yet find them by
     /// their names.
-    ///
-    /// # Errors
-    /// When the folder cannot be listed.
     pub fn sweeps(&self) -> Result<Vec<PathBuf>, StorageError> {
         let names: HashSet<OsString> = self.storage.list(&self.run())?.into_iter().collect();
         let is_there = |path: &PathBuf| path.file_name().is_some_and(|name| names.contains(name));
@@ -136,107 +113,82 @@ impl<'a> Layout<'a> {
     }
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
-    ///
-    /// # Errors
-    /// When the directory is gone, or the folder cannot be created.
     pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.storage.ensure_folder_below(&self.root, folder)
     }
 
-    /// Folder of reduced data.
-    #[must_use]
     pub fn reduced(&self) -> PathBuf {
         self.root.join("reduced")
     }
 
     /// File of a reduced table.
-    #[must_use]
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
 
-    /// Folder of figures.
-    #[must_use]
     pub fn figures(&self) -> PathBuf {
         self.root.join("figures")
     }
 
-    /// The report.
-    #[must_use]
     pub fn report(&self) -> PathBuf {
         self.root.join("report.html")
     }
 
     /// Folder of everything that is no result.
-    #[must_use]
     pub fn run(&self) -> PathBuf {
         self.root.join(RUN)
     }
 
     /// The folders in which names are results.
-    #[must_use]
     pub fn result_folders(&self) -> Vec<PathBuf> {
         let tables = [tables::SLIPS, tables::PRECURSORS, tables::JOBS];
         let folders = [self.root.clone(), self.run(), self.root.join(TABLES)];
         folders.into_iter().chain(tables.map(|table| self.table(table))).collect()
     }
 
-    /// The manifest.
-    #[must_use]
     pub fn manifest(&self) -> PathBuf {
         self.run().join(MANIFEST)
     }
 
     /// Copy of the sweep file of an extension.
-    #[must_use]
     pub fn sweep(&self, extension: usize) -> PathBuf {
         self.run().join(format!("sweep-{extension:03}.toml"))
     }
 
     /// Copy of the round that an extension is.
-    #[must_use]
     pub fn round(&self, extension: usize) -> PathBuf {
         self.run().join(format!("round-{extension:03}.json"))
     }
 
     /// Where a repair puts what is damaged.
-    #[must_use]
     pub fn quarantine(&self) -> PathBuf {
         self.run().join("quarantine")
     }
 
     /// Where one writer, known by a name of its own, prepares files.
-    #[must_use]
     pub fn staging(&self, writer: &str) -> PathBuf {
         self.run().join("staging").join(writer)
     }
 
     /// Folder of the lock files.
-    #[must_use]
     pub fn locks(&self) -> PathBuf {
         self.run().join("lock")
     }
 
     /// Folder of the workers' files.
-    #[must_use]
     pub fn workers(&self) -> PathBuf {
         self.run().join("workers")
     }
 
-    /// Folder of the claims.
-    #[must_use]
     pub fn claims(&self) -> PathBuf {
         self.run().join("claims")
     }
 
     /// Folder of what a stopped run had finished of parts that are not done.
-    #[must_use]
     pub fn spill(&self) -> PathBuf {
         self.run().join("spill")
     }
 
-    /// Folder of the logs.
-    #[must_use]
     pub fn logs(&self) -> PathBuf {
         self.run().join("log")
     }
@@ -246,7 +198,6 @@ impl<'a> Layout<'a> {
 const CHECKSUM_CHARACTERS: usize = 16;
 
 /// Name of a part, which is that of its file in every table.
-#[must_use]
 pub fn part_name(part: &Outline) -> String {
     part_name_of(part.extension, part.index)
 }
@@ -258,7 +209,6 @@ fn part_name_of(extension: usize, index: u64) -> String {
 /// Name of a table file, which says whose rows it holds: those of one part, or of consecutive parts of an extension.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TableFile {
-    /// Number of the extension.
     pub extension: usize,
     /// Number of the first part.
     pub first: u64,
@@ -270,26 +220,22 @@ pub struct TableFile {
 
 impl TableFile {
     /// The file of a part of its own.
-    #[must_use]
     pub const fn of_part(extension: usize, index: u64) -> Self {
         Self { extension, first: index, last: index, checksum: None }
     }
 
     /// The compacted file of these parts with this checksum.
-    #[must_use]
     pub fn compacted(extension: usize, parts: &RangeInclusive<u64>, checksum: &str) -> Self {
         let checksum = Some(checksum.chars().take(CHECKSUM_CHARACTERS).collect());
         Self { extension, first: *parts.start(), last: *parts.end(), checksum }
     }
 
     /// What the name of a file says; `None` if it is not that of a table file.
-    #[must_use]
     pub fn of_path(path: &Path) -> Option<Self> {
         Self::parse(path.file_name()?.to_str()?)
     }
 
     /// What a name says; `None` if it is not that of a table file.
-    #[must_use]
     pub fn parse(name: &str) -> Option<Self> {
         let stem = name.strip_suffix(FILE_EXTENSION)?.strip_suffix('.')?;
         let file = match *stem.split('-').collect::<Vec<_>>() {
@@ -303,13 +249,10 @@ impl TableFile {
     }
 
     /// Whether it holds several parts, or was meant to.
-    #[must_use]
     pub const fn is_compacted(&self) -> bool {
         self.checksum.is_some()
     }
 
-    /// Numbers of its parts.
-    #[must_use]
     pub const fn parts(&self) -> RangeInclusive<u64> {
         self.first..=self.last
     }

@@ -31,7 +31,6 @@ pub(super) const WRITER: &str = "manifest";
 /// How often other hosts may clear that folder while a manifest is staged.
 const MAX_CLEARINGS: u32 = 100;
 
-/// The file `run/manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {

@@ -11,27 +11,20 @@ use crate::table::checksum;
 use crate::table::shown::shown;
 use serde::Serialize;
 
-/// What a merger made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Merged {
     /// Parts that were taken over.
     pub parts: u64,
-    /// Jobs in them.
     pub jobs: u64,
     /// Parts that the merged directory had already, from an earlier source or before.
     pub parts_there: u64,
     /// Parts that no directory has.
     pub parts_missing: u64,
-    /// Jobs in them.
     pub jobs_missing: u64,
 }
 
 /// Puts the parts of directories of one sweep into another directory, which is begun if it is not there. The sources are
 /// not changed; of a part that several have, the first counts.
-///
-/// # Errors
-/// When the sources differ in more than what is done, the target belongs to something else or is being run, one of them is
-/// compacted, or a file is damaged. What was taken over is kept, and the same can be tried again.
 pub fn merge(sources: &[Layout<'_>], target: &Layout<'_>) -> Result<Merged, ResultsError> {
     let sources: Vec<Results<'_>> = sources.iter().map(Results::read).collect::<Result<_, _>>()?;
     let Some(first) = sources.first() else { return Ok(Merged::default()) };

@@ -35,19 +35,16 @@ pub struct DoneParts {
 
 impl DoneParts {
     /// Whether a part is done.
-    #[must_use]
     pub fn has(&self, part: &Outline) -> bool {
         self.is_compacted(part) || self.own.contains(&(part.extension, part.index))
     }
 
     /// Whether any part is in a compacted file.
-    #[must_use]
     pub fn any_is_compacted(&self) -> bool {
         !self.compacted.is_empty()
     }
 
     /// Whether the rows of a part are in a compacted file.
-    #[must_use]
     pub fn is_compacted(&self, part: &Outline) -> bool {
         let before = self.compacted.range((part.extension, 0)..=(part.extension, part.index)).next_back();
         before.is_some_and(|(_, &last)| part.index <= last)
@@ -68,9 +65,6 @@ const SAME_TIME: f64 = 1e-9;
 
 impl Results<'_> {
     /// Looks up which parts are done.
-    ///
-    /// # Errors
-    /// When the folder of the jobs table cannot be listed.
     pub fn done_parts(&self) -> Result<DoneParts, StorageError> {
         let mut done = DoneParts::default();
         for file in self.layout().table_files(tables::JOBS)? {
@@ -84,15 +78,11 @@ impl Results<'_> {
     }
 
     /// The file of a part in a table.
-    #[must_use]
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
         self.layout().table(table).join(TableFile::of_part(part.extension, part.index).to_string())
     }
 
     /// Positions of the jobs of a part that may run again; `None` if the part is not done. Such parts are never compacted.
-    ///
-    /// # Errors
-    /// When its file in `jobs` cannot be read, or has other jobs than the part.
     pub fn unfinished(
         &self,
         done: &DoneParts,
@@ -131,9 +121,6 @@ impl Results<'_> {
     }
 
     /// The parts of which something is spilled.
-    ///
-    /// # Errors
-    /// When the folder cannot be listed.
     pub fn spilled_parts(&self) -> Result<HashSet<(usize, u64)>, StorageError> {
         self.spilled_in(tables::JOBS)
     }
@@ -146,9 +133,6 @@ impl Results<'_> {
 
     /// Positions of the jobs of a part that are spilled: none if a file is damaged or gone, and they then run again; `None` if
     /// this host does not see a file yet that the folder lists, as on a network disk.
-    ///
-    /// # Errors
-    /// When a file cannot be read.
     pub fn spilled(&self, part: &Part) -> Result<Option<BTreeSet<usize>>, ResultsError> {
         let mut ids = HashSet::new();
         for table in self.tables() {
@@ -177,9 +161,6 @@ impl Results<'_> {
     }
 
     /// Spills the outcomes of some jobs of a part, beside those that are spilled already.
-    ///
-    /// # Errors
-    /// As [`Results::commit`].
     pub fn spill(
         &self,
         staging: &Path,
@@ -194,10 +175,7 @@ impl Results<'_> {
 
     /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have, in the tables
     /// or `spilled`.
-    ///
-    /// # Errors
-    /// When a file cannot be written or put in its place, or rows that are to be kept cannot be read. The part then
-    /// counts as before, or as done, but never as half done.
+    /// On an error the part counts as before, or as done, but never as half done.
     pub fn commit(
         &self,
         staging: &Path,
@@ -216,9 +194,6 @@ impl Results<'_> {
     }
 
     /// Removes what is spilled of those of these parts that are done, as who committed them may have died at that.
-    ///
-    /// # Errors
-    /// When the files cannot be listed or removed.
     pub fn tidy_spill(&self, parts: &[Outline]) -> Result<(), StorageError> {
         // All tables: who removed them may have been killed at that, too.
         let tables = self.tables().map(|table| self.spilled_in(table)).collect::<Result<Vec<_>, _>>()?;
@@ -330,9 +305,6 @@ columns! {
 
 /// Files of a table that count beside these of `jobs`: those with the rows of the same parts. A run killed in between
 /// leaves the slips of a part without its jobs.
-///
-/// # Errors
-/// As [`Layout::dataset`].
 pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, DatasetError> {
     let parts = |path: &PathBuf| {
         TableFile::of_path(path).map(|file| (file.extension, file.first, file.last, file.is_compacted()))

@@ -23,7 +23,6 @@ pub struct RoundsSoFar {
 
 impl Results<'_> {
     /// The rounds so far of the sweep that was asked for last, in order; itself alone if it decides nothing.
-    #[must_use]
     pub fn rounds(&self) -> &[Extension] {
         let text = self.sweep().text();
         let others = self.extensions().iter().rev().skip_while(|extension| extension.sweep.text() == text).count();
@@ -31,13 +30,11 @@ impl Results<'_> {
     }
 
     /// The round that was begun last; `None` if the sweep has none.
-    #[must_use]
     pub fn round(&self) -> Option<&Round> {
         self.extensions().last().and_then(|extension| extension.round.as_ref())
     }
 
     /// How far the rounds are; `None` if the sweep has none.
-    #[must_use]
     pub fn rounds_so_far(&self) -> Option<RoundsSoFar> {
         let round = self.round()?;
         let is_over = round.is_end();
@@ -46,9 +43,6 @@ impl Results<'_> {
 
     /// The directory as it goes on, once all its parts are done: in a round that another worker has begun meanwhile, or in
     /// the one that `decide` has found. `None` if the rounds are over, or if there are none.
-    ///
-    /// # Errors
-    /// When another sweep was begun here, something cannot be read or written, and what `decide` says.
     pub fn next_round(
         &self,
         decide: impl FnOnce(&Self) -> Result<Round, ResultsError>,

@@ -8,12 +8,10 @@ use crate::sweep::Sweep;
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 use crate::table::selected::{Selected, Selection};
 
-/// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobOutcome {
     /// It recorded all its slips.
     Done,
-    /// It reached `max_time` before.
     TimeLimit,
     /// It gave up, since no slip came within `give_up_after`.
     NoSlips,
@@ -23,7 +21,6 @@ pub enum JobOutcome {
 
 impl JobOutcome {
     /// The outcome of a job that did not fail.
-    #[must_use]
     pub fn of(measured: &Measurements) -> Self {
         match measured.summary.satisfied {
             _ if measured.has_given_up => Self::NoSlips,
@@ -32,8 +29,6 @@ impl JobOutcome {
         }
     }
 
-    /// Its word in tables.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Done => "done",
@@ -79,7 +74,6 @@ impl Selection for DriveAndSeed {
     const SYMBOLS: &'static [Symbol] = &[Symbol::V0, Symbol::Delta, Symbol::T, Symbol::Seed];
 }
 
-/// All parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct All;
 
@@ -92,20 +86,16 @@ pub type Label<S> = (Names, Selected<S>, Loading);
 
 /// Names of the tables, which are those of their folders.
 pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
-/// See [`SLIPS`].
 pub const PRECURSORS: &str = <PrecursorRow<'_> as Table>::NAME;
-/// See [`SLIPS`].
 pub const JOBS: &str = JobRow::NAME;
 
 /// The label of a job of a sweep.
-#[must_use]
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
     let [job_id, set_id] = [sweep.job_id(parameters).to_string(), sweep.set_id(parameters).to_string()];
     (Names { job_id, set_id }, Selected::new(parameters.clone()), Loading { eta: parameters.eta() })
 }
 
 /// The same label with other parameters.
-#[must_use]
 pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
     let (names, selected, loading) = label;
     (names.clone(), Selected::new(selected.parameters.clone()), *loading)
@@ -157,7 +147,6 @@ columns! {
 
 impl JobRecord {
     /// The record of a job that ended with these measurements, or failed for this reason.
-    #[must_use]
     pub fn new(outcome: Result<&Measurements, &str>) -> Self {
         let measured = outcome.ok();
         let summary = measured.map(|measured| measured.summary);

@@ -27,7 +27,6 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Time between two beats.
 pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
 /// A worker of another host is dead if its file is older than one's own by this time.
 pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(4) } else { Duration::from_mins(1) };
@@ -53,7 +52,6 @@ pub enum Task {
 /// A process, as its file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Worker {
-    /// Name of its host.
     pub host: String,
     /// Id of the process there.
     pub process: u32,
@@ -63,7 +61,6 @@ pub struct Worker {
     process_start: Option<u64>,
     /// What it is there for.
     pub task: Task,
-    /// Threads that run jobs.
     pub threads: usize,
     /// Jobs that it has finished, in a second.
     pub jobs_per_second: f64,
@@ -125,7 +122,6 @@ fn process_start(process: u32) -> Option<u64> {
 /// A worker that lives, as far as another can know.
 #[derive(Clone, Debug)]
 pub struct Living {
-    /// What it says.
     pub worker: Worker,
     /// When it was written, by the clock of the file system.
     pub beat: SystemTime,
@@ -147,10 +143,6 @@ pub struct Member<'a> {
 
 impl<'a> Results<'a> {
     /// Joins the workers, and is one of them while `body` runs.
-    ///
-    /// # Errors
-    /// When the workers' files cannot be written or read, somebody changes what is committed, or, for [`Task::Change`],
-    /// anybody is at work; and what `body` says.
     pub fn join<T, E: From<ResultsError>>(
         &self,
         task: Task,
@@ -177,9 +169,6 @@ impl<'a> Results<'a> {
     }
 
     /// Runs `body` while nobody else changes the directory.
-    ///
-    /// # Errors
-    /// As [`Results::join`].
     pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
         self.join(Task::Change, 1, |member| {
             member.tidy()?;
@@ -190,9 +179,6 @@ impl<'a> Results<'a> {
 
 impl Layout<'_> {
     /// The workers that live, by their names. Compares beats with `now`, by the clock of the file system.
-    ///
-    /// # Errors
-    /// When the workers cannot be listed or read.
     pub fn living(&self, now: SystemTime) -> Result<BTreeMap<String, Living>, StorageError> {
         let mut living = BTreeMap::new();
         for name in self.storage.list(&self.workers())? {
@@ -238,20 +224,15 @@ impl<'a> Member<'a> {
         Ok(member)
     }
 
-    /// Its name.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// A random number of its own.
-    #[must_use]
     pub const fn number(&self) -> u64 {
         self.number
     }
 
-    /// Where it prepares files.
-    #[must_use]
     pub fn staging(&self) -> PathBuf {
         self.layout.staging(&self.name)
     }
@@ -261,7 +242,6 @@ impl<'a> Member<'a> {
         self.staging().join(CLAIM)
     }
 
-    /// A job has ended.
     pub fn count_job(&self) {
         self.jobs.fetch_add(1, Ordering::Relaxed);
     }
@@ -284,10 +264,6 @@ impl<'a> Member<'a> {
         self.layout.workers().join(&self.name)
     }
 
-    /// The others that live.
-    ///
-    /// # Errors
-    /// When they cannot be listed.
     pub fn others(&self) -> Result<BTreeMap<String, Living>, StorageError> {
         let own = self.layout.storage.modified(&self.file());
         let mut living = self.layout.living(own.unwrap_or_else(|_| SystemTime::now()))?;
@@ -307,9 +283,6 @@ impl<'a> Member<'a> {
 
     /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
     /// looked up what is done before they ended; likewise what is left of compactions and mergers.
-    ///
-    /// # Errors
-    /// When something cannot be listed or removed.
     pub fn tidy(&self) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
         let gone_is_fine = |removed: Result<(), StorageError>| match removed {

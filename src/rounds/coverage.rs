@@ -14,7 +14,6 @@ use std::sync::atomic::AtomicBool;
 
 const FROM: u64 = 4;
 const MOST: u64 = 128;
-/// Repetitions with the model.
 const REPETITIONS: u64 = 200;
 
 /// What a number of repetitions came to.

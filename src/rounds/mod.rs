@@ -23,9 +23,6 @@ use precision::Need;
 use std::collections::BTreeMap;
 
 /// The round after those that a directory has. All their jobs must be done.
-///
-/// # Errors
-/// When a table is damaged or cannot be read.
 pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let sweep = results.sweep();
     let rounds = results.rounds().iter().filter_map(|extension| extension.round.as_ref());

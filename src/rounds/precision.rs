@@ -15,14 +15,12 @@ use crate::sweep::Precision;
 /// Seeds of a set below which its interval is not trusted, unless it may have no more.
 pub const MIN_SEEDS: u64 = 24;
 
-/// What a set needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Need {
     /// Every statistic is known to the target, or there is nothing to know: no job has a value.
     Nothing,
     /// More seeds than it may have.
     TooMuch,
-    /// This number of seeds.
     Seeds(u64),
 }
 

@@ -282,7 +282,6 @@ fn locked(under_way: &AllUnderWay) -> MutexGuard<'_, BTreeMap<(usize, u64, usize
     under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs one job.
 fn run_job(job: PartJob, kernel: &Kernel<'_>, interrupt: &AtomicBool, under_way: &AllUnderWay) -> Ended {
     if interrupt.load(Ordering::Relaxed) {
         return Ended { job, outcome: None, time: JobTime::default() };

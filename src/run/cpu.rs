@@ -1,7 +1,6 @@
 //! CPU time of the calling thread.
 
 /// CPU time that the calling thread has used since some instant, in s. Elsewhere than on Unix: time on the clock.
-#[must_use]
 pub fn thread_seconds() -> f64 {
     #[cfg(unix)]
     {

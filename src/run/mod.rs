@@ -52,7 +52,6 @@ pub type Kernel<'a> = dyn Fn(&Job, &AtomicBool) -> Result<Measurements, Simulati
 const REDUCTION: &str = "reduce";
 const REDUCED: &str = "reduced";
 
-/// How to run.
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
     /// Threads; by default all cores.
@@ -83,7 +82,6 @@ impl Events<'_> {
 /// A worker at the results of a sweep.
 pub struct Joined<'a> {
     results: &'a Results<'a>,
-    /// Those of its shard.
     parts: &'a [Outline],
     member: &'a Member<'a>,
     begin: Instant,
@@ -92,9 +90,6 @@ pub struct Joined<'a> {
 }
 
 /// Joins those who work on the directory of a sweep, while `body` runs.
-///
-/// # Errors
-/// When the directory belongs to something else, or somebody has it alone; and what `body` says.
 pub fn join<T, E: From<ResultsError>>(
     layout: &Layout<'_>,
     sweep: &Sweep,
@@ -130,9 +125,7 @@ impl Joined<'_> {
     /// Runs jobs of the sweep that are not yet in the directory, beside the other workers, until none is left for this one.
     ///
     /// A job that fails or panics becomes a row with its reason. Events come on the calling thread.
-    ///
-    /// # Errors
-    /// When the disk fails. What was committed is kept, and the same command resumes from there.
+    /// On an error, what was committed is kept, and the same command resumes.
     pub fn run(&self, kernel: &Kernel<'_>, display: &mut dyn FnMut(&RunEvent)) -> Result<RunReport, ResultsError> {
         self.results.sync_names()?;
         self.member.tidy()?;
@@ -234,9 +227,6 @@ impl Joined<'_> {
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.
-    ///
-    /// # Errors
-    /// When the claims cannot be read or written; and what `body` says.
     pub fn reduce<T, E: From<ResultsError>>(&self, body: impl FnOnce() -> Result<T, E>) -> Result<Option<T>, E> {
         let Some((mut claims, generation)) = self.take_reduction()? else { return Ok(None) };
         let reduced = body()?;
@@ -270,9 +260,6 @@ impl Joined<'_> {
 }
 
 /// Runs the jobs of a sweep that are not yet in a directory: a [`Joined`] of this alone.
-///
-/// # Errors
-/// As [`join`] and [`Joined::run`].
 pub fn run(
     layout: &Layout<'_>,
     sweep: &Sweep,

@@ -19,7 +19,6 @@ pub struct Shard {
 }
 
 impl Default for Shard {
-    /// All parts.
     fn default() -> Self {
         Self { number: 1, count: NonZeroU64::MIN }
     }

@@ -61,7 +61,6 @@ pub(super) struct PartJob {
 }
 
 impl PartJob {
-    /// Its predicted cost.
     pub fn cost(&self) -> f64 {
         self.of.part.jobs[self.position].cost
     }
@@ -149,7 +148,6 @@ pub(super) struct Work<'a> {
     walltime: &'a Walltime,
     claims: Claims<'a>,
     others: BTreeMap<String, Living>,
-    /// The first pass.
     pass: IntoIter<&'a Outline>,
     losses: u32,
     jobs: VecDeque<PartJob>,

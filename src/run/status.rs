@@ -28,9 +28,7 @@ pub struct Overview {
     pub jobs_kept: u64,
     /// Jobs that are missing, or are asked for and were ended by a shorter `max_time`.
     pub jobs_missing: u64,
-    /// Parts that are committed.
     pub parts_done: u64,
-    /// Parts that are missing.
     pub parts_missing: u64,
     /// Cost of all jobs that are done or failed.
     pub predicted_cost_done: f64,
@@ -43,9 +41,7 @@ pub struct Overview {
 /// The state of a results directory. Serialises to a stable form, whose version is `format`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
-    /// Version of this form.
     pub format: u32,
-    /// Name of the sweep.
     pub name: String,
     /// How far all parts are.
     #[serde(flatten)]
@@ -57,7 +53,6 @@ pub struct Status {
     /// Predicted wall time for the missing jobs, in s, at this pace and with the threads that are there now or ran last; null
     /// before the first part.
     pub time_left: Option<f64>,
-    /// The first failed jobs.
     pub failures: Vec<Failure>,
     /// How far the rounds are, of a sweep that decides for itself.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -67,19 +62,15 @@ pub struct Status {
 /// A worker that is there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Present {
-    /// Who.
     #[serde(flatten)]
     pub worker: Worker,
     /// Time since its last beat, in s; beside the clock of the file system, that of this host is read.
     pub last_beat: f64,
 }
 
-/// A job that failed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Failure {
-    /// Its id.
     pub job_id: String,
-    /// Why.
     pub reason: String,
     /// The command that does the same, to look at it alone.
     pub command: String,
@@ -162,9 +153,6 @@ columns! {
 
 impl Status {
     /// How many jobs of the tables ended without a slip, and how many were run to an end.
-    ///
-    /// # Errors
-    /// When the table of jobs cannot be read.
     pub fn jobs_without_slips(results: &Results<'_>) -> Result<(u64, u64), ResultsError> {
         let count = || -> Result<(u64, u64), ResultsError> {
             let (mut without, mut ended) = (0, 0);
@@ -180,18 +168,11 @@ impl Status {
     }
 }
 
-/// Looks through a directory.
-///
-/// # Errors
-/// When a log or a part cannot be read.
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
     status_with(results, MAX_FAILURES)
 }
 
 /// The same, with another number of failed jobs.
-///
-/// # Errors
-/// As [`status`].
 pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
     let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results, max_failures))??;
     let mut last_threads = None;

@@ -12,7 +12,6 @@ const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS",
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{variable}={value}: must be a whole number >= 1; unset it, or give --threads")]
 pub struct ThreadsError {
-    /// The variable.
     pub variable: &'static str,
     /// What it holds, as it can be shown.
     pub value: String,
@@ -29,9 +28,6 @@ pub struct Threads {
 
 impl Threads {
     /// Those that are asked for, else those of the first variable that is set, else all cores.
-    ///
-    /// # Errors
-    /// When that variable holds no whole number >= 1.
     pub fn choose(
         asked: Option<NonZeroUsize>,
         environment: impl Fn(&str) -> Option<OsString>,
@@ -48,9 +44,6 @@ impl Threads {
 }
 
 /// A number of threads, as a flag has it.
-///
-/// # Errors
-/// What is allowed.
 pub fn parse(text: &str) -> Result<NonZeroUsize, &'static str> {
     text.parse().map_err(|_| "must be a whole number >= 1")
 }

@@ -74,7 +74,6 @@ impl Walltime {
         self.state.update(|state| State { under_way: (state.under_way - cost).max(0.0), ..state });
     }
 
-    /// A job has ended.
     pub fn ended(&self, predicted: f64, measured: f64) {
         self.withdraw(predicted);
         self.state.update(|state| State {

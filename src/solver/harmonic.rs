@@ -20,7 +20,6 @@ pub struct Harmonic {
 }
 
 impl Harmonic {
-    /// Value after `elapsed` s.
     pub fn value(&self, elapsed: f64) -> f64 {
         let ramp = self.start + self.rate * elapsed;
         if self.amplitude == 0.0 { ramp } else { ramp + self.amplitude * libm::cos(self.angle(elapsed)) }

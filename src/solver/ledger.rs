@@ -22,23 +22,19 @@ const NODES_FOR_DRIVE: usize = 8;
 /// The energy balance of one simulation, from its start to its end. All in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ledger {
-    /// Work of the drive.
     pub work: f64,
     /// Elastic energy of chain, attached contacts and driving spring at the end.
     pub elastic: f64,
     /// Kinetic energy at the end.
     pub kinetic: f64,
-    /// Loss in damping.
     pub damping: f64,
     /// The part of it that leaps entered: the energy of the free motion that they dropped.
     pub left_out: f64,
-    /// Loss in breaking contacts.
     pub broken: f64,
 }
 
 impl Ledger {
     /// What does not balance, relative to the work of the drive. Zero for an exact solution; 0 if no work was done.
-    #[must_use]
     pub fn residual(&self) -> f64 {
         let spent = self.elastic + self.kinetic + self.damping + self.broken;
         if self.work == 0.0 { 0.0 } else { (self.work - spent) / self.work }
@@ -48,11 +44,8 @@ impl Ledger {
 /// What the drive has put in since the start, and where it was lost. All in J; the rest is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spent {
-    /// Work of the drive.
     pub work: f64,
-    /// Loss in damping.
     pub damping: f64,
-    /// Loss in breaking contacts.
     pub broken: f64,
 }
 

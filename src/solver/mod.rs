@@ -56,13 +56,11 @@ impl Resolve {
     pub const ALL: [(Self, &str); 3] = [(Self::Auto, "auto"), (Self::Grid, "grid"), (Self::Taylor, "taylor")];
 
     /// Its word in sweep files.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         Self::ALL[self as usize].1
     }
 
     /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
-    #[must_use]
     pub fn takes_grid(self, tolerance: f64) -> bool {
         match self {
             Self::Auto => tolerance >= GRID_TOLERANCE,
@@ -72,7 +70,6 @@ impl Resolve {
     }
 
     /// The one with this word.
-    #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|(_, known)| *known == word).map(|(resolve, _)| resolve)
     }
@@ -89,15 +86,11 @@ impl Default for Solver {
 
 impl Solver {
     /// From contact event to contact event with this tolerance, resolved as it is best.
-    #[must_use]
     pub const fn event_driven(tolerance: f64) -> Self {
         Self::EventDriven { tolerance, resolve: Resolve::Auto }
     }
 
     /// Checks that the setting fits the parameters.
-    ///
-    /// # Errors
-    /// When the time step is not stable, or the tolerance out of range.
     pub fn check(self, parameters: &Parameters) -> Result<(), SimulationError> {
         match self {
             Self::EventDriven { tolerance, .. } if !TOLERANCES.contains(&tolerance) => {
@@ -162,15 +155,12 @@ pub struct Summary {
     pub end_time: f64,
     /// Whether the observer was satisfied before the end time.
     pub satisfied: bool,
-    /// Steps of the solver.
     pub steps: u64,
     /// Of these, leaps over quiet time.
     pub leaps: u64,
     /// Of these, steps of the grid; none if motion was resolved in Taylor steps.
     pub grid_steps: u64,
-    /// Contacts broken.
     pub breaks: u64,
-    /// Contacts reattached.
     pub reattachments: u64,
 }
 
@@ -191,10 +181,7 @@ pub enum SimulationError {
         TOLERANCES.start(),
         TOLERANCES.end()
     )]
-    BadTolerance {
-        /// The refused tolerance.
-        tolerance: f64,
-    },
+    BadTolerance { tolerance: f64 },
     /// A ledger is asked for along the grid.
     #[error(
         "resolve = \"grid\": an energy ledger is kept along Taylor steps only; leave resolve out or set it to \"taylor\""
@@ -225,10 +212,8 @@ pub enum SimulationError {
     EventBudget {
         /// Model time, in s.
         time: f64,
-        /// The budget.
         events: u64,
     },
-    /// Stopped from outside.
     #[error("at t = {time} s: interrupted")]
     Interrupted {
         /// Model time, in s.
@@ -237,9 +222,6 @@ pub enum SimulationError {
 }
 
 /// Runs one realisation until the observer is satisfied or the end time is reached.
-///
-/// # Errors
-/// When the solver's setting does not fit the parameters, or the run cannot continue: see [`SimulationError`].
 pub fn simulate(
     parameters: &Parameters,
     solver: Solver,
@@ -251,9 +233,6 @@ pub fn simulate(
 
 /// The same with an energy ledger, which costs several times as much; the simulation itself is the same to the last
 /// bit, but that the event-driven solver takes Taylor steps at any tolerance.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_audited(
     parameters: &Parameters,
     solver: Solver,

@@ -12,7 +12,6 @@ pub enum ForcePath<'a> {
         coefficients: &'a [f64],
         /// Bound on the second derivative by s over [0, 1], in N.
         curvature_bound: f64,
-        /// Where the segment starts.
         first: f64,
         /// Time per unit of s, in s.
         scale: f64,
@@ -41,17 +40,13 @@ pub enum ForcePath<'a> {
 /// The largest and the least of something over a number of steps: how many steps from the beginning, and in N.
 #[derive(Clone, Copy, Debug)]
 pub struct Extremes {
-    /// The largest.
     pub largest: (f64, f64),
-    /// The least.
     pub least: (f64, f64),
 }
 
 impl Extremes {
-    /// Of nothing.
     pub(super) const NONE: Self = Self { largest: (0.0, f64::NEG_INFINITY), least: (0.0, f64::INFINITY) };
 
-    /// Takes in a value.
     #[inline(always)]
     fn include(&mut self, at: f64, value: f64) {
         if value > self.largest.1 {

@@ -25,8 +25,11 @@ pub(super) struct Column {
 #[derive(Clone, Debug)]
 pub(super) enum Axis {
     /// The whole numbers from `first` on.
-    Counted { symbol: Symbol, first: u64, count: u64 },
-    /// Listed rows.
+    Counted {
+        symbol: Symbol,
+        first: u64,
+        count: u64,
+    },
     Table(Table),
 }
 
@@ -60,7 +63,6 @@ impl Axis {
         }
     }
 
-    /// Number of rows.
     pub fn len(&self) -> u64 {
         match self {
             Self::Counted { count, .. } => *count,

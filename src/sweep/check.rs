@@ -106,7 +106,6 @@ const MAX_LOOKED_AT: usize = 100_000;
 
 impl Sweep {
     /// What is allowed but hardly meant.
-    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let points: Vec<Point> = self.points_of_one_seed().take(MAX_LOOKED_AT).collect();
         let worst = |quantity: Quantity, is_odd: &dyn Fn(f64) -> bool| {

@@ -9,7 +9,6 @@ use crate::solver::{Resolve, Solver};
 impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
     /// that read back to the same bits.
-    #[must_use]
     pub fn command(&self, job: &Job) -> String {
         let (defaults, mut words) = (Parameters::default(), vec!["stickslip simulate".to_owned()]);
         for symbol in Symbol::ALL {

@@ -44,7 +44,6 @@ const LOADED_AT_ONCE: f64 = 1.2;
 const OVERDAMPED: f64 = 4.0;
 
 /// Predicted CPU time of a job, in s.
-#[must_use]
 pub fn predicted_cost(parameters: &Parameters, recording: &Recording, solver: Solver) -> f64 {
     let blocks = parameters.blocks as f64;
     let Motion { time, resolved, breaks } = Motion::of(parameters, recording);

@@ -25,10 +25,6 @@ use std::path::Path;
 const MAX_NAME: usize = 100;
 
 impl Sweep {
-    /// Reads a sweep file.
-    ///
-    /// # Errors
-    /// When the file cannot be read, or as [`Sweep::parse`].
     pub fn from_file(path: &Path) -> Result<Self, SweepError> {
         let text = Disk.read(path).map_err(|error| error.source).and_then(|bytes| {
             String::from_utf8(bytes).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
@@ -37,9 +33,6 @@ impl Sweep {
     }
 
     /// Reads the text of a sweep file; the path is for messages only.
-    ///
-    /// # Errors
-    /// Names the line, key and value of all that is not allowed, and what is.
     pub fn parse(text: &str, path: &Path) -> Result<Self, SweepError> {
         let source = Source::new(path, text);
         read(&source).map_err(|_| source.error())

@@ -80,7 +80,6 @@ pub(super) struct ConditionError {
 }
 
 impl Condition {
-    /// Reads a condition.
     pub fn parse(text: &str) -> Result<Self, ConditionError> {
         let tokens = tokens(text)?;
         let mut reader = Reader { tokens: &tokens, next: 0, end: text.chars().count() + 1 };

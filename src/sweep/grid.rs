@@ -18,7 +18,6 @@ use crate::solver::Solver;
 use std::fmt;
 use std::ops::Range;
 
-/// A sweep file, parsed.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     pub(super) name: String,
@@ -26,7 +25,6 @@ pub struct Sweep {
     /// `[model]` over the defaults; what an axis sets is not used.
     pub(super) base: Parameters,
     pub(super) axes: Vec<Axis>,
-    /// All must hold.
     pub(super) conditions: Vec<Condition>,
     pub(super) recording: Recording,
     pub(super) solver: Solver,
@@ -53,25 +51,20 @@ impl fmt::Display for Difference {
 
 impl Sweep {
     /// The name: letters, digits, `_` and `-`.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// The text of the file.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// What every job records.
-    #[must_use]
     pub const fn recording(&self) -> &Recording {
         &self.recording
     }
 
     /// The solver of every job.
-    #[must_use]
     pub const fn solver(&self) -> Solver {
         self.solver
     }
@@ -85,7 +78,6 @@ impl Sweep {
     }
 
     /// Number of points of the grid, before the conditions drop some: at most [`MAX_POINTS`](super::MAX_POINTS).
-    #[must_use]
     pub fn point_count(&self) -> u64 {
         self.axes.iter().map(Axis::len).product()
     }
@@ -109,13 +101,11 @@ impl Sweep {
     }
 
     /// Whether these canonical parameters are a job of this sweep: exact bits, without walking through the points.
-    #[must_use]
     pub fn contains(&self, parameters: &Parameters) -> bool {
         self.find(parameters).is_some()
     }
 
     /// Number of the point that is the job with these canonical parameters.
-    #[must_use]
     pub fn find(&self, parameters: &Parameters) -> Option<u64> {
         let rows: Vec<u64> = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
@@ -124,20 +114,17 @@ impl Sweep {
     }
 
     /// The id of a job.
-    #[must_use]
     pub fn job_id(&self, parameters: &Parameters) -> JobId {
         self.identity.job(parameters)
     }
 
     /// The id of the set of a job.
-    #[must_use]
     pub fn set_id(&self, parameters: &Parameters) -> SetId {
         self.identity.set(parameters)
     }
 
     /// In what another sweep differs besides axes and conditions: name, model, recording, solver. Parameters that an axis
     /// of either sets are left out, as an axis may be added, changed or dropped.
-    #[must_use]
     pub fn difference(&self, other: &Self) -> Vec<Difference> {
         let moved = |symbol| self.moves(symbol) || other.moves(symbol);
         let values = |sweep: &Self| {

@@ -15,7 +15,6 @@ use std::fmt;
 pub struct Job {
     /// Number of the point in grid order, before conditions and duplicates.
     pub point: u64,
-    /// Canonical parameters, seed included.
     pub parameters: Parameters,
     /// Predicted CPU time, in s.
     pub cost: f64,
@@ -32,7 +31,6 @@ macro_rules! id {
 
         impl $Id {
             /// The 16 bytes.
-            #[must_use]
             pub const fn as_bytes(&self) -> &[u8; ID_BYTES] {
                 &self.0
             }
@@ -78,7 +76,6 @@ pub struct Identity {
 
 impl Identity {
     /// The identity of jobs with this solver and recording.
-    #[must_use]
     pub fn new(solver: Solver, recording: &Recording) -> Self {
         let mut shared = Sha256::new();
         shared.update(format!("model={MODEL_VERSION}\nrng={RNG_SCHEME}\n"));
@@ -89,13 +86,11 @@ impl Identity {
     }
 
     /// The id of a job with these canonical parameters.
-    #[must_use]
     pub fn job(&self, parameters: &Parameters) -> JobId {
         JobId(self.hash(parameters, &Symbol::ALL))
     }
 
     /// The id of the set that such a job belongs to.
-    #[must_use]
     pub fn set(&self, parameters: &Parameters) -> SetId {
         SetId(self.hash(parameters, Symbol::ALL.split_last().map_or(&[], |(_, others)| others)))
     }

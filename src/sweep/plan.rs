@@ -29,7 +29,6 @@ pub const PLAN_VERSION: u32 = 4;
 /// A sweep of a directory, and what of it counts there.
 #[derive(Clone, Debug)]
 pub struct Extension {
-    /// The sweep.
     pub sweep: Sweep,
     /// Most predicted CPU time of a part with more than one job, in s.
     pub part_cost: f64,
@@ -81,9 +80,7 @@ impl Deref for Part {
 /// What a plan adds up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
-    /// Number of jobs.
     pub jobs: u64,
-    /// Number of parts.
     pub parts: u64,
     /// Predicted CPU time, in s.
     pub cost: f64,
@@ -92,13 +89,10 @@ pub struct Totals {
 impl Extension {
     /// Begins an extension. Its parts have a 64th of its predicted cost at most, and mostly 5 s; where that would be too
     /// many, a 20,000th. A dear job is a part of its own.
-    #[must_use]
     pub fn new(sweep: &Sweep, earlier: &[Self]) -> Self {
         Self::in_round(sweep, earlier, sweep.first_round())
     }
 
-    /// Begins a further round.
-    #[must_use]
     pub fn next_round(sweep: &Sweep, earlier: &[Self], round: Round) -> Self {
         Self::in_round(sweep, earlier, Some(round))
     }
@@ -111,7 +105,6 @@ impl Extension {
         own
     }
 
-    /// Its points among these.
     fn points(&self, among: &Range<u64>) -> Vec<Range<u64>> {
         let Some(round) = &self.round else { return vec![among.clone()] };
         let from = round.points.partition_point(|range| *range.end() < among.start);
@@ -141,7 +134,6 @@ fn own_jobs<'a>(
 
 impl<'a> Plan<'a> {
     /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::difference`].
-    #[must_use]
     pub const fn new(extensions: &'a [Extension]) -> Self {
         Self { extensions }
     }
@@ -174,7 +166,6 @@ impl<'a> Plan<'a> {
     }
 
     /// The part of an outline, whose points alone are walked through.
-    #[must_use]
     pub fn part(self, outline: &Outline) -> Part {
         let (own, earlier) = (&self.extensions[outline.extension], &self.extensions[..outline.extension]);
         let points = *outline.points.start()..outline.points.end() + 1;
@@ -196,7 +187,6 @@ impl<'a> Plan<'a> {
     }
 
     /// Walks through the plan and adds up.
-    #[must_use]
     pub fn totals(self) -> Totals {
         self.outlines().fold(Totals::default(), |totals, part| Totals {
             jobs: totals.jobs + part.job_count as u64,

@@ -163,7 +163,6 @@ pub(super) struct Wanted<'a> {
 /// An axis that is to be refined.
 pub(super) struct WantedAxis<'a> {
     quantity: Quantity,
-    /// Where it is named.
     entry: Entry<'a>,
     to: (f64, Entry<'a>),
     /// How often its cells can be halved, once the axis is read.

@@ -41,7 +41,6 @@ pub struct Precision {
 pub enum Target {
     /// As a share of the statistic.
     Relative(f64),
-    /// In its unit.
     Absolute(f64),
 }
 
@@ -52,7 +51,6 @@ pub struct Refinement {
     pub axes: Vec<RefinedAxis>,
     /// What tells the sets of a cell apart.
     pub by: Statistic,
-    /// When they differ.
     pub contrast: Contrast,
     /// Most sets of the sweep.
     pub max_sets: u64,
@@ -61,7 +59,6 @@ pub struct Refinement {
 /// An axis along which cells are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RefinedAxis {
-    /// Number of the axis.
     pub axis: usize,
     /// How often a cell of the first round can be halved.
     pub levels: u32,
@@ -87,7 +84,6 @@ pub struct Round {
     /// The points, in order; none: the rounds are over.
     #[serde(serialize_with = "write_ranges", deserialize_with = "read_ranges")]
     pub points: Vec<RangeInclusive<u64>>,
-    /// How things stood.
     pub standing: Standing,
 }
 
@@ -107,9 +103,7 @@ pub struct Standing {
 /// What all rounds of a sweep may add up to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bounds {
-    /// Sets at most.
     pub sets: u64,
-    /// Jobs at most.
     pub jobs: u64,
     /// Predicted CPU time at most, in s; of sets that are not known yet, that of the dearest of the first round.
     pub predicted_cost: f64,
@@ -117,7 +111,6 @@ pub struct Bounds {
 
 impl Refinement {
     /// What makes a set lie on one side of the edge, as the table of cells says it.
-    #[must_use]
     pub fn condition(&self) -> String {
         let key = self.by.key;
         match &self.contrast {
@@ -130,7 +123,6 @@ impl Refinement {
 
 impl Rounds {
     /// Seeds that a set gets first, if the grid has this many.
-    #[must_use]
     pub fn seeds_at_first(&self, all: u64) -> u64 {
         self.precision.as_ref().map_or(all, |precision| *precision.seeds.start())
     }
@@ -144,13 +136,11 @@ impl Rounds {
 
 impl Round {
     /// Whether it has a point.
-    #[must_use]
     pub fn has(&self, point: u64) -> bool {
         contains(&self.points, point)
     }
 
     /// Whether it says that the rounds are over.
-    #[must_use]
     pub const fn is_end(&self) -> bool {
         self.points.is_empty()
     }
@@ -163,7 +153,6 @@ pub(super) fn contains(ranges: &[RangeInclusive<u64>], point: u64) -> bool {
 }
 
 /// Ranges in order, those that touch as one.
-#[must_use]
 pub fn merged(mut ranges: Vec<RangeInclusive<u64>>) -> Vec<RangeInclusive<u64>> {
     ranges.sort_unstable_by_key(|range| (*range.start(), *range.end()));
     let mut merged: Vec<RangeInclusive<u64>> = Vec::new();
@@ -180,19 +169,16 @@ pub fn merged(mut ranges: Vec<RangeInclusive<u64>>) -> Vec<RangeInclusive<u64>> 
 
 impl Sweep {
     /// What it decides by itself; none for a sweep that runs its whole grid.
-    #[must_use]
     pub const fn rounds(&self) -> Option<&Rounds> {
         self.rounds.as_ref()
     }
 
     /// Number of the axis of seeds, if they have one.
-    #[must_use]
     pub fn seed_axis(&self) -> Option<usize> {
         self.axes.iter().position(|axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)])
     }
 
     /// Number of seeds of a set in the grid.
-    #[must_use]
     pub fn seed_count(&self) -> u64 {
         self.seed_axis().map_or(1, |axis| self.axes[axis].len())
     }
@@ -203,7 +189,6 @@ impl Sweep {
     }
 
     /// The rows of a point.
-    #[must_use]
     pub fn rows(&self, mut point: u64) -> Vec<u64> {
         let mut rows: Vec<u64> = Vec::with_capacity(self.axes.len());
         for axis in self.axes.iter().rev() {
@@ -215,13 +200,11 @@ impl Sweep {
     }
 
     /// The number of rows of each axis.
-    #[must_use]
     pub fn row_counts(&self) -> Vec<u64> {
         self.axes.iter().map(Axis::len).collect()
     }
 
     /// Key and value of an axis of one quantity at a row; `None` of a word, or of several quantities.
-    #[must_use]
     pub fn value_at(&self, axis: usize, row: u64) -> Option<(&'static str, f64)> {
         let mut point = Point { parameters: self.base.clone(), fixes_period: None };
         self.axes[axis].apply(row, &mut point);
@@ -235,14 +218,12 @@ impl Sweep {
     }
 
     /// The set of a point.
-    #[must_use]
     pub fn set_of(&self, point: u64) -> u64 {
         let stride = self.seed_stride();
         point - point / stride % self.seed_count() * stride
     }
 
     /// The set of a job with these canonical parameters, whatever its seed.
-    #[must_use]
     pub fn set_with(&self, parameters: &Parameters) -> Option<u64> {
         let mut point = Point { parameters: parameters.clone(), fixes_period: None };
         if let Some(axis) = self.seed_axis() {
@@ -253,7 +234,6 @@ impl Sweep {
 
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
     /// the period alone are one set.
-    #[must_use]
     pub fn set_at(&self, rows: &[u64]) -> Option<u64> {
         let mut rows = rows.to_vec();
         if let Some(axis) = self.seed_axis() {
@@ -293,7 +273,6 @@ impl Sweep {
     }
 
     /// What its rounds may add up to; `None` for a sweep without.
-    #[must_use]
     pub fn bounds(&self) -> Option<Bounds> {
         let rounds = self.rounds.as_ref()?;
         let costs: Vec<f64> =
@@ -306,7 +285,6 @@ impl Sweep {
     }
 
     /// The first round; `None` for a sweep without.
-    #[must_use]
     pub fn first_round(&self) -> Option<Round> {
         let seeds = self.rounds.as_ref()?.seeds_at_first(self.seed_count());
         let sets = self.first_sets();

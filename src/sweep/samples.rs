@@ -44,7 +44,6 @@ impl Range {
     }
 }
 
-/// A space-filling sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sample {
     Sobol,

@@ -15,7 +15,6 @@ use serde_json::{Map, Value as Json, json};
 use std::ops::Bound;
 
 /// The schema, JSON Schema draft 7.
-#[must_use]
 pub fn schema() -> Json {
     let model = Quantity::all().map(|quantity| (quantity.key(), described(quantity, single(quantity))));
     let axes = Quantity::all().map(|quantity| (quantity.key(), described(quantity, axis(quantity))));

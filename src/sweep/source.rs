@@ -22,7 +22,6 @@ pub enum SweepError {
     /// The file cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", shown(path))]
     Unreadable {
-        /// The file.
         path: PathBuf,
         /// What the operating system says.
         source: std::io::Error,
@@ -30,7 +29,6 @@ pub enum SweepError {
     /// The file does not say what to run.
     #[error("{}", listed(path, mistakes))]
     Invalid {
-        /// The file.
         path: PathBuf,
         /// At least one, in the order of their lines.
         mistakes: Vec<Mistake>,
@@ -92,12 +90,10 @@ impl<'a> Source<'a> {
         Refused(())
     }
 
-    /// Refused if anything was.
     pub fn passed(&self) -> Result<(), Refused> {
         if self.mistakes.borrow().is_empty() { Ok(()) } else { Err(Refused(())) }
     }
 
-    /// All that was refused.
     pub fn error(&self) -> SweepError {
         let mut mistakes = self.mistakes.take();
         mistakes.sort_unstable();
@@ -212,7 +208,6 @@ impl<'a> Entry<'a> {
         self.source.refuse(self.at, format!("{}{value}: {problem}", self.key))
     }
 
-    /// Reports what is allowed.
     pub fn must_be(&self, allowed: &str) -> Refused {
         self.refuse(format!("must be {allowed}"))
     }
@@ -283,7 +278,6 @@ pub(super) fn hint(word: &str, known: &[&str]) -> String {
 }
 
 /// The known word that was probably meant by an unknown one.
-#[must_use]
 pub fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     let distance = |candidate: &str| strsim::levenshtein(&word.to_lowercase(), &candidate.to_lowercase());
     // Half of a short word, two letters of a long one.

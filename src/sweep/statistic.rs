@@ -4,7 +4,6 @@
 /// A column of the reduced table of sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Statistic {
-    /// Name of the column.
     pub key: &'static str,
     /// Its SI unit; empty for a pure number or a word.
     pub unit: &'static str,
@@ -19,7 +18,6 @@ pub enum StatisticKind {
     Estimate,
     /// An angle with a confidence interval: a relative error means nothing.
     Angle,
-    /// A number alone.
     Number,
     /// A flag, a word, or a count that tells kinds of sets apart.
     Class,
@@ -71,7 +69,6 @@ impl Statistic {
     }
 
     /// Whether it has a confidence interval.
-    #[must_use]
     pub const fn has_interval(self) -> bool {
         matches!(self.kind, Estimate | Angle)
     }

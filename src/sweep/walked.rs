@@ -17,7 +17,6 @@ pub(super) fn note(point: u64, end: u64) {
 }
 
 /// The point that the last walk has come to, and where it ends.
-#[must_use]
 pub fn walked() -> (u64, u64) {
     (POINT.load(Ordering::Relaxed), END.load(Ordering::Relaxed))
 }

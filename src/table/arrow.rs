@@ -38,7 +38,6 @@ fn field(column: &Column) -> Field {
 }
 
 /// Arrow schema of a row, with units and meanings in the metadata of its fields and, for pandas, of the schema.
-#[must_use]
 pub fn schema<R: Row>() -> SchemaRef {
     let columns = R::columns();
     let by_name = |text: fn(&Column) -> &'static str| {
@@ -50,7 +49,6 @@ pub fn schema<R: Row>() -> SchemaRef {
 }
 
 /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.
-#[must_use]
 pub fn json<R: Row>(row: &R) -> Json {
     let (columns, mut object) = (R::columns(), Map::new());
     row.cells(&mut |cell| {
@@ -83,7 +81,6 @@ enum Cells {
 
 impl RowBuffer {
     /// An empty buffer for rows of this type.
-    #[must_use]
     pub fn new<R: Row>() -> Self {
         let cells = R::columns().into_iter().map(|column| match column.kind {
             Kind::Real => Cells::Real(Vec::new()),
@@ -94,20 +91,15 @@ impl RowBuffer {
         Self { schema: schema::<R>(), cells: cells.collect(), rows: 0 }
     }
 
-    /// Number of rows.
-    #[must_use]
     pub const fn len(&self) -> usize {
         self.rows
     }
 
     /// Whether there is no row.
-    #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.rows == 0
     }
 
-    /// Schema of the rows.
-    #[must_use]
     pub const fn schema(&self) -> &SchemaRef {
         &self.schema
     }
@@ -124,9 +116,6 @@ impl RowBuffer {
     }
 
     /// Appends some rows of a batch of the same table.
-    ///
-    /// # Errors
-    /// When the batch has other columns or types; the buffer may then not be used further.
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
         for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
             let array = column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
@@ -137,9 +126,6 @@ impl RowBuffer {
     }
 
     /// Takes all rows out as one batch.
-    ///
-    /// # Errors
-    /// When a column that may not be null holds a null, copied from a batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
         RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().map(Cells::take).collect())
@@ -199,9 +185,6 @@ fn cell(array: &dyn Array, kind: Kind, row: usize) -> Cell<'_> {
 }
 
 /// The rows of a batch. Columns that the row does not have are passed over.
-///
-/// # Errors
-/// What is wrong with a batch that lacks a column or holds a value that cannot be.
 pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let columns = R::columns();
     let arrays = columns.iter().map(|described| {

@@ -29,8 +29,6 @@ const MAGIC: &[u8] = b"PAR1";
 /// Bytes that are read and hashed at once.
 const CHUNK: usize = 1 << 16;
 
-/// SHA-256 in hexadecimal characters.
-#[must_use]
 pub fn hexadecimal(hash: &[u8]) -> String {
     hash.iter().fold(String::new(), |mut text, byte| {
         // Writing to a string cannot fail.
@@ -56,9 +54,6 @@ pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
 }
 
 /// Reads a file and compares its bytes with its checksum, which it returns.
-///
-/// # Errors
-/// When the file cannot be read, is no table file with a checksum, or is not as it was written.
 pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError> {
     check_file(&ReadFile::open(storage, path)?, path)
 }
@@ -120,18 +115,12 @@ struct Checksummed<'a, T> {
 }
 
 /// A value as JSON with a checksum: the same text for the same value.
-///
-/// # Errors
-/// When the value has no form as a JSON object.
 pub fn to_json<T: Serialize>(value: &T) -> serde_json::Result<String> {
     let sha256 = hexadecimal(&Sha256::digest(serde_json::to_string_pretty(value)?));
     Ok(serde_json::to_string_pretty(&Checksummed { value, sha256 })? + "\n")
 }
 
 /// The value of such a text.
-///
-/// # Errors
-/// What is wrong with a text that [`to_json`] did not write.
 pub fn from_json<T: Serialize + DeserializeOwned>(text: &str) -> Result<T, String> {
     let mut object: Map<String, Value> = serde_json::from_str(text).map_err(|error| error.to_string())?;
     object.remove("sha256").ok_or("it has no checksum")?;

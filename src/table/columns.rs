@@ -25,19 +25,13 @@ use std::borrow::Cow;
 /// What the cells of a column hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Doubles.
     Real,
-    /// Whole numbers.
     Count,
-    /// Yes or no.
     Flag,
-    /// Texts.
     Text,
 }
 
 impl Kind {
-    /// Its word in documentation.
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Real => "real",
@@ -53,26 +47,20 @@ impl Kind {
 pub enum Cell<'a> {
     /// A value that is missing.
     Null,
-    /// A double.
     Real(f64),
-    /// A whole number.
     Count(u64),
-    /// Yes or no.
     Flag(bool),
-    /// A text.
     Text(&'a str),
 }
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Name, fixed for readers.
     pub name: Cow<'static, str>,
     /// SI unit; empty for a pure number or a text.
     pub unit: &'static str,
     /// One line, without a full stop.
     pub meaning: &'static str,
-    /// What its cells hold.
     pub kind: Kind,
     /// Whether cells may be null.
     pub nullable: bool,
@@ -80,7 +68,6 @@ pub struct Column {
 
 /// A type that a cell can hold.
 pub trait Field: Sized {
-    /// What its cells hold.
     const KIND: Kind;
     /// Whether it may be null.
     const NULLABLE: bool = false;
@@ -104,9 +91,6 @@ pub trait Row {
 /// A row that can be read back.
 pub trait FromRow: Row + Sized {
     /// The row with these cells, in the order of the columns.
-    ///
-    /// # Errors
-    /// What is wrong with a cell that cannot be one of this row's.
     fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
 }
 
@@ -123,13 +107,9 @@ pub trait Part: Sized {
     /// The columns of a field with this name, unit and meaning.
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column>;
 
-    /// Gives the cells.
     fn give(&self, give: &mut dyn FnMut(Cell<'_>));
 
     /// Reads the cells of a field with this name.
-    ///
-    /// # Errors
-    /// What is wrong with a cell that cannot be one of this field's.
     fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
 }
 
@@ -173,7 +153,6 @@ pub(crate) use part;
 
 /// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
 /// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
-#[must_use]
 pub fn markdown<T: Table>() -> String {
     let is_parameter = |column: &Column| {
         Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)

@@ -11,32 +11,18 @@ pub enum DatasetError {
     /// A file operation failed, which says nothing about what the file holds.
     #[error(transparent)]
     Storage(StorageError),
-    /// Writing failed.
     #[error("{}: cannot be written: {source}; all that was committed before is kept", shown(path))]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: ParquetError,
-    },
+    Write { path: PathBuf, source: ParquetError },
     /// A file is cut off, changed or no table.
     #[error(
         "{}: damaged: {}; `stickslip verify` on its results directory reports how to repair it",
         shown(path),
         shown_text(problem)
     )]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
+    Damaged { path: PathBuf, problem: String },
     /// Something else lies among the files of a table.
     #[error("{}: is no table file, and a table folder may hold nothing else; move it away", shown(path))]
-    Stray {
-        /// The file.
-        path: PathBuf,
-    },
+    Stray { path: PathBuf },
 }
 
 impl From<StorageError> for DatasetError {
@@ -51,9 +37,7 @@ impl From<StorageError> for DatasetError {
 
 impl DatasetError {
     /// Of a file that must be there: what is wrong with it, as far as that is known.
-    ///
-    /// # Errors
-    /// When the disk fails: what cannot be read is not damaged.
+    /// An error of the disk stays one: what cannot be read is not damaged.
     pub fn damage(self) -> Result<(PathBuf, String), Self> {
         match self {
             Self::Damaged { path, problem } => Ok((path, problem)),
@@ -62,8 +46,6 @@ impl DatasetError {
         }
     }
 
-    /// The file.
-    #[must_use]
     pub fn path(&self) -> &Path {
         match self {
             Self::Storage(StorageError { path, .. })

@@ -56,13 +56,11 @@ impl Default for Footer {
 
 impl Footer {
     /// The same, with the name and the text of a sweep.
-    #[must_use]
     pub fn with_sweep(self, name: &str, text: &str) -> Self {
         self.with("sweep_name", name).with("sweep", text)
     }
 
     /// The same, with one more text.
-    #[must_use]
     pub fn with(mut self, key: &str, text: &str) -> Self {
         self.0.insert(key.to_owned(), text.to_owned());
         self
@@ -99,7 +97,6 @@ fn by_name(schema: &Schema, key: &str) -> String {
 }
 
 /// Whether a footer is that of a file with these columns.
-#[must_use]
 pub fn has_columns(footer: &BTreeMap<String, String>, schema: &Schema) -> bool {
     footer.get(UNITS).is_some_and(|units| *units == by_name(schema, UNIT))
 }
@@ -116,9 +113,6 @@ pub struct TableWriter<R> {
 
 impl<R: Row> TableWriter<R> {
     /// Writes into this file, which is empty.
-    ///
-    /// # Errors
-    /// When the footer cannot be.
     pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
         let buffer = RowBuffer::new::<R>();
         let writer = footer
@@ -128,19 +122,12 @@ impl<R: Row> TableWriter<R> {
         Ok(Self { row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
     }
 
-    /// Appends a row.
-    ///
-    /// # Errors
-    /// When a full row group cannot be written.
     pub fn push(&mut self, row: &R) -> Result<(), DatasetError> {
         self.buffer.push(row);
         if self.buffer.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
     }
 
     /// Appends rows that were read from a file of the same table.
-    ///
-    /// # Errors
-    /// When the rows have other columns, or a full row group cannot be written.
     pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), DatasetError> {
         while !rows.is_empty() {
             let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
@@ -164,9 +151,7 @@ impl<R: Row> TableWriter<R> {
     }
 
     /// Writes what is left and the footer, brings the file to the disk, and gives its [checksum].
-    ///
-    /// # Errors
-    /// When that fails; the file is then unreadable.
+    /// Without it, the file is unreadable.
     pub fn finish(mut self) -> Result<String, DatasetError> {
         if !self.buffer.is_empty() {
             self.flush()?;
@@ -187,26 +172,18 @@ impl<R: Row> TableWriter<R> {
 /// Some rows of a file.
 #[derive(Clone, Debug)]
 pub struct Batch {
-    /// The file.
     pub path: Arc<Path>,
-    /// The rows.
     pub rows: RecordBatch,
 }
 
 impl Batch {
     /// The rows, of this type.
-    ///
-    /// # Errors
-    /// When the file lacks a column, or holds a value that the type cannot have.
     pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
         arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
     }
 }
 
 /// The checksum of a file, and the texts under keys in its footer.
-///
-/// # Errors
-/// When the file cannot be read or is damaged.
 pub fn footer(storage: &dyn Storage, path: &Path) -> Result<(String, BTreeMap<String, String>), DatasetError> {
     let file = ReadFile::open(storage, path)?;
     let checksum = checksum::check_file(&file, path)?;
@@ -251,16 +228,11 @@ pub struct Dataset<'a> {
 }
 
 impl<'a> Dataset<'a> {
-    /// These files.
-    #[must_use]
     pub const fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
         Self { storage, files }
     }
 
     /// All files of a table folder, in order of their names; none if there is no such folder.
-    ///
-    /// # Errors
-    /// When the folder cannot be read or holds anything else.
     pub fn of_folder(storage: &'a dyn Storage, folder: &Path) -> Result<Self, DatasetError> {
         let paths = storage.list(folder)?.into_iter().map(|name| folder.join(name));
         let checked = |path: PathBuf| {
@@ -273,14 +245,11 @@ impl<'a> Dataset<'a> {
         Ok(Self::new(storage, paths.map(checked).collect::<Result<_, _>>()?))
     }
 
-    /// The files.
-    #[must_use]
     pub fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
     /// Those of the files for which this is true.
-    #[must_use]
     pub fn filter(mut self, is_kept: impl FnMut(&PathBuf) -> bool) -> Self {
         self.files.retain(is_kept);
         self

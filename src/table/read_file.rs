@@ -27,10 +27,6 @@ struct State {
 }
 
 impl ReadFile {
-    /// Opens a file.
-    ///
-    /// # Errors
-    /// When it cannot be opened or looked up.
     pub fn open(storage: &dyn Storage, path: &Path) -> Result<Self, StorageError> {
         let file = storage.open(path)?;
         let length = file.metadata().map_err(StorageError::at("look up", path))?.len();
@@ -43,9 +39,6 @@ impl ReadFile {
     }
 
     /// A stretch of its bytes.
-    ///
-    /// # Errors
-    /// When they cannot be read, do not all fit into memory, or the file ends before them.
     pub fn bytes(&self, start: u64, length: usize) -> io::Result<Vec<u8>> {
         if start.checked_add(length as u64).is_none_or(|end| end > self.length) {
             return Err(io::ErrorKind::UnexpectedEof.into());

@@ -15,14 +15,12 @@ pub trait Selection {
 /// defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selected<S> {
-    /// The parameters.
     pub parameters: Parameters,
     selection: PhantomData<S>,
 }
 
 impl<S> Selected<S> {
     /// The columns of these parameters.
-    #[must_use]
     pub const fn new(parameters: Parameters) -> Self {
         Self { parameters, selection: PhantomData }
     }

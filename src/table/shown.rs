@@ -5,18 +5,15 @@ use std::path::Path;
 
 /// A path as messages show it: as it is, if it is plain. Control characters and those that turn the direction of writing
 /// are escaped as in Rust, and bytes that are not UTF-8 as `\xff`.
-#[must_use]
 pub fn shown(path: &Path) -> Shown<'_> {
     Shown(path.as_os_str().as_encoded_bytes())
 }
 
 /// A text in the same way.
-#[must_use]
 pub fn shown_text(text: &str) -> Shown<'_> {
     Shown(text.as_bytes())
 }
 
-/// See [`shown`].
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a>(&'a [u8]);
 
@@ -33,16 +30,12 @@ impl fmt::Display for Shown<'_> {
 }
 
 /// Whether a terminal shows a character, and nothing else happens.
-#[must_use]
 pub fn is_plain(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     !c.is_control() && !turns
 }
 
 /// A path in JSON, which holds texts alone: exact if it is UTF-8, else with `\xff` for each byte that is not.
-///
-/// # Errors
-/// As the serializer.
 pub fn serialize_path<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     match path.to_str() {
         Some(text) => serializer.serialize_str(text),

@@ -21,9 +21,6 @@ pub const MAX_WHOLE: u64 = 1 << 28;
 /// Where the bytes of a file go.
 pub trait Sink: Write + Send {
     /// Returns when all that was written is on the disk.
-    ///
-    /// # Errors
-    /// When it cannot be brought there.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -35,29 +32,20 @@ pub struct StoredFile {
 
 impl StoredFile {
     /// The file of this path, whose bytes go there.
-    #[must_use]
     pub fn new(path: &Path, sink: impl Sink + 'static) -> Self {
         Self { path: path.to_owned(), sink: Box::new(sink) }
     }
 
-    /// Where it lies.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Appends bytes, all of them.
-    ///
-    /// # Errors
-    /// When they cannot be written.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), StorageError> {
         self.sink.write_all(bytes).map_err(StorageError::at("write", &self.path))
     }
 
     /// Returns when all that was written is on the disk.
-    ///
-    /// # Errors
-    /// When it cannot be brought there.
     pub fn sync(&mut self) -> Result<(), StorageError> {
         self.sink.sync().map_err(StorageError::at("write", &self.path))
     }
@@ -84,7 +72,6 @@ pub trait Storage: Sync {
     fn open(&self, file: &Path) -> Result<File, StorageError>;
     /// Whether a file is there.
     fn exists(&self, file: &Path) -> Result<bool, StorageError>;
-    /// Removes a file.
     fn remove(&self, file: &Path) -> Result<(), StorageError>;
     /// Removes a folder with all that is in it; nothing happens if there is none.
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError>;
@@ -220,9 +207,6 @@ pub struct HeldFolder {
 
 impl HeldFolder {
     /// When a name in it was changed last, by the clock of its file system.
-    ///
-    /// # Errors
-    /// When that cannot be read.
     pub fn modified(&self) -> io::Result<SystemTime> {
         self.open.metadata()?.modified()
     }
@@ -238,7 +222,6 @@ impl PartialEq for HeldFolder {
 pub enum Lock {
     /// It is ours, until this is dropped or the process ends.
     Ours(Box<dyn Send + Sync>),
-    /// Another process holds it.
     Taken,
     /// The file system has no locks.
     Unknown,
@@ -248,11 +231,8 @@ pub enum Lock {
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot {action}: {source}; all that was committed before is kept", shown(path))]
 pub struct StorageError {
-    /// What was tried.
     pub action: &'static str,
-    /// On what.
     pub path: PathBuf,
-    /// The operating system's reason.
     pub source: io::Error,
 }
 
@@ -263,19 +243,16 @@ impl StorageError {
     }
 
     /// The kind of the operating system's reason.
-    #[must_use]
     pub fn kind(&self) -> io::ErrorKind {
         self.source.kind()
     }
 
     /// Whether there is no file of this name.
-    #[must_use]
     pub fn is_missing(&self) -> bool {
         matches!(self.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
     }
 
     /// Whether something has this name that the program cannot have written: it is not that the disk fails.
-    #[must_use]
     pub fn is_no_file(&self) -> bool {
         self.source.get_ref().is_some_and(<dyn Error + Send + Sync>::is::<NoFile>)
     }
@@ -330,7 +307,6 @@ fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Opens a folder.
 fn open_folder(path: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true);

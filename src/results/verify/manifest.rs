@@ -15,9 +15,6 @@ use crate::table::storage::StorageError;
 use std::path::PathBuf;
 
 /// Opens a directory whose manifest or sweep files may be damaged, from what is whole; what is not is a problem.
-///
-/// # Errors
-/// When it is no results directory, belongs to another version of the program, or cannot be restored.
 pub(super) fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Results<'a>, ResultsError> {
     let extensions = match whole_or_copies(layout, problems)? {
         Texts::Manifest(manifest) => {
@@ -59,9 +56,6 @@ fn round(layout: &Layout<'_>, extension: usize) -> Result<Round, ResultsError> {
 }
 
 /// Writes the manifest and the copies of the sweep files again.
-///
-/// # Errors
-/// When they cannot be written.
 pub(super) fn restore_manifest(results: &Results<'_>) -> Result<(), ResultsError> {
     let _alone = alone(results.layout(), WRITER)?;
     Manifest::new(results.extensions()).write(results.layout())
@@ -155,9 +149,6 @@ fn foreign(layout: &Layout<'_>, manifest: &Manifest, copies: &[String]) -> Resul
 }
 
 /// The sweep in the first whole file with parts of an extension.
-///
-/// # Errors
-/// When the disk fails.
 fn text_in_tables(layout: &Layout<'_>, extension: usize) -> Result<Option<String>, DatasetError> {
     let folder = layout.table(tables::JOBS);
     for file in layout.table_files(tables::JOBS)?.filter(|file| file.extension == extension) {

@@ -36,23 +36,18 @@ const FORMAT: u32 = 3;
 /// What a verification found. Serialises to a stable form, whose version is `format`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
-    /// Version of this form.
     pub format: u32,
-    /// Whether nothing is damaged.
     pub whole: bool,
     /// Damage, in the order in which it was found.
     pub problems: Vec<Problem>,
     /// Table files that are whole.
     pub files: u64,
-    /// Their bytes.
     pub bytes: u64,
     /// Parts that are done and whole.
     pub parts: u64,
-    /// Jobs in them.
     pub jobs: u64,
     /// Parts that are asked for and not yet done, damaged ones aside.
     pub parts_missing: u64,
-    /// Jobs in them.
     pub jobs_missing: u64,
     /// Whether parts are to be run again for what is damaged.
     pub wants_run: bool,
@@ -61,10 +56,8 @@ pub struct Verification {
     lost_compacted: bool,
 }
 
-/// Something that is damaged.
 #[derive(Clone, Debug, Serialize)]
 pub struct Problem {
-    /// The file.
     #[serde(serialize_with = "serialize_path")]
     pub path: PathBuf,
     /// What is wrong with it.
@@ -73,26 +66,22 @@ pub struct Problem {
     pub parts: Vec<String>,
     /// Ids of the jobs concerned.
     pub jobs: Vec<String>,
-    /// What mends it.
     pub remedy: Remedy,
     /// Files that a repair moves away, in this order.
     #[serde(skip)]
     moved: Vec<PathBuf>,
 }
 
-/// What mends a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
     /// Writing the manifest and the copies of the sweep files again.
     Manifest,
-    /// Moving the file away.
     File,
     /// Moving the file away with those of the same parts in other tables, and running these parts.
     Part,
     /// Running the part: there is nothing of it.
     Run,
-    /// Reducing again.
     Reduce,
 }
 
@@ -105,19 +94,16 @@ impl Problem {
 
 impl Verification {
     /// Whether something is to be moved or written before anything is run.
-    #[must_use]
     pub fn wants_repair(&self) -> bool {
         self.problems.iter().any(|problem| !matches!(problem.remedy, Remedy::Run | Remedy::Reduce))
     }
 
     /// Whether tables that were compacted are to be compacted again.
-    #[must_use]
     pub const fn wants_compaction(&self) -> bool {
         self.lost_compacted
     }
 
     /// Whether reduced data are to be made again, and no run does it.
-    #[must_use]
     pub fn wants_reduction(&self) -> bool {
         !self.wants_run && self.problems.iter().any(|problem| problem.remedy == Remedy::Reduce)
     }
@@ -130,17 +116,11 @@ impl Verification {
 
 impl<'a> Results<'a> {
     /// Verifies a directory, whatever is damaged. Needs no lock, so runs may be at work.
-    ///
-    /// # Errors
-    /// When it is no results directory, belongs to another version of the program, or cannot be restored at all.
     pub fn verify(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         Ok(Self::examined(layout)?.1)
     }
 
     /// A directory as it is restored, and what is wrong with it.
-    ///
-    /// # Errors
-    /// As [`Results::verify`].
     pub(super) fn examined(layout: &Layout<'a>) -> Result<(Self, Verification), ResultsError> {
         let mut looks = 0;
         loop {
@@ -157,10 +137,6 @@ impl<'a> Results<'a> {
     }
 
     /// Takes away what is damaged, so that the next run makes it again; returns what was found.
-    ///
-    /// # Errors
-    /// When a shard is being run, or something cannot be written or moved; nothing that is whole is lost then, and the
-    /// same can be tried again.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
         // Reports what is no results directory before anything is written.
         let (results, _) = layout.read_tables(|| Self::examine(layout))??;
@@ -213,9 +189,6 @@ impl<'a> Results<'a> {
 }
 
 /// What a check found of a file that must be there: its path and what is wrong.
-///
-/// # Errors
-/// When the disk fails: what cannot be read is not damaged.
 fn damage_in<T>(checked: Result<T, DatasetError>) -> Result<Option<(PathBuf, String)>, DatasetError> {
     checked.map_or_else(|error| error.damage().map(Some), |_| Ok(None))
 }

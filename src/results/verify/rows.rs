@@ -13,9 +13,6 @@ pub(super) type Files = Vec<(&'static str, PathBuf)>;
 /// Goes through all rows, and compares them with the ids of the planned jobs. A job that may run again, as it failed or was
 /// ended by a shorter limit, may have further rows than it says, numbered on: a run that was killed while it replaced them
 /// left them, and the same command puts that right.
-///
-/// # Errors
-/// When rows are missing, in excess, or in another order than the jobs.
 pub(super) fn check_rows(
     results: &Results<'_>,
     files: &Files,

@@ -53,7 +53,6 @@ impl Operation {
     }
 }
 
-/// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
     /// EIO, once; nothing is done.

@@ -24,7 +24,6 @@ const STALE: u64 = 60;
 enum Belief {
     Absent,
     Present,
-    /// It has read this.
     Read(File),
 }
 

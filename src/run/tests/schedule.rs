@@ -17,7 +17,6 @@ struct State {
     /// Who is killed, and how many operations it does before.
     kill: Option<(usize, u64)>,
     killed: BTreeSet<usize>,
-    /// Who did what.
     log: Vec<(usize, &'static str)>,
 }
 
@@ -38,12 +37,10 @@ impl State {
     }
 }
 
-/// A random index.
 pub fn random_index(random: &mut ChaCha8Rng, count: usize) -> usize {
     usize::try_from(random.next_u64() % count as u64).unwrap()
 }
 
-/// Gives turns to processes.
 pub struct Schedule {
     state: Mutex<State>,
     turned: Condvar,
@@ -109,12 +106,10 @@ impl Schedule {
         state.killed.contains(&process)
     }
 
-    /// Operations so far.
     pub fn now(&self) -> u64 {
         self.state().log.len() as u64
     }
 
-    /// Who did what.
     pub fn log(self) -> Vec<(usize, &'static str)> {
         self.state.into_inner().unwrap().log
     }

@@ -38,12 +38,10 @@ enum There {
     StoppedRun,
     /// All jobs of the sweep with fewer seeds.
     FewerJobs,
-    /// The same, compacted.
     Compacted,
     AllJobs,
 }
 
-/// What a process does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Process {
     Run,

@@ -19,9 +19,7 @@ pub(super) struct PerBlock {
 /// Displacements and velocities in lanes.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    /// In m.
     pub displacement: Vec<Row>,
-    /// In m/s.
     pub velocity: Vec<Row>,
 }
 

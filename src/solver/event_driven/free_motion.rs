@@ -47,7 +47,6 @@ pub(super) struct FreeMotion {
 /// The motion of the blocks, and what it is split into; one entry a block.
 #[derive(Clone, Debug)]
 pub(super) struct SplitMotion {
-    /// In m and m/s.
     pub displacement: Vec<f64>,
     pub velocity: Vec<f64>,
     pub driven: DrivenSolution,

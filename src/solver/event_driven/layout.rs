@@ -5,7 +5,6 @@
 
 use crate::model::{LANES, Row};
 
-/// Where blocks lie.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     pub blocks: usize,

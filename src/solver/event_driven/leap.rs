@@ -43,7 +43,6 @@ pub(super) enum Attempt {
     Wait { seconds: f64 },
 }
 
-/// What bounds a leap.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// Time to the next reattachment or to the end, in s.

@@ -47,7 +47,6 @@ impl<S, T, F: FnOnce(S) -> T> WithSimd for HotLoop<S, F> {
     }
 }
 
-/// Eight doubles.
 pub(super) trait Vector: Copy {
     type Simd;
     fn splat(simd: Self::Simd, value: f64) -> Self;
@@ -158,7 +157,6 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     }
 }
 
-/// For any processor.
 impl Simd for Baseline {
     type Vector = Lanes<Self, 1>;
 }

@@ -26,7 +26,6 @@ pub(super) struct StepInput {
     pub error: f64,
     /// Order from which on the terms are compared with it.
     pub min_order: usize,
-    /// The drive's displacement.
     pub drive: DriveDerivatives,
 }
 

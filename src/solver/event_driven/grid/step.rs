@@ -121,13 +121,11 @@ pub(in super::super) struct GridStep {
     pub trail: [f64; MAX_RUN],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
-    /// Work space.
     saved_displacement: Vec<Row>,
     saved_increment: Vec<Row>,
 }
 
 impl GridStep {
-    /// Steps of `length` s.
     pub fn new(parameters: &Parameters, chain: &Chain, length: f64) -> Self {
         let layout = chain.layout;
         let square = length * length;
@@ -244,7 +242,6 @@ const FIRST_LANE: Row = {
     row
 };
 
-/// Adds to one lane.
 #[inline(always)]
 fn add(rows: &mut [Row], row: usize, lane: usize, value: f64) {
     let sum = rows[row][lane] + value;
