@@ -9,6 +9,8 @@ import sys
 import threading
 import time
 import tomllib
+from pathlib import Path
+from zipfile import ZipFile
 
 import duckdb
 import nbformat
@@ -315,6 +317,15 @@ def test_figures_show_the_data(results, opened):
     assert len(panels) == 2 and "(s)" in panels[-1].get_xlabel()
     heights = [sum(bar.get_height() * bar.get_width() for bar in axes.patches) for axes in panels]
     assert heights == pytest.approx([1, 1])
+
+
+def test_a_wheel_holds_the_package_alone(tmp_path):
+    maturin = Path(sys.executable).with_name("maturin")
+    subprocess.run([maturin, "build", "--release", "--locked", "--quiet", "--out", tmp_path], cwd=ROOT, check=True)
+    with ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
+        files = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    sources = ROOT / "python" / "stickslip"
+    assert files == {f"stickslip/{path.name}" for path in sources.iterdir() if path.name != "__pycache__"}
 
 
 def test_importing_it_imports_no_other_library():

@@ -19,8 +19,8 @@ def log(stickslip, tmp_path_factory):
 
 
 def run(module, *arguments):
-    """The command ``python -m stickslip.MODULE``."""
-    command = [sys.executable, "-m", f"stickslip.{module}", *map(str, arguments)]
+    """The command ``python -m MODULE``."""
+    command = [sys.executable, "-m", module, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 

@@ -9,11 +9,10 @@ import numpy
 import pandas
 import pytest
 from conftest import ROOT
+from validation import beyond, document, friction, intervals, kinematics, phase
 
 import stickslip as module
 from stickslip import statistics
-from stickslip.validation import beyond, document, friction, intervals, kinematics, phase
-
 
 PAGE = ROOT / "docs" / "validation.md"
 
@@ -92,7 +91,7 @@ def test_stretches_of_periods_leave_out_the_gaps(holds, expected):
 
 
 def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
-    command = [sys.executable, "-m", "stickslip.validation", tmp_path, "--to", tmp_path / "validation.md"]
+    command = [sys.executable, "-m", "validation", tmp_path, "--to", tmp_path / "validation.md"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2
     assert "sweeps/fig2.toml" in done.stderr
@@ -125,7 +124,7 @@ def test_every_section_is_written_from_real_tables(stickslip, tmp_path):
         module.run(short(sweep), tmp_path / name, progress=False)
     (tmp_path / "eq1").mkdir()
     stickslip("simulate", ROOT / "sweeps" / "eq1.toml", "--profile", tmp_path / "eq1" / "profile.parquet")
-    command = [sys.executable, "-m", "stickslip.validation", tmp_path, "--to", tmp_path / "validation.md"]
+    command = [sys.executable, "-m", "validation", tmp_path, "--to", tmp_path / "validation.md"]
     subprocess.run(command, cwd=ROOT, check=True)
     written, committed = (tmp_path / "validation.md").read_text(), PAGE.read_text()
     assert re.findall(r"^##+ .*", written, re.M) == re.findall(r"^##+ .*", committed, re.M)

@@ -1,8 +1,8 @@
 """Replays a contact log with the exact solution of the model and reports how far off the solver that wrote it was.
 
     stickslip simulate --set Delta=1e-6 --set frequency=58 --time 0.2 --tolerance 1e-10 --contacts log.parquet
-    .venv/bin/python -m stickslip.oracle log.parquet --breaks 1200
-    .venv/bin/python -m stickslip.oracle log.parquet --follow
+    .venv/bin/python -m oracle log.parquet --breaks 1200
+    .venv/bin/python -m oracle log.parquet --follow
 
 Between two contact events the model is linear, with damping proportional to mass, so it decouples into modes. With
 displacements u counted from the state at the last event, mode z with angular frequency σ obeys

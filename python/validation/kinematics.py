@@ -11,7 +11,7 @@ import pandas
 from numpy.typing import ArrayLike
 from scipy import optimize
 
-from ..statistics import rayleigh_p_of, resultant_length
+from stickslip.statistics import rayleigh_p_of, resultant_length
 
 #: A set is locked if its Rayleigh p is below the one and its resultant length above the other (docs/model.md).
 LOCKED_P, LOCKED_LENGTH = 0.001, 0.5

@@ -1,4 +1,4 @@
-"""Writes docs/validation.md from measured results: ``python -m stickslip.validation [RESULTS] [--to FILE]``.
+"""Writes docs/validation.md from measured results: ``python -m validation [RESULTS] [--to FILE]``.
 
 Run it in the project's folder. Every measured number comes from the tables below RESULTS; scripts/reproduce makes them.
 """
@@ -7,7 +7,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..tables import MissingResult
+from stickslip.tables import MissingResult
+
 from . import beyond, friction, intervals, phase
 from .document import figure, paragraph, table
 
@@ -62,7 +63,7 @@ def document(results: Path) -> str:
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m stickslip.validation", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m validation", description=__doc__)
     parser.add_argument(
         "results", nargs="?", type=Path, default=Path("results"), help="folder of all results (%(default)s)"
     )

@@ -1,4 +1,4 @@
-"""The command line of the oracle: ``python -m stickslip.oracle LOG``."""
+"""The command line of the oracle: ``python -m oracle LOG``."""
 
 import json
 import sys

@@ -10,8 +10,9 @@ import numpy
 import pandas
 from scipy import signal, stats
 
-from ..statistics import Estimate, jackknife, locking_index, mean, near_whole, share
-from ..tables import Sweep, select
+from stickslip.statistics import Estimate, jackknife, locking_index, mean, near_whole, share
+from stickslip.tables import Sweep, select
+
 from .document import Section, Verdict
 from .kinematics import random_load_share
 

@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 import pyarrow.parquet
 
-from ..tables import parameters
+from stickslip.tables import parameters
 
 
 class LogError(Exception):
@@ -165,7 +165,7 @@ class ContactLog:
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """The command line of a module of the package, with the log and an option for each parameter."""
     parser = argparse.ArgumentParser(
-        prog=f"python -m stickslip.{module}",
+        prog=f"python -m {module}",
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -7,8 +7,9 @@ import numpy
 import pandas
 from scipy import stats
 
-from ..statistics import Estimate, bootstrap, jackknife, mean, proportion, rayleigh_p, resultant_length, share
-from ..tables import Sweep
+from stickslip.statistics import Estimate, bootstrap, jackknife, mean, proportion, rayleigh_p, resultant_length, share
+from stickslip.tables import Sweep
+
 from .document import Section, Verdict
 from .kinematics import (
     load_phase,

@@ -7,8 +7,9 @@ import numpy
 import pandas
 from scipy import stats
 
-from ..statistics import Estimate, difference, jackknife, share
-from ..tables import Sweep, parameters, read, select
+from stickslip.statistics import Estimate, difference, jackknife, share
+from stickslip.tables import Sweep, parameters, read, select
+
 from .document import Section, Verdict
 from .intervals import LARGE, without_modulation
 from .kinematics import under_minimum

@@ -1,6 +1,6 @@
 """Checks the oracle itself: the first breaks of a contact log, integrated numerically by SciPy's DOP853.
 
-    .venv/bin/python -m stickslip.oracle.scipy_check log.parquet --breaks 40
+    .venv/bin/python -m oracle.scipy_check log.parquet --breaks 40
 
 Shares no method with the oracle: the equations of motion are integrated step by step (explicit Runge-Kutta of order 8,
 rtol 1e-13) and each break is found by an event function, the distance of the nearest break position. Of the log only

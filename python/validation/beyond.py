@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy
 import pandas
 
-from ..statistics import difference, jackknife, locking_index, mean, near_whole, resultant_length, share
-from ..tables import Sweep, select
+from stickslip.statistics import difference, jackknife, locking_index, mean, near_whole, resultant_length, share
+from stickslip.tables import Sweep, select
+
 from .document import Section
 from .intervals import SIZES, count_by_slip, of_same_jobs, without_modulation
 from .kinematics import locked_by_chance, locked_in_load
