@@ -37,7 +37,7 @@ def run(
     retry_failed
         Whether to run failed jobs again.
     walltime
-        End within this time, in s: start only what ends by then.
+        End within this time, in s, and keep what is done.
     reduce
         Whether to reduce the tables and to draw the figures, when all is done.
 

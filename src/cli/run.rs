@@ -56,8 +56,7 @@ pub struct Arguments {
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// End within this time, such as 55m, 1h30m or 1:30:00: start only what ends by then; reduction and figures take
-    /// extra time
+    /// End within this time, such as 55m, 1h30m or 1:30:00, and keep what is done; reduction and figures take extra time
     #[arg(long, value_name = "TIME", value_parser = time::parse)]
     walltime: Option<Duration>,
     /// Run as one of many workers in a batch queue: exit with 0 also when others run the rest, or when the time is over
@@ -79,7 +78,7 @@ pub struct Arguments {
 }
 
 /// Version of [`Report`] as JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -199,15 +198,10 @@ pub fn no_standing_figure(layout: &Layout<'_>) -> String {
 /// What to do after a run that stopped early.
 fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
     let left = output::count(report.jobs_left, "job");
-    let hint = match report.time_wanted {
-        Some(time) if report.jobs_run == 0 => {
-            let time = output::duration(time);
-            format!("No part fits into this time, the cheapest takes about {time}: give a longer --walltime.")
-        }
-        None if has_walltime && report.jobs_run == 0 => {
-            "No part ended in this time: give a longer --walltime.".to_owned()
-        }
-        _ => "The same command resumes.".to_owned(),
+    let hint = if has_walltime && report.jobs_run == 0 {
+        "No part ended in this time: give a longer --walltime."
+    } else {
+        "The same command resumes."
     };
     format!("stopped with {left} left; finished jobs are kept. {hint}")
 }

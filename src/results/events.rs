@@ -121,8 +121,6 @@ pub struct RunReport {
     pub stopped: bool,
     /// Hosts of the workers that run the jobs which are left.
     pub hosts: Vec<String>,
-    /// Predicted wall time of the cheapest part that was not started for want of time, in s.
-    pub time_wanted: Option<f64>,
     /// Predicted CPU time of the jobs run, in s.
     pub predicted_cost: f64,
     /// Their measured CPU time, in s.
@@ -326,7 +324,7 @@ mod tests {
         let mut log = results.begin_log().unwrap();
         let events = [
             RunEvent::started("1/1".to_owned(), 1, 2, 3, 0, 4.0),
-            RunEvent::Finished(RunReport { jobs_run: 3, time_wanted: Some(1.5), ..RunReport::default() }),
+            RunEvent::Finished(RunReport { jobs_run: 3, wall: 1.5, ..RunReport::default() }),
             RunEvent::Error { error: "disk full".to_owned() },
             RunEvent::Stopping,
         ];

@@ -183,7 +183,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 cost_out += job.cost();
                 hand_out(job);
             }
-            if !is_out_of_time && self.walltime.refused().is_some() {
+            if !is_out_of_time && self.walltime.has_refused() {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
@@ -223,7 +223,6 @@ impl<'a, 'e> Collector<'a, 'e> {
         let job = &part.jobs[of.position];
         self.member.count_job();
         let predicted_cost = job.cost;
-        self.walltime.ended(predicted_cost, time.wall);
         let event = match &outcome {
             Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
             Err(reason) => RunEvent::JobFailed {
@@ -259,7 +258,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
         self.share.results.commit(&self.member.staging(), part, &whole.outcomes, spilled)?;
-        self.walltime.committed(begin.elapsed().as_secs_f64());
+        self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }

@@ -1,7 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! share.rs    parts that are not there, in outline, claimed -> their jobs (walltime.rs: those that end in time)
+//! share.rs    parts that are not there, in outline, claimed -> their jobs (walltime.rs: while there is time)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
@@ -62,7 +62,7 @@ pub struct Options<'a> {
     pub retry_failed: bool,
     /// The share of the parts to look after.
     pub shard: Shard,
-    /// Starts nothing that would not end within this time after the run's beginning, and ends by then.
+    /// Ends within this time after the run's beginning, and takes no part for which it is too short.
     pub walltime: Option<Duration>,
 }
 
@@ -175,8 +175,7 @@ impl Joined<'_> {
             self.claim_next_reduction()?;
         }
         if report.jobs_left > 0 {
-            let earlier_pace = if options.walltime.is_some() { results.pace()? } else { None };
-            let walltime = Walltime::new(begin, options.walltime, threads, earlier_pace);
+            let walltime = Walltime::new(begin, options.walltime);
             let (jobs, predicted_cost) = (report.jobs_left, overview.predicted_cost_missing + cost_again);
             if let (Some(_), Some(rounds)) = (&events.log, results.rounds_so_far()) {
                 events.send(&RunEvent::RoundBegun { jobs, predicted_cost, rounds })?;
@@ -217,7 +216,6 @@ impl Joined<'_> {
                 // The disk may be what failed: the first error counts.
                 let _ = events.send(&RunEvent::Error { error: error.to_string() });
             })?;
-            report.time_wanted = walltime.refused();
             report.stopped = left.is_none() && report.jobs_left > 0;
             if let Some(left) = left {
                 (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());

@@ -49,6 +49,7 @@ pub(super) struct Taken {
     pub again: bool,
     /// How many of its jobs are to be run.
     pub together: usize,
+    pub begin: Instant,
 }
 
 /// A job of a part that is to be run.
@@ -196,13 +197,15 @@ impl<'a> Work<'a> {
 
     /// Takes the next part with jobs to run, if there is one.
     fn take_next(&mut self, is_busy: bool) -> Result<(), ResultsError> {
-        while let Some(part) = self.pass.next() {
+        while !self.walltime.has_refused()
+            && let Some(part) = self.pass.next()
+        {
             if self.take_unclaimed(part)? {
                 return Ok(());
             }
         }
         let last_look = *self.last_look.get_or_insert_with(Instant::now);
-        if self.walltime.refused().is_some() {
+        if self.walltime.has_refused() {
             self.has_ended = true;
         } else if last_look.elapsed() >= self.pause(is_busy) {
             self.last_look = Some(Instant::now());
@@ -256,9 +259,9 @@ impl<'a> Work<'a> {
                     is_certain &= *is_known || has_beaten;
                 }
                 Standing::Free(generation) => {
-                    // If it goes to another, or does not end in time, the next look decides.
+                    // If it goes to another, the next look decides.
                     is_certain = false;
-                    if self.take_missing(part, generation)? {
+                    if self.take_missing(part, generation)? || self.walltime.has_refused() {
                         break;
                     }
                 }
@@ -276,7 +279,7 @@ impl<'a> Work<'a> {
         self.take(self.share.part(outline), spilled, jobs, generation)
     }
 
-    /// Claims a part, if these of its jobs would end in time; each with whether it has failed before.
+    /// Claims a part, if there is time for it. `jobs` are those to be run, each with whether it has failed before.
     fn take(
         &mut self,
         part: Part,
@@ -284,12 +287,10 @@ impl<'a> Work<'a> {
         jobs: Vec<(usize, bool)>,
         generation: u64,
     ) -> Result<bool, ResultsError> {
-        let costs = || jobs.iter().map(|&(position, _)| part.jobs[position].cost);
-        if !self.walltime.admits(costs()) {
+        if !self.walltime.admits_part() {
             return Ok(false);
         }
         if !self.claims.take(&part_name(&part), generation)? {
-            self.walltime.withdraw(costs().sum());
             self.losses += 1;
             if self.losses == LOSSES {
                 self.losses = 0;
@@ -298,7 +299,7 @@ impl<'a> Work<'a> {
             return Ok(false);
         }
         let again = self.share.done.has(&part);
-        let taken = Arc::new(Taken { part, spilled, again, together: jobs.len() });
+        let taken = Arc::new(Taken { part, spilled, again, together: jobs.len(), begin: Instant::now() });
         let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
         self.jobs.extend(jobs.into_iter().map(job));
         Ok(true)

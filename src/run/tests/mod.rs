@@ -669,8 +669,8 @@ fn all_tables_have_the_described_columns() {
 }
 
 #[test]
-fn a_walltime_ends_a_run_in_time_with_all_that_it_started_committed_and_the_pace_is_learnt() {
-    /// Of the predicted cost: at a pace of 1 no part of 5 s on two threads would end in time.
+fn a_walltime_ends_a_run_in_time_with_all_that_it_finished_kept() {
+    /// Time over predicted cost: each of four parts takes half a second on two threads.
     const PACE: f64 = 0.2;
     const WALLTIME: Duration = Duration::from_millis(1500);
     let slow = |job: &Job, interrupt: &AtomicBool| {
@@ -681,19 +681,17 @@ fn a_walltime_ends_a_run_in_time_with_all_that_it_started_committed_and_the_pace
     let stop = AtomicBool::new(false);
     for round in 0.. {
         let options = Options { walltime: Some(WALLTIME), ..options(&stop, 2) };
-        let (mut jobs_ended, mut out_of_time, mut interrupted) = (0, 0, false);
+        let (mut jobs_ended, mut out_of_time) = (0, 0);
         let report =
             run(&Layout::new(&Disk, root.path()), &sweep(SEEDS, ""), options, &slow, &mut |event| match event {
                 RunEvent::JobDone { .. } => jobs_ended += 1,
                 RunEvent::OutOfTime => out_of_time += 1,
-                RunEvent::Stopping => interrupted = true,
                 _ => {}
             })
             .unwrap();
         assert!(report.wall < WALLTIME.as_secs_f64(), "{report:?}");
-        // A machine that stalls may interrupt a part.
-        assert!(interrupted || (report.jobs_run > 0 && report.jobs_run == jobs_ended), "{report:?}");
-        assert_eq!((report.time_wanted.is_some(), out_of_time), (out_of_time > 0, u32::from(out_of_time > 0)));
+        assert!(report.jobs_run + report.jobs_spilled == jobs_ended && jobs_ended > 0, "{report:?}");
+        assert!(out_of_time <= 1, "it is said once");
         assert_eq!(report.stopped, report.jobs_left > 0, "{report:?}");
         assert!(report.stopped || round > 0, "four parts take 2 s");
         if !report.stopped {
