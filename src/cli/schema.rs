@@ -16,6 +16,6 @@ The first line of a sweep file then names it for Even Better TOML (VS Code), Tap
 pub struct Arguments {}
 
 pub fn schema() -> Result<Exit> {
-    output::json(&crate::sweep::schema())?;
+    output::print(crate::sweep::SCHEMA)?;
     Ok(Exit::Done)
 }

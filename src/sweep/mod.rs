@@ -24,7 +24,6 @@ mod read_axes;
 mod read_rounds;
 mod rounds;
 mod samples;
-mod schema;
 mod source;
 mod statistic;
 #[cfg(test)]
@@ -37,7 +36,10 @@ pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
-pub use schema::schema;
 pub use source::{Mistake, SweepError, nearest};
 pub use statistic::{STATISTICS, Statistic, StatisticKind};
 pub use walked::walked;
+
+/// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
+/// is left to [`Sweep::parse`].
+pub const SCHEMA: &str = include_str!("../../docs/sweep.schema.json");

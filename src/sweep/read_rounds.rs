@@ -25,8 +25,8 @@ use crate::model::{Shortest, Symbol, Value};
 use crate::observe::Regime;
 use std::cell::Cell;
 
-/// Keys with their meanings and allowed values: of messages, the schema and the documentation.
-pub(super) type Keys = [(&'static str, &'static str, &'static str)];
+/// Keys with their meanings and allowed values, of messages and the documentation.
+type Keys = [(&'static str, &'static str, &'static str)];
 
 pub(super) const PRECISION: &Keys = &[
     (
@@ -72,11 +72,6 @@ pub(super) const REFINE: &Keys = &[
     ),
     ("sets", "Largest number of sets of the sweep", "whole, up to 100000; at least those of the axes as they stand"),
 ];
-
-/// Whether there can be values between those of a quantity.
-pub(super) fn is_refinable(quantity: Quantity) -> bool {
-    quantity != Quantity::BREAK_ON && !quantity.is_count()
-}
 
 fn keys(table: &Keys) -> Vec<&'static str> {
     table.iter().map(|(key, ..)| *key).collect()

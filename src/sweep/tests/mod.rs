@@ -2,6 +2,7 @@
 
 mod bad_files;
 mod properties;
+mod schema;
 
 use super::*;
 use crate::model::{BreakOn, Parameters, Symbol, Value};
