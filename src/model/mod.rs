@@ -21,5 +21,6 @@ pub use parameters::{ParameterError, Parameters, Symbol};
 pub(crate) use value::Shortest;
 pub use value::{BreakOn, Value};
 
-/// Version of the equations and definitions; part of every job id. Raised when the same parameters give other results.
+/// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file that leaves
+/// them out, give other results.
 pub const MODEL_VERSION: u32 = 3;

@@ -41,18 +41,6 @@ impl Recording {
         };
         distance / parameters.drive_velocity
     }
-
-    /// Keys and values that define a job, part of its id. The keys of the first version always are; later ones only where
-    /// they differ from their default, so that the ids of other jobs stay as they were. The longest time and the budget of
-    /// events always count as the default: they change no job that ends by itself.
-    pub fn settings(&self) -> impl Iterator<Item = (String, String)> {
-        let default = Self::default();
-        let recording = Self { max_time: default.max_time, max_events: default.max_events, ..*self };
-        RecordingKey::ALL
-            .into_iter()
-            .filter(move |&key| key <= RecordingKey::Precursors || recording.get(key) != default.get(key))
-            .map(move |key| (format!("record.{}", key.key()), recording.get(key).to_string()))
-    }
 }
 
 impl RecordingKey {

@@ -1,12 +1,12 @@
 //! A job, and the names by which results know it.
 //!
-//! An id is the first half of SHA-256 over the model version, the scheme of random numbers, the solver's setting, the
-//! recording and the exact bits of every parameter: never over the place in a grid. Contract: pinned by a known-answer
-//! test; another id means that the results are others.
+//! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver, recording
+//! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So what is
+//! added later changes no id. Contract: pinned by known-answer tests, and so are the defaults.
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Shortest, Symbol};
-use crate::observe::Recording;
-use crate::solver::{Resolve, Solver};
+use crate::observe::{Recording, RecordingKey};
+use crate::solver::Solver;
 use sha2::{Digest, Sha256};
 use std::fmt;
 
@@ -54,18 +54,23 @@ id! {
     SetId
 }
 
-/// Keys and values of the solver and the recording, as a sweep file writes them. Values read back to the same bits.
-pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> {
-    let (method, key, value, resolve) = match solver {
-        Solver::EventDriven { tolerance, resolve } => ("event-driven", "solver.tolerance", tolerance, resolve),
-        Solver::FixedStep { time_step } => ("fixed-step", "solver.dt", time_step, Resolve::Auto),
+/// Keys and values of the solver and the recording, as a sweep file writes them, but for the longest time and the budget of
+/// events: they change no job that ends by itself, and always count as the default. Values read back to the same bits.
+pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> + use<> {
+    let solver = match solver {
+        Solver::EventDriven { tolerance, resolve } => vec![
+            ("method", "event-driven".to_owned()),
+            ("tolerance", Shortest(tolerance).to_string()),
+            ("resolve", resolve.word().to_owned()),
+        ],
+        Solver::FixedStep { time_step } => {
+            vec![("method", "fixed-step".to_owned()), ("dt", Shortest(time_step).to_string())]
+        }
     };
-    let mut solver = vec![("solver.method", method.to_owned()), (key, Shortest(value).to_string())];
-    // As a later key of the recording: part of an id only where it differs from its default.
-    if resolve != Resolve::Auto {
-        solver.push(("solver.resolve", resolve.word().to_owned()));
-    }
-    solver.into_iter().map(|(key, value)| (key.to_owned(), value)).chain(recording.settings())
+    let default = Recording::default();
+    let recording = Recording { max_time: default.max_time, max_events: default.max_events, ..*recording };
+    let solver = solver.into_iter().map(|(key, value)| (format!("solver.{key}"), value));
+    solver.chain(RecordingKey::ALL.map(|key| (format!("record.{}", key.key()), recording.get(key).to_string())))
 }
 
 /// Gives jobs their ids: all that they share is hashed once.
@@ -79,7 +84,8 @@ impl Identity {
     pub fn new(solver: Solver, recording: &Recording) -> Self {
         let mut shared = Sha256::new();
         shared.update(format!("model={MODEL_VERSION}\nrng={RNG_SCHEME}\n"));
-        for (key, value) in settings(solver, recording) {
+        let defaults: Vec<_> = settings(Solver::default(), &Recording::default()).collect();
+        for (key, value) in settings(solver, recording).filter(|setting| !defaults.contains(setting)) {
             shared.update(format!("{key}={value}\n"));
         }
         Self { shared }
@@ -96,11 +102,15 @@ impl Identity {
     }
 
     fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> [u8; ID_BYTES] {
-        let mut hasher = self.shared.clone();
+        let (mut hasher, defaults) = (self.shared.clone(), Parameters::default());
         for &symbol in symbols {
-            let (kind, bits) = parameters.get(symbol).bits();
-            hasher.update([kind]);
-            hasher.update(bits.to_le_bytes());
+            let value = parameters.get(symbol);
+            if value != defaults.get(symbol) {
+                let (kind, bits) = value.bits();
+                hasher.update(symbol.key());
+                hasher.update([b'=', kind]);
+                hasher.update(bits.to_le_bytes());
+            }
         }
         let digest = hasher.finalize();
         std::array::from_fn(|byte| digest[byte])
@@ -111,7 +121,6 @@ impl Identity {
 mod tests {
     use super::*;
     use crate::model::{BreakOn, Value};
-    use crate::observe::RecordingKey;
     use std::collections::HashSet;
 
     fn identity() -> Identity {
@@ -120,9 +129,39 @@ mod tests {
 
     #[test]
     fn ids_are_pinned() {
-        // A change here orphans every result: raise MODEL_VERSION or leave the hash alone.
-        assert_eq!(identity().job(&Parameters::default()).to_string(), "8c3edcbf146555e1b906e31378667201");
-        assert_eq!(identity().set(&Parameters::default()).to_string(), "63ec6bdfb85d355b8b9e1913ba90294a");
+        // A change here orphans every result: raise FORMAT of the manifest with it, or leave the hash alone.
+        let modulated = Parameters {
+            drive_velocity: 2e-4,
+            modulation_amplitude: 1e-6,
+            modulation_period: Some(0.01),
+            seed: 3,
+            ..Parameters::default()
+        };
+        let default = Identity::new(Solver::default(), &Recording::default());
+        assert_eq!(default.job(&Parameters::default()).to_string(), "a7584e1086a2c8da86d617407fbf03fd");
+        assert_eq!(identity().job(&modulated).to_string(), "a991af669d7b60157774c05ea37350bc");
+        assert_eq!(identity().set(&modulated).to_string(), "fcd5287f46654b8559553e38595808ea");
+    }
+
+    #[test]
+    fn defaults_are_pinned() {
+        // What is at its default is no part of an id: with another default an id would name another job. Change one, and
+        // raise MODEL_VERSION; what is added is added here alone.
+        let defaults = Parameters::default();
+        let parameters = Symbol::ALL.map(|symbol| format!("{}={}", symbol.key(), defaults.get(symbol)));
+        let settings = settings(Solver::default(), &Recording::default()).map(|(key, value)| format!("{key}={value}"));
+        let defaults: Vec<String> = parameters.into_iter().chain(settings).collect();
+        assert_eq!(
+            (MODEL_VERSION, defaults.join(" ").as_str()),
+            (
+                3,
+                "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
+                V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 FN=4000 L=0.15 break_on=magnitude seed=0 \
+                solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.discard=5 \
+                record.max_time=none record.max_events=1000000000 record.precursor_size=none record.precursors=false \
+                record.drop_size=none record.energies=false record.give_up_after=none"
+            )
+        );
     }
 
     #[test]

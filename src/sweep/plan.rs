@@ -23,8 +23,9 @@ const MANY_PARTS: f64 = 20_000.0;
 const ROUNDING: f64 = 1e-9;
 /// Most jobs of a part, so that a part of cheap jobs fits in memory.
 pub const PART_JOBS: usize = 4096;
-/// Version of how sweeps become parts: order, cost and limits. A directory keeps the one that it was started with.
-pub const PLAN_VERSION: u32 = 4;
+/// Version of how sweeps become parts: values of axes, order, cost and limits. A directory keeps the one that it was started
+/// with.
+pub const PLAN_VERSION: u32 = 5;
 
 /// A sweep of a directory, and what of it counts there.
 #[derive(Clone, Debug)]

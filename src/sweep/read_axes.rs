@@ -8,8 +8,8 @@
 //! [axes.sobol], [axes.latin]                    points, seed and a range for each quantity
 //! ```
 //!
-//! Axes stand in the order of the file; the last moves fastest. A range of a whole-number quantity is rounded to whole
-//! numbers. An axis reports its first mistake, a zip or a sample that of each column.
+//! Axes stand in the order of the file; the last moves fastest. Values of a range are rounded to twelve digits, those of a
+//! whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each column.
 
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::check::Places;
@@ -17,7 +17,7 @@ use super::quantity::Quantity;
 use super::read_rounds::{Wanted, WantedAxis};
 use super::samples::{Range, Sample};
 use super::source::{Entry, Refused, Section, all};
-use crate::model::{Shortest, Value};
+use crate::model::Value;
 
 const RANGE_FORMS: &str = "{ linear = [low, high], points = n } or { log = [low, high], points = n }";
 const AXIS_FORMS: &str =
@@ -117,7 +117,7 @@ fn read_values(
     // One point would leave out an end.
     let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
     let points = finer.map_or(Ok(points), |axis| axis.points(&range, points))?;
-    range.spaced(points).map(|value| Ok((ranged(entry, quantity, value)?, entry.at))).collect()
+    Ok(range.spaced(points).map(|value| (ranged(quantity, value), entry.at)).collect())
 }
 
 /// Reads the first of counted values and their number; none if the entry has another form.
@@ -173,7 +173,7 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
         let value = entry.value().and_then(|value| quantity.checked(value));
         value.and_then(Value::number).ok_or_else(|| entry.refuse(problem))
     };
-    let range = Range { low: end(low)?, high: end(high)?, logarithmic };
+    let range = Range { low: end(low)?, high: end(high)?, logarithmic, whole: quantity.is_count() };
     if range.low >= range.high {
         return Err(entry.must_be("[low, high] with low < high"));
     }
@@ -183,14 +183,9 @@ fn read_range(table: &Section<'_>, quantity: Quantity) -> Result<Option<Range>, 
     Ok(Some(range))
 }
 
-/// A value within a range, whole where the quantity is.
-fn ranged(entry: &Entry<'_>, quantity: Quantity, value: f64) -> Result<Value, Refused> {
-    let value = if quantity.is_count() { value.round() } else { value };
-    // Between two allowed ends everything is allowed; a quantity with a gap would be refused here.
-    quantity.checked(Value::Real(value)).ok_or_else(|| {
-        let problem = format!("{} = {}: must be {}", entry.key, Shortest(value), quantity.allowed());
-        entry.source.refuse(entry.at, problem)
-    })
+/// A value within a range.
+fn ranged(quantity: Quantity, value: f64) -> Value {
+    quantity.checked(Value::Real(value)).expect("no quantity has a gap between two values that are allowed")
 }
 
 fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
@@ -223,7 +218,7 @@ fn read_sample(table: &Section<'_>, sample: Sample, places: &mut Places<'_>) -> 
         let quantity = known(entry, table.title, &SETTINGS, places)?;
         let form = entry.section("a range of a sample").ok_or_else(|| entry.must_be(SAMPLE_FORMS))?;
         form.only(&["linear", "log"])?;
-        Ok((entry, quantity, read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?))
+        Ok((quantity, read_range(&form, quantity)?.ok_or_else(|| entry.must_be(SAMPLE_FORMS))?))
     }))?;
     if ranges.is_empty() {
         let problem =
@@ -231,12 +226,11 @@ fn read_sample(table: &Section<'_>, sample: Sample, places: &mut Places<'_>) -> 
         return Err(table.source.refuse(table.at, problem));
     }
     let [points, seed] = [points?, seed?].map(|number| u32::try_from(number).unwrap_or(u32::MAX));
-    let columns = all((0..).zip(ranges).map(|(dimension, (entry, quantity, range))| {
+    let columns = (0..).zip(ranges).map(|(dimension, (quantity, range))| {
         let coordinates = sample.coordinates(dimension, points, seed);
-        let values = coordinates.into_iter().map(|x| ranged(entry, quantity, range.at(x))).collect::<Result<_, _>>()?;
-        Ok(Column { quantity, values })
-    }))?;
-    of_columns(table, columns)
+        Column { quantity, values: coordinates.into_iter().map(|x| ranged(quantity, range.at(x))).collect() }
+    });
+    of_columns(table, columns.collect())
 }
 
 /// The axis of a zip or a sample.

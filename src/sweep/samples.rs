@@ -9,6 +9,9 @@ use super::axes::MAX_ROWS;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+/// Significant digits of a value between the ends of a range: 1e-4 as people write it, not what a logarithm makes of it.
+const DIGITS: usize = 12;
+
 /// A range of a quantity, low < high.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
@@ -16,10 +19,12 @@ pub(super) struct Range {
     pub high: f64,
     /// Even in the logarithm; both ends are > 0.
     pub logarithmic: bool,
+    /// Whether the quantity takes whole numbers only.
+    pub whole: bool,
 }
 
 impl Range {
-    /// The value at a fraction of the way, 0 to 1; the ends are exact.
+    /// The value at a fraction of the way, 0 to 1, rounded; the ends are exact.
     pub fn at(&self, fraction: f64) -> f64 {
         if fraction <= 0.0 {
             return self.low;
@@ -34,7 +39,8 @@ impl Range {
             // Two terms: the difference of the ends may overflow.
             self.low * (1.0 - fraction) + self.high * fraction
         };
-        value.clamp(self.low, self.high)
+        let rounded = if self.whole { value.round() } else { significant(value) };
+        rounded.clamp(self.low, self.high)
     }
 
     /// Evenly spaced values, ends included. At least two.
@@ -42,6 +48,11 @@ impl Range {
         let last = (points - 1) as f64;
         (0..points).map(move |point| self.at(point as f64 / last))
     }
+}
+
+/// The double that is nearest to a value in [`DIGITS`].
+fn significant(value: f64) -> f64 {
+    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,7 +100,7 @@ mod tests {
     #[test]
     fn the_ends_of_a_range_are_exact_and_its_steps_even() {
         for logarithmic in [false, true] {
-            let range = Range { low: 3e-7, high: 1e-4, logarithmic };
+            let range = Range { low: 3e-7, high: 1e-4, logarithmic, whole: false };
             let values: Vec<f64> = range.spaced(7).collect();
             assert_eq!((values[0], values[6]), (3e-7, 1e-4));
             for pair in values.windows(3) {
@@ -98,10 +109,14 @@ mod tests {
                 } else {
                     2.0 * pair[1] / (pair[0] + pair[2])
                 };
-                assert!((even - 1.0).abs() < 1e-13, "{values:?}");
+                // Each value is rounded by 5e-12 of itself at most.
+                assert!((even - 1.0).abs() < 2e-11, "{values:?}");
             }
         }
-        let widest = Range { low: -f64::MAX, high: f64::MAX, logarithmic: false };
+        let ends = (1.234_567_890_123_456_7, 9.876_543_210_987_654);
+        let long = Range { low: ends.0, high: ends.1, logarithmic: true, whole: false };
+        assert_eq!((long.at(0.0), long.at(1.0), long.at(1e-15)), (ends.0, ends.1, ends.0));
+        let widest = Range { low: -f64::MAX, high: f64::MAX, logarithmic: false, whole: false };
         assert_eq!(widest.at(0.5), 0.0);
     }
 

@@ -71,6 +71,36 @@ fn eta_and_frequency_fix_the_period() {
 }
 
 #[test]
+fn a_range_holds_the_numbers_that_people_write() {
+    let in_common = "seed = { count = 2 }\nDelta = [0, 1e-6]";
+    let ranged = sweep(&format!(
+        "where = \"V0 == 1e-4 or frequency == 30\"\n[axes]\nV0 = {{ log = [1e-6, 1e-3], points = 7 }}\n\
+         frequency = {{ linear = [0.1, 99.9], points = 999 }}\n{in_common}"
+    ));
+    let velocities = "3.16227766017e-6, 1e-5, 3.16227766017e-5, 1e-4, 3.16227766017e-4, 1e-3";
+    let frequencies: Vec<String> = (1..=999).map(|tenths| format!("{}.{}", tenths / 10, tenths % 10)).collect();
+    let listed = sweep(&format!(
+        "where = \"V0 == 1e-4 or frequency == 30\"\n[axes]\nV0 = [1e-6, {velocities}]\nfrequency = [{}]\n{in_common}",
+        frequencies.join(", ")
+    ));
+    assert_eq!(ranged.jobs().count(), 2 * (1 + 999 + 6));
+    for (ranged, listed) in ranged.jobs().zip(listed.jobs()) {
+        assert_eq!(ranged, listed);
+    }
+    let sample = |range: &str| values(&sweep(&format!("[axes.sobol]\npoints = 9\nV0 = {{ {range} }}")), Symbol::V0);
+    for value in [sample("log = [1e-6, 1e-3]"), sample("linear = [1e-6, 1e-3]")].concat() {
+        let Value::Real(value) = value else { panic!("{value}") };
+        assert_eq!(format!("{value:.11e}").parse(), Ok(value));
+    }
+    assert!(
+        Sweep::parse("name = \"a\"\n[axes]\nV0 = { linear = [1, 1.00000000001], points = 9 }", Path::new("a.toml"))
+            .unwrap_err()
+            .to_string()
+            .contains("repeats value 1 of this axis")
+    );
+}
+
+#[test]
 fn whole_quantities_take_rounded_values_of_a_range() {
     assert_eq!(counts(&sweep("[axes]\nN = { log = [1, 1000], points = 5 }"), Symbol::N), [1, 6, 32, 178, 1000]);
 }
