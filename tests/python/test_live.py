@@ -1,15 +1,11 @@
-"""pandas, polars and DuckDB read a table folder without options while a run writes it or a compaction replaces it, and
-after a kill."""
+"""pandas, polars and DuckDB read a table folder without options while a run writes it, and after a kill."""
 
-import os
-import shutil
 import subprocess
 import time
 
 import duckdb
 import pandas as pd
 import polars as pl
-import pyarrow.dataset
 import pytest
 
 # Many jobs of some 50 µs, in parts of 4096: files appear all the time.
@@ -82,68 +78,3 @@ def test_all_readers_read_while_a_run_writes_and_after_a_kill(writer):
     for name, rows in found.items():
         print(f"{name}: {len(rows)} reads, {len(set(rows))} different numbers of rows, up to {rows[-1]}")
         assert len(set(rows)) >= 3, f"{name}: nothing was written meanwhile"
-
-
-# 65 parts, which are compacted into one file.
-FINISHED = SWEEP.replace("1_000_000", "9200")
-ROWS = SLIPS_OF_A_JOB * 9200
-COMPACTIONS = 2
-
-
-def files(folder):
-    """The files of a folder, for readers that would pass over one which they do not find."""
-    return sorted(str(path) for path in folder.glob("*.parquet"))
-
-
-# The rows of a folder, or an error where files that were listed have gone since.
-ROWS_OF = {
-    "pandas": lambda folder: len(pd.read_parquet(files(folder))),
-    "pyarrow": lambda folder: pyarrow.dataset.dataset(files(folder)).count_rows(),
-    "polars": lambda folder: pl.read_parquet(folder).height,
-    "duckdb": lambda folder: duckdb.connect()
-    .sql(f"select count(*) from '{folder}/*.parquet'")
-    .fetchall()[0][0],
-}
-GONE = (FileNotFoundError, duckdb.IOException)
-
-
-@pytest.fixture
-def finished(stickslip, tmp_path):
-    """The results of a small sweep."""
-    sweep, results = tmp_path / "live.toml", tmp_path / "results"
-    sweep.write_text(FINISHED)
-    stickslip("run", sweep, "--out", results, "--no-reduce")
-    return results
-
-
-@pytest.mark.parametrize("reader", ["listdir", "glob", *ROWS_OF])
-def test_readers_find_all_rows_or_a_file_gone_and_never_an_empty_folder_beside_compactions(
-    program, finished, tmp_path, reader
-):
-    complete = 0
-    for number in range(COMPACTIONS):
-        results = tmp_path / f"copy-{number}"
-        shutil.copytree(finished, results)
-        slips = results / "tables" / "slips"
-        opened, listed = os.scandir(slips), files(slips)
-        compaction = subprocess.Popen([program, "compact", results], stdout=subprocess.DEVNULL)
-        is_running = True
-        while is_running:
-            # Once more after its end.
-            is_running = compaction.poll() is None
-            if reader == "listdir":
-                assert os.listdir(slips)
-            elif reader == "glob":
-                assert list(slips.glob("*.parquet"))
-            else:
-                try:
-                    assert ROWS_OF[reader](slips) == ROWS
-                except GONE:
-                    continue
-            complete += 1
-        assert compaction.returncode == 0
-        assert len(list(opened)) == len(listed) > 1, "who opened the folder before lists all its files later"
-        with pytest.raises(FileNotFoundError):
-            open(listed[0])
-    print(f"{reader}: {complete} complete reads")
-    assert complete >= COMPACTIONS

@@ -1,7 +1,5 @@
 """pandas, polars and DuckDB read the tables of a sweep without options, and find what the reduction found."""
 
-import shutil
-
 import duckdb
 import numpy as np
 import pandas as pd
@@ -62,18 +60,6 @@ def test_every_table_folder_reads_without_options(results, table, rows):
     }
     assert len(shapes) == 1, shapes
     assert rows is None or shapes.pop()[0] == rows
-
-
-@pytest.mark.parametrize("table, rows", [("slips", SLIPS), ("jobs", JOBS)])
-def test_compacted_tables_hold_the_same_rows_in_the_same_order(stickslip, results, tmp_path, table, rows):
-    compacted = shutil.copytree(results, tmp_path / "compacted")
-    stickslip("compact", compacted)
-    before, after = (pd.read_parquet(folder / "tables" / table) for folder in (results, compacted))
-    assert len(after) == rows
-    pd.testing.assert_frame_equal(before, after)
-    folder = compacted / "tables" / table
-    assert pl.read_parquet(folder).shape == after.shape
-    assert duckdb.sql(f"select * from '{folder}/*.parquet'").df().shape == after.shape
 
 
 def test_parameters_are_columns_of_numbers(results):
