@@ -4,7 +4,6 @@
 //! breaks.rs     before chaos: break times, contact by contact
 //! distance.rs   after chaos: distances of distributions and biases, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
-//! scaling.rs    what a slip costs as the slider grows
 //! hard_cases.rs parameters that break a naive code, each audited
 //! cost.rs       what a computation costs
 //! tables.rs -> report.rs: tables as Parquet and JSON, figures
@@ -15,15 +14,13 @@ pub mod cost;
 pub mod distance;
 mod hard_cases;
 mod report;
-mod scaling;
 mod study;
 mod tables;
 
 pub use cost::Cost;
 pub use distance::{Bias, Distance, Distances};
 pub use hard_cases::{HardCase, Stability, hard_cases};
-pub use report::{Report, scaling_report, stability_report, study_report};
-pub use scaling::{Exponents, SIZES, Scaling, ScalingFindings, SizeRow};
+pub use report::{Report, stability_report, study_report};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 
 use crate::figure::FigureError;

@@ -1,11 +1,10 @@
 //! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures, put in place together.
 
 use super::distance::Distance;
-use super::scaling::{ScalingFindings, SizeRow, growing};
 use super::study::{Findings, MethodRow, Quantity, Study};
 use super::{AccuracyError, Stability, cost, method_in_words, other_settings};
-use crate::figure::{ErrorPanel, Growth, Line, Look, MethodLine, Picture, WorkPrecision, scaling, work_precision};
-use crate::model::{Parameters, Symbol};
+use crate::figure::{ErrorPanel, Look, MethodLine, Picture, WorkPrecision, work_precision};
+use crate::model::Parameters;
 use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::table::arrow;
@@ -37,14 +36,6 @@ pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<
             drawn.push(set);
         }
     }
-    Ok(report)
-}
-
-/// A scaling, with its figure.
-pub fn scaling_report(findings: &ScalingFindings) -> Result<Report<'_>, AccuracyError> {
-    let mut report =
-        Report::new("scaling", json!({})).table("sizes", &findings.sizes).table("exponents", &findings.exponents);
-    report.pictures.push(("scaling".to_owned(), scaling_figure(findings)?));
     Ok(report)
 }
 
@@ -179,25 +170,6 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
     lines
 }
 
-/// Costs, steps and breaks over either size, a line per tolerance.
-fn scaling_figure(findings: &ScalingFindings) -> Result<Picture, AccuracyError> {
-    let mut tolerances: Vec<f64> = findings.sizes.iter().map(|row| row.tolerance).collect();
-    tolerances.sort_by(|a, b| b.total_cmp(a));
-    tolerances.dedup();
-    let lines = |size, name: &str, value: fn(&SizeRow) -> f64| {
-        let points = |tolerance| growing(size, tolerance, &findings.sizes).map(|(count, row)| (count, value(row)));
-        tolerances.iter().map(|&tolerance| (format!("{name} {tolerance:e}"), points(tolerance).collect())).collect()
-    };
-    let columns = [(Symbol::N, "Blocks N"), (Symbol::Ns, "Contacts per block Nₛ")].map(|(size, label)| {
-        let mut counts: Vec<Line> = lines(size, "steps,", |row| row.cost.steps_per_slip);
-        // Breaks hardly depend on the tolerance.
-        let breaks: Vec<Line> = lines(size, "breaks,", |row| row.breaks_per_slip);
-        counts.extend(breaks.into_iter().take(1).map(|(_, points)| ("breaks".to_owned(), points)));
-        Growth { label: label.to_owned(), costs: lines(size, "tolerance", |row| row.cost.per_slip), counts }
-    });
-    Ok(scaling(&columns, &Look::default())?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::breaks::BreakErrors;
@@ -254,18 +226,6 @@ mod tests {
         Findings { methods: vec![method, untested], distances: vec![distance] }
     }
 
-    fn sizes_of_two() -> Vec<SizeRow> {
-        let row = |blocks, tolerance| SizeRow {
-            parameters: Selected::new(Parameters { blocks, ..Parameters::default() }),
-            tolerance,
-            cost: cost::Cost { per_slip: 0.01, steps_per_slip: 1e4, ..cost::Cost::default() },
-            leaps_per_slip: 100.0,
-            breaks_per_slip: 3e3,
-            reattachments_per_slip: 3e3,
-        };
-        vec![row(70, 1e-10), row(70, 1e-6), row(140, 1e-10), row(140, 1e-6)]
-    }
-
     #[test]
     fn a_study_is_written_as_tables_json_and_figures() {
         let folder = tempfile::tempdir().unwrap();
@@ -297,14 +257,9 @@ mod tests {
     #[test]
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
-        let (study, findings, scaling) = (
-            Study { sets: vec![Parameters::default()], ..Study::quick() },
-            findings(),
-            ScalingFindings { sizes: sizes_of_two(), ..ScalingFindings::default() },
-        );
+        let (study, findings) = (Study { sets: vec![Parameters::default()], ..Study::quick() }, findings());
         let reports = [
             ("accuracy", study_report(&study, &findings).unwrap()),
-            ("accuracy --scaling", scaling_report(&scaling).unwrap()),
             ("accuracy --hard-cases", stability_report(&[])),
         ];
         for (command, report) in reports {
@@ -313,21 +268,5 @@ mod tests {
                 assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
             }
         }
-    }
-
-    #[test]
-    fn a_scaling_is_drawn_whatever_the_order_of_its_rows_and_not_without_any() {
-        let sizes = sizes_of_two();
-        let svg = scaling_figure(&ScalingFindings { sizes, exponents: Vec::new() }).unwrap().svg();
-        for name in [
-            "costs: tolerance 1e-6",
-            "costs: tolerance 1e-10",
-            "counts: steps, 1e-6",
-            "counts: steps, 1e-10",
-            "counts: breaks",
-        ] {
-            assert_eq!(svg.matches(&format!(">{name}<")).count(), 1, "{name}");
-        }
-        assert!(matches!(scaling_figure(&ScalingFindings::default()), Err(AccuracyError::Figure(_))));
     }
 }

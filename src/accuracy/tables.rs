@@ -1,4 +1,4 @@
-//! A solver as columns, and the documentation of all tables that an accuracy study, scaling and the hard cases write.
+//! A solver as columns, and the documentation of all tables that an accuracy study and the hard cases write.
 //!
 //! Unlike the tables of a sweep these hold times, of the machine that they were measured on. Their JSON has the same fields.
 
@@ -49,7 +49,7 @@ impl Part for Solver {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{DistanceRow, Exponents, MethodRow, SizeRow, Stability};
+    use super::super::{DistanceRow, MethodRow, Stability};
     use crate::table::columns::{Column, Table};
 
     fn described<T: Table>() -> (&'static str, Vec<Column>) {
@@ -62,8 +62,6 @@ mod tests {
         let tables = [
             described::<MethodRow>(),
             described::<DistanceRow>(),
-            described::<SizeRow>(),
-            described::<Exponents>(),
             described::<Stability>(),
         ];
         for (table, columns) in tables {

@@ -5,8 +5,8 @@ use super::output;
 use super::sweep::settings_as_sweep;
 use super::threads::ThreadsFlag;
 use crate::accuracy::{
-    self, DistanceRow, Distances, Findings, MethodRow, Quantity, Report, Scaling, ScalingFindings, Stability, Study,
-    hard_cases, scaling_report, set_in_words, solver_in_words, stability_report, study_report,
+    self, DistanceRow, Distances, Findings, MethodRow, Quantity, Report, Stability, Study, hard_cases, set_in_words,
+    solver_in_words, stability_report, study_report,
 };
 use crate::model::Parameters;
 use crate::sweep::Sweep;
@@ -39,20 +39,18 @@ Examples:
   stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
   stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver
-  stickslip accuracy --scaling               how the cost of a slip grows with N and Ns, in two minutes; --quick: in seconds
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
-    #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "scaling", "hard_cases"])]
+    #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "hard_cases"])]
     sweep: Option<PathBuf>,
     /// Set a parameter of the model, and study this one set; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["scaling", "hard_cases"])]
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "hard_cases")]
     settings: Vec<String>,
     /// Folder for tables, JSON and figures
     #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
-    /// Take fewer slips, or fewer sizes
+    /// Take fewer slips
     #[arg(long)]
     quick: bool,
     /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
@@ -64,9 +62,6 @@ pub struct Arguments {
     slips: Option<u64>,
     #[command(flatten)]
     threads: ThreadsFlag,
-    /// Measure how the cost of a slip grows with the slider instead
-    #[arg(long, conflicts_with_all = ["hard_cases", "seeds", "slips", "threads"])]
-    scaling: bool,
     /// Run the hard cases instead
     #[arg(long, conflicts_with_all = ["quick", "seeds", "slips", "threads"])]
     hard_cases: bool,
@@ -78,9 +73,6 @@ pub struct Arguments {
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     if arguments.hard_cases {
         return run_hard_cases(arguments);
-    }
-    if arguments.scaling {
-        return run_scaling(arguments);
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
     let sweep = match &arguments.sweep {
@@ -104,13 +96,6 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
     write_and_print(arguments, &study_report(&study, &findings)?, &study_text(&study, &findings))?;
-    Ok(Exit::Done)
-}
-
-fn run_scaling(arguments: &Arguments) -> Result<Exit> {
-    let scaling = if arguments.quick { Scaling::quick() } else { Scaling::full() };
-    let findings = scaling.run(&mut |next| output::report(next))?;
-    write_and_print(arguments, &scaling_report(&findings)?, &scaling_text(&findings))?;
     Ok(Exit::Done)
 }
 
@@ -291,48 +276,6 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
         ));
     }
     lines
-}
-
-fn scaling_text(findings: &ScalingFindings) -> String {
-    let mut lines = vec![format!("{}; one thread; means per slip after start-up", accuracy::cost::processor())];
-    lines.push(format!(
-        "\n{:>6} {:>6} {:>9} {:>6} {:>10} {:>10} {:>9} {:>9} {:>9} {:>7} {:>8}",
-        "N", "Ns", "tolerance", "slips", "CPU s", "CPU/sim. s", "steps", "breaks", "reattach.", "leaps", "ns/step"
-    ));
-    for row in &findings.sizes {
-        lines.push(format!(
-            "{:>6} {:>6} {:>9e} {:>6} {:>10.2e} {:>10.2e} {:>9.0} {:>9.0} {:>9.0} {:>7.0} {:>8.0}",
-            row.parameters.blocks,
-            row.parameters.contacts_per_block,
-            row.tolerance,
-            row.cost.timed_slips,
-            row.cost.per_slip,
-            row.cost.per_simulated_second,
-            row.cost.steps_per_slip,
-            row.breaks_per_slip,
-            row.reattachments_per_slip,
-            row.leaps_per_slip,
-            1e9 * row.cost.per_step
-        ));
-    }
-    lines.push(format!(
-        "\n{:13} {:>9} {:>17} {:>10} {:>9} {:>9} {:>8}",
-        "exponents in", "tolerance", "CPU s", "CPU/sim. s", "steps", "breaks", "ns/step"
-    ));
-    for row in &findings.exponents {
-        lines.push(format!(
-            "{:>13} {:>9e} {:>17.2} {:>10.2} {:>9.2} {:>9.2} {:>8.2}",
-            row.size.key(),
-            row.tolerance,
-            row.cpu_per_slip,
-            row.cpu_per_simulated_second,
-            row.steps_per_slip,
-            row.breaks_per_slip,
-            row.cpu_per_step
-        ));
-    }
-    lines.push(String::new());
-    lines.join("\n")
 }
 
 fn stability_text(rows: &[Stability]) -> String {
