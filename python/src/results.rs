@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stickslip::reduce::{BackboneBin, CellRow, HistogramBin, Point, SetInRounds, SetRow, StartupRow};
+use stickslip::reduce::{BackboneBin, CellRow, HistogramBin, Point, SetInRounds, SetRow};
 use stickslip::results::layout::Layout;
 use stickslip::results::parts::committed_files;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, PrecursorRow, SLIPS, SlipRow};
@@ -91,7 +91,7 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
         (R::NAME, schema::<R>())
     }
     let all =
-        [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<StartupRow>(), of::<BackboneBin>(), of::<Point>()];
+        [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
     all.into_iter().find(|(name, _)| *name == table)
 }
 

@@ -82,10 +82,6 @@ class Results:
         """One row per bin of eta: phases of all its slips."""
         return self._table("backbone", columns)
 
-    def startup(self, columns: Sequence[str] | None = None) -> Table:
-        """Intervals by the number of the slip, to see how long start-up lasts."""
-        return self._table("startup", columns)
-
     def points(self, columns: Sequence[str] | None = None) -> Table:
         """Slips for scatter figures: all up to 20,000, or every k-th."""
         return self._table("points", columns)

@@ -217,7 +217,7 @@ mod tests {
         let label = |name: &str| Values::of(&[], "x", name).unwrap().label();
         assert_eq!(label("V0"), "Drive velocity V₀ (m/s)");
         assert_eq!(label("tau_mean"), "Mean interval (s)");
-        assert_eq!(label("startup_p"), "startup_p");
+        assert_eq!(label("rayleigh_p"), "rayleigh_p");
         assert_eq!(label("Delta"), "Amplitude of the modulation Δ (m)");
         let short = |name: &str| Values::of(&[], "x", name).unwrap().short_label();
         assert_eq!(["Delta", "tau_mean", "locked"].map(short), ["Δ (m)", "tau_mean (s)", "locked"]);

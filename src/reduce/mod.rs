@@ -1,5 +1,5 @@
 //! Reduction: the tables of a sweep become Fig. 3-style data: statistics per parameter set, the φ-η back-bone, histograms
-//! of τ, start-up, and a sample of slips for scatter figures.
+//! of τ, and a sample of slips for scatter figures.
 
 mod backbone;
 mod cells;
@@ -9,14 +9,12 @@ mod confidence;
 mod histogram;
 mod moments;
 mod point;
-mod rank;
 mod read;
 mod reduction;
 mod rounds;
 mod sequence;
 mod set;
 mod slip_stats;
-mod startup;
 mod statistic;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
@@ -33,7 +31,6 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
 pub use rounds::{RoundOfSet, SetInRounds};
 pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
-pub use startup::{FIRST_SLIPS, STARTUP_NUMBERS, StartupRow};
 pub use statistic::StatisticValue;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
@@ -85,7 +82,6 @@ mod tests {
             markdown::<RoundOfSet>(),
             markdown::<CellRow>(),
             markdown::<HistogramBin>(),
-            markdown::<StartupRow>(),
             markdown::<BackboneBin>(),
             markdown::<Point>(),
         ];

@@ -1,4 +1,4 @@
-//! The reduction of a results directory: jobs once, slips as often as memory asks for, five files committed together.
+//! The reduction of a results directory: jobs once, slips as often as memory asks for, four files committed together.
 //!
 //! Sets stand in the order of their parameters and rows are summed in table order (file names, then rows), so the same
 //! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as
@@ -11,7 +11,6 @@ use super::histogram::{HistogramBin, histogram};
 use super::point::{Point, RampStage, spacing};
 use super::rounds::SetWriter;
 use super::set::{SetJobs, SetRow, SetSlips};
-use super::startup::StartupRow;
 use crate::model::{Symbol, Value};
 use crate::observe::{Regime, Slip};
 use crate::results::commit::{Commit, alone};
@@ -72,7 +71,7 @@ pub struct ReductionSummary {
     pub backbone: Vec<BackboneBin>,
 }
 
-/// Reduces the tables of a results directory to `reduced/{sets,histograms,startup,backbone,points}.parquet`, over those
+/// Reduces the tables of a results directory to `reduced/{sets,histograms,backbone,points}.parquet`, over those
 /// of an earlier reduction, with the sweep that was asked for last in their footers.
 /// On an error, earlier reduced files stay whole.
 pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary, ReduceError> {
@@ -123,7 +122,6 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
     let mut refined_sets = BTreeMap::new();
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
-    let mut startup_writer = TableWriter::new(stage(StartupRow::NAME)?, footer)?;
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
     let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
 
@@ -139,9 +137,6 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
             }
             for bin in histogram(row, &set.intervals) {
                 histogram_writer.push(&bin)?;
-            }
-            for slip in &set.startup {
-                startup_writer.push(slip)?;
             }
             pooled.push(&set);
             summary.slips += row.slips;
@@ -168,7 +163,6 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     }
     set_writer.finish()?;
     histogram_writer.finish()?;
-    startup_writer.finish()?;
     backbone_writer.finish()?;
     point_writer.finish()?;
     Ok((commit, summary))
@@ -403,7 +397,7 @@ mod tests {
     }
 
     fn reduced_bytes(layout: &Layout<'_>) -> Vec<Vec<u8>> {
-        ["sets", "histograms", "startup", "backbone", "points"]
+        ["sets", "histograms", "backbone", "points"]
             .map(|name| fs::read(layout.reduced_file(name)).unwrap())
             .to_vec()
     }

@@ -6,7 +6,6 @@ use super::confidence::Interval;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
-use super::startup::{StartupRow, startup_probability, startup_rows};
 use crate::model::theory::random_load_mean;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Regime, Slip};
@@ -91,8 +90,6 @@ columns! {
         intervals: u64 = "", "intervals between slips";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
         effective_intervals: Option<f64> = "", "the same of intervals";
-        startup_p: Option<f64> = "",
-            "p-value of the rank test of the intervals of each job's first 3 slips against those of its later half";
         tau_mean: Option<f64> = "s", "mean interval";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
@@ -231,7 +228,6 @@ impl SetSlips {
             intervals: tau.count(),
             effective_slips: phases.effective(),
             effective_intervals: intervals.effective(),
-            startup_p: startup_probability(&by_job, intervals.inflation()),
             tau_mean: tau.mean(),
             tau_interval: intervals.interval(),
             tau_deviation: tau.deviation(),
@@ -270,8 +266,7 @@ impl SetSlips {
             front_speed_mean: self.front_speed.mean(),
             slow_front_speed_mean: self.slow_front_speed.mean(),
         };
-        let startup = startup_rows(&row.set_id, &by_job, [intervals.inflation(), drops.inflation()]);
-        FinishedSet { row, intervals: sorted, phases, loads, below: self.below, startup }
+        FinishedSet { row, intervals: sorted, phases, loads, below: self.below }
     }
 
     fn by_job(&self) -> Vec<&[SlipStats]> {
@@ -296,8 +291,6 @@ pub(super) struct FinishedSet {
     /// Its load phases, for η < 1.
     pub(super) loads: Estimate<2>,
     pub(super) below: u64,
-    /// Its first slips against the later ones.
-    pub(super) startup: Vec<StartupRow>,
 }
 
 #[cfg(test)]

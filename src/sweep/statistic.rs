@@ -26,7 +26,7 @@ pub enum StatisticKind {
 use StatisticKind::{Angle, Class, Estimate, Number};
 
 /// All that a sweep file may name.
-pub const STATISTICS: [Statistic; 34] = [
+pub const STATISTICS: [Statistic; 33] = [
     Statistic::new("tau_mean", "s", Estimate),
     Statistic::new("mean_friction", "N", Estimate),
     Statistic::new("locking_index", "", Estimate),
@@ -40,7 +40,6 @@ pub const STATISTICS: [Statistic; 34] = [
     Statistic::new("attached_fraction", "", Number),
     Statistic::new("effective_slips", "", Number),
     Statistic::new("effective_intervals", "", Number),
-    Statistic::new("startup_p", "", Number),
     Statistic::new("tau_sd", "s", Number),
     Statistic::new("tau_05", "s", Number),
     Statistic::new("tau_25", "s", Number),

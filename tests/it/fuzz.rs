@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use stickslip::figure::{Format, Look, draw_all};
 use stickslip::observe::measure;
-use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, StartupRow, reduce};
+use stickslip::reduce::{BackboneBin, HistogramBin, Point, SetRow, reduce};
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::results::tables::{JobRow, PrecursorRow, SlipRow};
@@ -480,7 +480,6 @@ proptest! {
             "jobs" => write_nonsense::<JobRow>,
             "sets" => write_nonsense::<SetRow>,
             "histograms" => write_nonsense::<HistogramBin>,
-            "startup" => write_nonsense::<StartupRow>,
             "backbone" => write_nonsense::<BackboneBin>,
             "points" => write_nonsense::<Point>,
             other => panic!("a table {other}"),

@@ -61,7 +61,6 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
         "tables/jobs/part-000-000000.parquet",
         "reduced/sets.parquet",
         "reduced/histograms.parquet",
-        "reduced/startup.parquet",
         "reduced/backbone.parquet",
         "reduced/points.parquet",
         "figures/phi-eta.svg",

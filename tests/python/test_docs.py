@@ -41,7 +41,7 @@ def test_the_model_page_has_every_parameter_with_its_unit(results):
 def test_every_column_is_documented(results):
     written = {file.parent.name: file for file in (results / "tables").glob("*/*.parquet")}
     written |= {file.stem: file for file in (results / "reduced").glob("*.parquet")}
-    assert {"slips", "jobs", "precursors", "sets", "histograms", "startup", "backbone", "points"} <= set(written)
+    assert {"slips", "jobs", "precursors", "sets", "histograms", "backbone", "points"} <= set(written)
     text = "".join(page.read_text() for page in PAGES if page.parent.name == "docs")
     for table, file in written.items():
         for field in pq.read_schema(file):

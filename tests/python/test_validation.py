@@ -77,6 +77,17 @@ def test_phases_under_phi_min_are_those_on_falling_load_of_any_period():
     assert list(kinematics.under_minimum(phases, eta, 0.15)) == [True, False, False, True, True]
 
 
+def test_start_up_ends_with_the_last_slip_that_differs_from_the_later_ones():
+    generator = numpy.random.default_rng(7)
+    slips = pandas.DataFrame({"set_id": "a", "slip": numpy.tile(numpy.arange(40), 60)})
+    slips = slips.assign(interval=generator.normal(0.11, 0.01, len(slips)), drop=generator.normal(100, 1, len(slips)))
+    slips.loc[slips["slip"] == 0, "interval"] = numpy.nan
+    slips.loc[slips["slip"] < 4, "interval"] += 0.02
+    p = beyond.startup(slips)
+    assert list(p.index[p < 0.05]) == [1, 2, 3]
+    assert (beyond.startup(slips[slips["slip"] < 20]) == 1).all()
+
+
 def test_curves_are_below_a_level_from_their_last_crossing_on():
     assert friction.first_below([(0, 5), (1, -20), (2, 0), (3, -20)], -10) == pytest.approx(2.5)
 
