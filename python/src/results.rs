@@ -90,8 +90,7 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
     fn of<R: TableRow>() -> (&'static str, SchemaRef) {
         (R::NAME, schema::<R>())
     }
-    let all =
-        [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
+    let all = [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
     all.into_iter().find(|(name, _)| *name == table)
 }
 

@@ -258,10 +258,8 @@ mod tests {
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
         let (study, findings) = (Study { sets: vec![Parameters::default()], ..Study::quick() }, findings());
-        let reports = [
-            ("accuracy", study_report(&study, &findings).unwrap()),
-            ("accuracy --hard-cases", stability_report(&[])),
-        ];
+        let reports =
+            [("accuracy", study_report(&study, &findings).unwrap()), ("accuracy --hard-cases", stability_report(&[]))];
         for (command, report) in reports {
             let row = page.lines().find(|line| line.starts_with(&format!("| `{command}` |"))).unwrap();
             for field in report.json().as_object().unwrap().keys() {

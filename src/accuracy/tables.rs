@@ -59,11 +59,7 @@ mod tests {
     #[test]
     fn every_column_is_documented() {
         let page = include_str!("../../docs/commands.md");
-        let tables = [
-            described::<MethodRow>(),
-            described::<DistanceRow>(),
-            described::<Stability>(),
-        ];
+        let tables = [described::<MethodRow>(), described::<DistanceRow>(), described::<Stability>()];
         for (table, columns) in tables {
             let row = page.lines().find(|line| line.starts_with(&format!("| `{table}` |"))).unwrap();
             // The ends of all intervals are described together.

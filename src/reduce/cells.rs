@@ -55,7 +55,7 @@ impl Table for CellRow {
 }
 
 /// The undivided cells, coarse ones first; none of grids that are refined along more than two axes.
-pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &SetRow>) -> Vec<CellRow> {
+pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, SetRow>) -> Vec<CellRow> {
     let (first, second) = match refinement.axes.as_slice() {
         [first] => (first, None),
         [first, second] => (first, Some(second)),
@@ -92,7 +92,7 @@ pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap
 }
 
 /// Divides the cells whose sets differ, for as long as there is room.
-pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, &SetRow>) -> Division {
+pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, SetRow>) -> Division {
     let grid = Cells { sweep, refinement, known };
     let mut division = Division::default();
     let mut room = refinement.max_sets.saturating_sub(known.len() as u64);
@@ -168,7 +168,7 @@ pub struct Cells<'a> {
     pub sweep: &'a Sweep,
     pub refinement: &'a Refinement,
     /// The sets that its rounds have run.
-    pub known: &'a BTreeMap<u64, &'a SetRow>,
+    pub known: &'a BTreeMap<u64, SetRow>,
 }
 
 /// Points of the grid by their rows, each with its set if it is a job.

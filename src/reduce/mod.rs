@@ -3,15 +3,15 @@
 
 mod backbone;
 mod cells;
-mod chosen;
 pub mod circular;
 mod confidence;
+mod gather;
 mod histogram;
 mod moments;
-mod point;
-mod read;
+mod reduced;
 mod reduction;
 mod rounds;
+mod sample;
 mod sequence;
 mod set;
 mod slip_stats;
@@ -19,18 +19,18 @@ mod statistic;
 
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
 pub use cells::{CellOfGrid, CellRow, Cells, Division, divide};
-#[cfg(test)]
-pub(crate) use chosen::row_of;
-pub use chosen::{ChosenSet, reduce_chosen};
 pub use confidence::{CONFIDENCE, Interval};
+pub use gather::reduce_jobs;
+#[cfg(test)]
+pub(crate) use gather::row_of;
 pub use histogram::{BINS_PER_MEAN, HistogramBin};
 pub use moments::{Moments, quantile};
-pub use point::{MAX_POINTS, Point, RampStage};
-pub use read::{SetSummary, Statistic, read_reduced, read_sets};
+pub use reduced::{SetSummary, Statistic, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{ReduceError, ReductionSummary, SUMMARY_FORMAT, reduce};
 pub use rounds::{RoundOfSet, SetInRounds};
-pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetJobs, SetRow};
+pub use sample::{MAX_POINTS, Point, RampStage};
+pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetRow};
 pub use statistic::StatisticValue;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

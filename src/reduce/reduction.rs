@@ -1,34 +1,24 @@
-//! The reduction of a results directory: jobs once, slips as often as memory asks for, four files committed together.
-//!
-//! Sets stand in the order of their parameters and rows are summed in table order (file names, then rows), so the same
-//! tables give the same bytes. Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as
-//! much again for those of the set at hand; where the tables hold more, the slips are read again for the next sets.
+//! The reduction of a results directory: four tables, committed together. Sets stand in the order of their parameters, so the
+//! same tables give the same bytes.
 
-use super::PhaseLimits;
 use super::backbone::{Backbone, BackboneBin};
 use super::cells::{CellRow, cell_rows};
+use super::gather::{Gathering, MAX_SLIPS};
 use super::histogram::{HistogramBin, histogram};
-use super::point::{Point, RampStage, spacing};
 use super::rounds::SetWriter;
-use super::set::{SetJobs, SetRow, SetSlips};
-use crate::model::{Symbol, Value};
-use crate::observe::{Regime, Slip};
+use super::sample::{Point, spacing};
+use super::set::SetRow;
 use crate::results::commit::{Commit, alone};
-use crate::results::parts::committed_files;
-use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
+use crate::results::tables::JOBS;
 use crate::results::{Results, ResultsError};
-use crate::table::columns::{Table, columns};
-use crate::table::file::{Dataset, DatasetError, TableWriter};
-use crate::table::selected::Selected;
+use crate::table::columns::Table;
+use crate::table::file::{DatasetError, TableWriter};
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
 use serde::Serialize;
-use std::cmp::Ordering;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Slips that are held at once: 170 MB.
-const MAX_SLIPS: u64 = 1 << 22;
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
@@ -95,10 +85,8 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
 /// Reads the tables, and stages what they are reduced to.
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary), ReduceError> {
     let layout = results.layout();
-    // Listed once: what other runs commit meanwhile is left out as a whole.
-    let job_files = layout.dataset(JOBS)?;
-    let slip_files = committed_files(layout, SLIPS, &job_files)?;
-    let all_jobs = read_jobs(job_files)?;
+    let gathering = Gathering::of_jobs(layout, &|_| true)?;
+    let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
         return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
     }
@@ -126,26 +114,19 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
-    for chunk in chunks(all_jobs, max_slips) {
-        let gathered = gather(slip_files.clone(), chunk, spacing(total))?;
-        for (jobs, slips, set_points) in gathered {
-            let set = slips.finish(jobs);
-            let row = &set.row;
-            set_writer.push(row)?;
-            if refinement.is_some() {
-                refined_sets.extend(set_writer.chosen(row).map(|number| (number, row.clone())));
-            }
-            for bin in histogram(row, &set.intervals) {
-                histogram_writer.push(&bin)?;
-            }
-            pooled.push(&set);
-            summary.slips += row.slips;
-            summary.locked_sets += u64::from(row.is_locked);
-            kept.extend(
-                set_points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })),
-            );
+    gathering.each_set(max_slips, spacing(total), |set, points| {
+        let row = &set.row;
+        set_writer.push(row)?;
+        if refinement.is_some() {
+            refined_sets.extend(set_writer.chosen(row).map(|number| (number, row.clone())));
         }
-    }
+        histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
+        pooled.push(&set);
+        summary.slips += row.slips;
+        summary.locked_sets += u64::from(row.is_locked);
+        kept.extend(points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })));
+        Ok(())
+    })?;
     kept.sort_by_key(|(place, _)| *place);
     summary.points = kept.len() as u64;
     for (_, point) in &kept {
@@ -157,8 +138,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     }
     if let Some(refinement) = refinement {
         let mut cell_writer = TableWriter::new(stage(CellRow::NAME)?, footer)?;
-        let known = refined_sets.iter().map(|(&number, row)| (number, row)).collect();
-        cell_rows(results.sweep(), refinement, &known).iter().try_for_each(|cell| cell_writer.push(cell))?;
+        cell_rows(results.sweep(), refinement, &refined_sets).iter().try_for_each(|cell| cell_writer.push(cell))?;
         cell_writer.finish()?;
     }
     set_writer.finish()?;
@@ -168,148 +148,18 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     Ok((commit, summary))
 }
 
-columns! {
-    /// The set of a job, and the job.
-    pub(super) struct JobOfSet {
-        set_id: String;
-        facts: JobFacts;
-    }
-}
-
-columns! {
-    /// What a reduction takes from the jobs table beside set and parameters.
-    pub(super) struct JobFacts {
-        outcome: JobOutcome;
-        slips: Option<u64>;
-        mean_friction: Option<f64>;
-        attached_fraction: Option<f64>;
-        slip_share: Option<f64>;
-        regime: Option<Regime>;
-    }
-}
-
-columns! {
-    /// The set of a slip.
-    struct SetOfSlip {
-        set_id: String;
-    }
-}
-
-impl SetJobs {
-    /// A job of the set has ended.
-    pub(super) fn push(&mut self, job: &JobFacts) {
-        if job.outcome == JobOutcome::Failed {
-            self.failed += 1;
-            return;
-        }
-        self.finished += 1;
-        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
-        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-        self.friction.extend(job.mean_friction);
-        self.attached_fraction.extend(job.attached_fraction);
-        self.slip_share.extend(job.slip_share);
-        self.regime = match (self.regime, job.regime) {
-            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
-            (regime, other) => other.or(regime),
-        };
-    }
-}
-
-/// The sets of all jobs, in the order of their parameters.
-fn read_jobs(jobs: Dataset<'_>) -> Result<Vec<SetJobs>, DatasetError> {
-    let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
-    for batch in jobs.rows::<(JobOfSet, Selected<All>)>() {
-        for (job, parameters) in batch? {
-            let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters.parameters);
-            let set = sets.entry(job.set_id).or_insert_with_key(new);
-            set.push(&job.facts);
-        }
-    }
-    let mut sets: Vec<SetJobs> = sets.into_values().collect();
-    sets.sort_by(by_parameters);
-    Ok(sets)
-}
-
-fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
-    let others = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed);
-    others
-        .map(|symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
-            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
-            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
-            (left, right) => left.to_string().cmp(&right.to_string()),
-        })
-        .find(|order| order.is_ne())
-        .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
-}
-
-/// Cuts the sets where their slips would exceed the most.
-fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
-    let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
-    let mut slips = 0;
-    for set in sets {
-        slips = set.slips.saturating_add(slips);
-        match chunks.last_mut() {
-            Some(chunk) if slips <= max_slips => chunk.push(set),
-            _ => {
-                slips = set.slips;
-                chunks.push(vec![set]);
-            }
-        }
-    }
-    chunks
-}
-
-/// A set, its slips, and the points among them with their place in table order.
-type Gathered = (SetJobs, SetSlips, Vec<(u64, Point)>);
-
-/// Reads all slips and keeps those of these sets.
-fn gather(slips: Dataset<'_>, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, DatasetError> {
-    let index: HashMap<String, usize> =
-        sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
-    let limits: Vec<PhaseLimits> = sets.iter().map(|set| PhaseLimits::at(set.parameters.eta())).collect();
-    let mut gathered: Vec<Gathered> = sets.into_iter().map(|set| (set, SetSlips::default(), Vec::new())).collect();
-    let mut place = 0;
-    for batch in slips.rows::<(SetOfSlip, Slip)>() {
-        for (SetOfSlip { set_id }, slip) in batch? {
-            let here = place;
-            place += 1;
-            let Some(&index) = index.get(&set_id) else { continue };
-            let (set, slips, points) = &mut gathered[index];
-            let parameters = &set.parameters;
-            let is_ramped = parameters.ramp_time > 0.0;
-            let eta = slip.modulation.eta(parameters.drive_velocity);
-            slips.push_of(parameters, &slip, &limits[index]);
-            if here % spacing == 0 {
-                let point = Point {
-                    drive_velocity: parameters.drive_velocity,
-                    amplitude: slip.modulation.amplitude,
-                    period: slip.modulation.period,
-                    eta,
-                    ramp_stage: is_ramped.then(|| RampStage::at(slip.onset, parameters.ramp_time)),
-                    onset: slip.onset,
-                    interval: slip.interval,
-                    periods: slip.periods,
-                    phase: slip.phase,
-                    is_locked: false,
-                };
-                points.push((here, point));
-            }
-        }
-    }
-    Ok(gathered)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::read_reduced;
     use super::*;
     use crate::model::Parameters;
-    use crate::observe::{Averages, Measurements, Modulation};
+    use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
     use crate::sweep::Sweep;
     use crate::table::file::Footer;
+    use crate::table::selected::Selected;
     use crate::table::storage::{Disk, Storage};
     use std::fs;
     use std::path::Path;
@@ -339,7 +189,7 @@ mod tests {
             modulation: Modulation { period: parameters.modulation_period, amplitude: parameters.modulation_amplitude },
             periods: (number > 0).then_some(12),
             peak_force: 480.0,
-            drop: 100.0 + f64::from(number),
+            drop: 100.0 + f64::from(number) + 0.1 * parameters.seed as f64,
             nucleation: 0.0,
             nucleation_block: 1,
             duration: 0.005,
@@ -350,7 +200,11 @@ mod tests {
         let summary = Summary { satisfied: true, ..Summary::default() };
         Measurements {
             slips: (0..slips).map(slip).collect(),
-            averages: Some(Averages { friction: 430.0, ..Averages::default() }),
+            averages: Some(Averages {
+                friction: 430.0,
+                attached_fraction: 0.7 + 0.01 * parameters.seed as f64,
+                ..Averages::default()
+            }),
             summary,
             ..Measurements::default()
         }
@@ -365,17 +219,22 @@ mod tests {
 
     /// Two parts, three sets of two seeds, one failed job; the slips of a third part are without their jobs.
     fn directory(slips: u32) -> (tempfile::TempDir, Results<'static>) {
+        directory_of(slips, [0, 1, 2])
+    }
+
+    /// The same with these seeds of its parts.
+    fn directory_of(slips: u32, seeds: [u64; 3]) -> (tempfile::TempDir, Results<'static>) {
         let (root, results) = without_jobs();
         let layout = results.layout();
         fs::create_dir_all(layout.table("slips")).unwrap();
         fs::create_dir_all(layout.table("jobs")).unwrap();
-        for part in 0..3 {
+        for (part, seed) in (0..).zip(seeds) {
             let name = format!("part-000-{part:06}.parquet");
             let path = layout.table("slips").join(&name);
             let file = Disk.create(&path).unwrap();
             let mut slip_writer = TableWriter::<SlipRow<'_>>::new(file, &Footer::default()).unwrap();
             let labels: Vec<Label<DriveAndSeed>> =
-                (0..3).map(|set| label(set, part, [0.0, 1e-6, 2e-6][set as usize])).collect();
+                (0..3).map(|set| label(set, seed, [0.0, 1e-6, 2e-6][set as usize])).collect();
             let measured: Vec<Measurements> = labels.iter().map(|label| job_result(label, slips)).collect();
             for (job, result) in labels.iter().zip(&measured) {
                 result.slips.iter().for_each(|slip| slip_writer.push(&(job, slip)).unwrap());
@@ -397,9 +256,7 @@ mod tests {
     }
 
     fn reduced_bytes(layout: &Layout<'_>) -> Vec<Vec<u8>> {
-        ["sets", "histograms", "backbone", "points"]
-            .map(|name| fs::read(layout.reduced_file(name)).unwrap())
-            .to_vec()
+        ["sets", "histograms", "backbone", "points"].map(|name| fs::read(layout.reduced_file(name)).unwrap()).to_vec()
     }
 
     #[test]
@@ -426,6 +283,19 @@ mod tests {
         assert_eq!(passes, whole);
         assert!(reduced_bytes(layout) == bytes);
         assert!(Disk.list(&layout.staging(WRITER)).unwrap().is_empty());
+    }
+
+    #[test]
+    fn no_digit_depends_on_the_order_in_which_seeds_were_run() {
+        let of_seeds = |seeds, max_slips| {
+            let (_root, results) = directory_of(50, seeds);
+            reduce_by(&results, max_slips).unwrap();
+            let sets: Vec<SetRow> = read_reduced(results.layout()).unwrap();
+            sets
+        };
+        let ascending = of_seeds([1, 6, 9], MAX_SLIPS);
+        assert_eq!(of_seeds([6, 1, 9], MAX_SLIPS), ascending);
+        assert_eq!(of_seeds([6, 1, 9], 1), ascending);
     }
 
     #[test]

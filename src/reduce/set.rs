@@ -3,12 +3,14 @@
 use super::PhaseLimits;
 use super::circular::unit;
 use super::confidence::Interval;
+use super::gather::JobFacts;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
 use crate::model::theory::random_load_mean;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Regime, Slip};
+use crate::results::tables::JobOutcome;
 use crate::table::columns::{Table, columns};
 use crate::table::selected::{Selected, Selection};
 use std::f64::consts::TAU;
@@ -24,7 +26,7 @@ pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// What the jobs table says about a set.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SetJobs {
+pub(super) struct SetJobs {
     /// Id of the set, 32 hexadecimal characters.
     pub set_id: String,
     /// Its parameters; the seed is that of any of its jobs.
@@ -44,11 +46,14 @@ pub struct SetJobs {
     pub slip_share: Moments,
     /// How the slider moved in the jobs; mixed if they differ.
     pub regime: Option<Regime>,
+    /// Seed of the last of them, and whether they came in the order of their seeds.
+    pub last_seed: Option<u64>,
+    pub is_in_order: bool,
 }
 
 impl SetJobs {
     /// A set without jobs so far.
-    pub fn new(set_id: String, parameters: Parameters) -> Self {
+    pub(super) fn new(set_id: String, parameters: Parameters) -> Self {
         let none = Moments::default();
         Self {
             set_id,
@@ -61,7 +66,29 @@ impl SetJobs {
             attached_fraction: none,
             slip_share: none,
             regime: None,
+            last_seed: None,
+            is_in_order: true,
         }
+    }
+
+    /// A job of the set has ended.
+    pub(super) fn push(&mut self, seed: u64, job: &JobFacts) {
+        self.is_in_order &= self.last_seed.is_none_or(|last| last < seed);
+        self.last_seed = Some(seed);
+        if job.outcome == JobOutcome::Failed {
+            self.failed += 1;
+            return;
+        }
+        self.finished += 1;
+        self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
+        self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
+        self.friction.extend(job.mean_friction);
+        self.attached_fraction.extend(job.attached_fraction);
+        self.slip_share.extend(job.slip_share);
+        self.regime = match (self.regime, job.regime) {
+            (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
+            (regime, other) => other.or(regime),
+        };
     }
 }
 

@@ -16,7 +16,8 @@ mod tests;
 
 pub use precision::MIN_SEEDS;
 
-use crate::reduce::{ChosenSet, SetRow, divide, reduce_chosen};
+use crate::model::Parameters;
+use crate::reduce::{SetRow, divide, reduce_jobs};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Round, Standing, Sweep, merged};
 use precision::Need;
@@ -28,37 +29,31 @@ pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let rounds = results.rounds().iter().filter_map(|extension| extension.round.as_ref());
     let points = merged(rounds.flat_map(|round| round.points.iter().cloned()).collect());
     let chosen = Round { points, ..Round::default() };
-    let sets = reduce_chosen(results, |parameters| {
-        let point = sweep.find(parameters)?;
-        chosen.has(point).then(|| sweep.set_of(point))
-    })?;
-    Ok(decide(sweep, &sets))
+    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
+    let numbered = |row: SetRow| Some((sweep.set_with(&row.parameters.parameters)?, row));
+    Ok(decide(sweep, &reduce_jobs(results, is_chosen)?.into_iter().filter_map(numbered).collect()))
 }
 
-/// The round after these sets, which are in order.
-fn decide(sweep: &Sweep, sets: &[ChosenSet]) -> Round {
+/// The round after these sets, by their numbers.
+fn decide(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Round {
     let Some(rounds) = sweep.rounds() else { return Round::default() };
     let mut standing = Standing::default();
     let mut points = Vec::new();
-    for set in sets {
-        match rounds
-            .precision
-            .as_ref()
-            .map_or(Need::Nothing, |precision| precision::need(precision, set.jobs, &set.row))
-        {
+    for (&number, row) in sets {
+        let jobs = row.finished_jobs + row.failed_jobs;
+        match rounds.precision.as_ref().map_or(Need::Nothing, |precision| precision::need(precision, jobs, row)) {
             Need::Nothing => standing.sets_done += 1,
             Need::TooMuch => standing.sets_capped += 1,
             Need::Seeds(seeds) => {
                 standing.sets_open += 1;
-                points.extend(sweep.points_of_set(set.number, set.jobs..seeds));
+                points.extend(sweep.points_of_set(number, jobs..seeds));
             }
         }
     }
     if points.is_empty()
         && let Some(refinement) = &rounds.refinement
     {
-        let known: BTreeMap<u64, &SetRow> = sets.iter().map(|set| (set.number, &set.row)).collect();
-        let division = divide(sweep, refinement, &known);
+        let division = divide(sweep, refinement, sets);
         standing.sets_open = division.sets.len() as u64;
         standing.cells_capped = division.cells_left;
         let seeds = rounds.seeds_at_first(sweep.seed_count());

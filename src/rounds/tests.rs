@@ -1,7 +1,7 @@
 //! Rounds of a grid that is refined, from the first to the end.
 
 use super::decide;
-use crate::reduce::{CellOfGrid, Cells, ChosenSet, SetRow};
+use crate::reduce::{CellOfGrid, Cells, SetRow};
 use crate::sweep::{Round, Sweep};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,8 +26,7 @@ fn rounds_of(sweep: &Sweep, row: impl Fn(f64, f64) -> SetRow) -> (Vec<Round>, BT
             let new = || row(job.parameters.modulation_amplitude, job.parameters.drive_velocity);
             sets.entry(sweep.set_of(job.point)).or_insert_with(new).finished_jobs += 1;
         }
-        let of = |(&number, row): (&u64, &SetRow)| ChosenSet { number, jobs: row.finished_jobs, row: row.clone() };
-        rounds.push(decide(sweep, &sets.iter().map(of).collect::<Vec<_>>()));
+        rounds.push(decide(sweep, &sets));
         assert!(rounds.len() < 50, "no end");
     }
     (rounds, sets)
@@ -35,9 +34,8 @@ fn rounds_of(sweep: &Sweep, row: impl Fn(f64, f64) -> SetRow) -> (Vec<Round>, BT
 
 /// Leaves of the grid after these sets.
 fn leaves(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Vec<CellOfGrid> {
-    let known = sets.iter().map(|(&set, row)| (set, row)).collect();
     let refinement = sweep.rounds().unwrap().refinement.as_ref().unwrap();
-    Cells { sweep, refinement, known: &known }.leaves().0
+    Cells { sweep, refinement, known: sets }.leaves().0
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! A sample of slips for scatter figures.
 
+use crate::model::Parameters;
+use crate::observe::Slip;
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 
 /// Slips up to which all become points; of more, every k-th in table order remains.
@@ -17,7 +19,7 @@ pub enum RampStage {
 
 impl RampStage {
     /// The stage at a time in s, of a ramp that takes `ramp_time` s each way.
-    pub(super) fn at(time: f64, ramp_time: f64) -> Self {
+    fn at(time: f64, ramp_time: f64) -> Self {
         match time / ramp_time {
             share if share < 1.0 => Self::Up,
             share if share < 2.0 => Self::Down,
@@ -54,6 +56,25 @@ columns! {
         periods: Option<u64> = "", "interval in periods T, rounded";
         phase: Option<f64> = "rad", "phase of the onset against the modulation";
         is_locked as "locked": bool = "", "whether the set of the slip is locked";
+    }
+}
+
+impl Point {
+    /// A slip of a job with these parameters; whether its set is locked is not known yet.
+    pub(super) fn of(parameters: &Parameters, slip: &Slip) -> Self {
+        let is_ramped = parameters.ramp_time > 0.0;
+        Self {
+            drive_velocity: parameters.drive_velocity,
+            amplitude: slip.modulation.amplitude,
+            period: slip.modulation.period,
+            eta: slip.modulation.eta(parameters.drive_velocity),
+            ramp_stage: is_ramped.then(|| RampStage::at(slip.onset, parameters.ramp_time)),
+            onset: slip.onset,
+            interval: slip.interval,
+            periods: slip.periods,
+            phase: slip.phase,
+            is_locked: false,
+        }
     }
 }
 

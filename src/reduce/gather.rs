@@ -1,0 +1,266 @@
+//! The sets of jobs, gathered from the tables: jobs once, slips as often as memory asks for.
+//!
+//! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
+//! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before. Jobs lie in
+//! that order already, but for sweeps that an extension gave lower seeds; slips of such sets wait until all are there.
+//!
+//! Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as much again for those of
+//! the set at hand; where the tables hold more, the slips are read again for the next sets.
+
+use super::PhaseLimits;
+use super::sample::Point;
+use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
+use super::slip_stats::SlipStats;
+use crate::model::{Parameters, Symbol, Value};
+use crate::observe::{Regime, Slip};
+use crate::results::layout::Layout;
+use crate::results::parts::committed_files;
+use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
+use crate::results::{Results, ResultsError};
+use crate::table::columns::columns;
+use crate::table::file::{Dataset, DatasetError};
+use crate::table::selected::Selected;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, HashMap};
+
+/// Slips that are held at once: 170 MB.
+pub(super) const MAX_SLIPS: u64 = 1 << 22;
+/// A slip that waits is held whole, and counts for so many.
+const WAITING: u64 = (size_of::<Slip>() / size_of::<SlipStats>()) as u64;
+
+columns! {
+    /// The set of a job, and the job.
+    struct JobOfSet {
+        set_id: String;
+        facts: JobFacts;
+    }
+}
+
+columns! {
+    /// What a reduction takes from the jobs table beside set and parameters.
+    pub(super) struct JobFacts {
+        outcome: JobOutcome;
+        slips: Option<u64>;
+        mean_friction: Option<f64>;
+        attached_fraction: Option<f64>;
+        slip_share: Option<f64>;
+        regime: Option<Regime>;
+    }
+}
+
+columns! {
+    /// The job of a slip.
+    #[derive(PartialEq)]
+    struct JobOfSlip {
+        set_id: String;
+        seed: u64;
+    }
+}
+
+/// Which jobs are wanted, by their parameters.
+type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
+
+/// The sets of the wanted jobs, in the order of their parameters.
+pub fn reduce_jobs(
+    results: &Results<'_>,
+    is_wanted: impl Fn(&Parameters) -> bool,
+) -> Result<Vec<SetRow>, ResultsError> {
+    let rows = results.layout().read_tables(|| {
+        let gathered = Gathering::of_jobs(results.layout(), &is_wanted)?;
+        let mut rows = Vec::new();
+        gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
+            rows.push(set.row);
+            Ok(())
+        })?;
+        Ok::<_, DatasetError>(rows)
+    });
+    Ok(rows??)
+}
+
+/// The jobs of a directory, whose slips are still to be gathered.
+pub(super) struct Gathering<'a> {
+    pub(super) sets: Vec<SetJobs>,
+    slips: Dataset<'a>,
+    is_wanted: Wanted<'a>,
+}
+
+impl<'a> Gathering<'a> {
+    /// The sets of the wanted jobs, in the order of their parameters.
+    pub(super) fn of_jobs(layout: &Layout<'a>, is_wanted: Wanted<'a>) -> Result<Self, DatasetError> {
+        // Listed once: what other runs commit meanwhile is left out as a whole.
+        let jobs = layout.dataset(JOBS)?;
+        let slips = committed_files(layout, SLIPS, &jobs)?;
+        let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
+        each_job(&jobs, is_wanted, |job, parameters| {
+            let seed = parameters.seed;
+            let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters);
+            sets.entry(job.set_id).or_insert_with_key(new).push(seed, &job.facts);
+        })?;
+        let unordered = sets.values().filter(|set| !set.is_in_order);
+        let mut unordered: HashMap<String, Vec<(u64, JobFacts)>> =
+            unordered.map(|set| (set.set_id.clone(), Vec::new())).collect();
+        if !unordered.is_empty() {
+            each_job(&jobs, is_wanted, |job, parameters| {
+                if let Some(jobs) = unordered.get_mut(&job.set_id) {
+                    jobs.push((parameters.seed, job.facts));
+                }
+            })?;
+        }
+        let mut sets: Vec<SetJobs> = sets.into_values().collect();
+        for set in &mut sets {
+            let Some(mut jobs) = unordered.remove(&set.set_id) else { continue };
+            jobs.sort_by_key(|(seed, _)| *seed);
+            let new = SetJobs::new(std::mem::take(&mut set.set_id), std::mem::take(&mut set.parameters));
+            *set = SetJobs { is_in_order: false, ..new };
+            for (seed, facts) in &jobs {
+                set.push(*seed, facts);
+            }
+        }
+        sets.sort_by(by_parameters);
+        Ok(Self { sets, slips, is_wanted })
+    }
+
+    /// Hands on set after set, each with every `spacing`-th slip of the table as a point and its place in the table.
+    pub(super) fn each_set(
+        self,
+        max_slips: u64,
+        spacing: u64,
+        mut finished: impl FnMut(FinishedSet, Vec<(u64, Point)>) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        for chunk in chunks(self.sets, max_slips) {
+            for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
+                let (set, points) = set.finish();
+                finished(set, points)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn each_job(
+    files: &Dataset<'_>,
+    is_wanted: Wanted<'_>,
+    mut job: impl FnMut(JobOfSet, Parameters),
+) -> Result<(), DatasetError> {
+    for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
+        let wanted = batch?.into_iter().filter(|(_, of_job)| is_wanted(&of_job.parameters));
+        wanted.for_each(|(facts, Selected { parameters, .. })| job(facts, parameters));
+    }
+    Ok(())
+}
+
+fn by_parameters(left: &SetJobs, right: &SetJobs) -> Ordering {
+    let others = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed);
+    others
+        .map(|symbol| match (left.parameters.get(symbol), right.parameters.get(symbol)) {
+            (Value::Real(left), Value::Real(right)) => left.total_cmp(&right),
+            (Value::Count(left), Value::Count(right)) => left.cmp(&right),
+            (left, right) => left.to_string().cmp(&right.to_string()),
+        })
+        .find(|order| order.is_ne())
+        .unwrap_or_else(|| left.set_id.cmp(&right.set_id))
+}
+
+/// Cuts the sets where their slips would exceed the most.
+fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
+    let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
+    let mut slips = 0;
+    for set in sets {
+        let more = if set.is_in_order { set.slips } else { set.slips.saturating_mul(WAITING) };
+        slips = more.saturating_add(slips);
+        match chunks.last_mut() {
+            Some(chunk) if slips <= max_slips => chunk.push(set),
+            _ => {
+                slips = more;
+                chunks.push(vec![set]);
+            }
+        }
+    }
+    chunks
+}
+
+/// A set and its slips so far.
+struct Gathered {
+    jobs: SetJobs,
+    limits: PhaseLimits,
+    slips: SetSlips,
+    /// Those that wait for slips of lower seeds, with their seeds.
+    waiting: Vec<(u64, Slip)>,
+    /// Points among them, with their place in table order.
+    points: Vec<(u64, Point)>,
+}
+
+impl Gathered {
+    fn new(jobs: SetJobs) -> Self {
+        let limits = PhaseLimits::at(jobs.parameters.eta());
+        Self { jobs, limits, slips: SetSlips::default(), waiting: Vec::new(), points: Vec::new() }
+    }
+
+    fn push(&mut self, slip: &Slip) {
+        self.slips.push_of(&self.jobs.parameters, slip, &self.limits);
+    }
+
+    fn finish(mut self) -> (FinishedSet, Vec<(u64, Point)>) {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        waiting.sort_by_key(|(seed, _)| *seed);
+        for (_, slip) in &waiting {
+            self.push(slip);
+        }
+        (self.slips.finish(self.jobs), self.points)
+    }
+}
+
+/// Reads all slips and keeps those of the wanted jobs of these sets.
+fn slips_of(
+    files: Dataset<'_>,
+    sets: Vec<SetJobs>,
+    is_wanted: Wanted<'_>,
+    spacing: u64,
+) -> Result<Vec<Gathered>, DatasetError> {
+    let index: HashMap<String, usize> =
+        sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
+    let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
+    let (mut place, mut last, mut found) = (0, None, None);
+    for batch in files.rows::<(JobOfSlip, Slip)>() {
+        for (job, slip) in batch? {
+            let here = place;
+            place += 1;
+            if last.as_ref() != Some(&job) {
+                let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
+                found = index.get(&job.set_id).copied().filter(|&index| is_wanted(&of_job(&sets[index])));
+                last = Some(job);
+            }
+            let (Some(index), Some(job)) = (found, &last) else { continue };
+            let set = &mut sets[index];
+            if here % spacing == 0 {
+                set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
+            }
+            if set.jobs.is_in_order {
+                set.push(&slip);
+            } else {
+                set.waiting.push((job.seed, slip));
+            }
+        }
+    }
+    Ok(sets)
+}
+
+/// The row of a set of these jobs.
+#[cfg(test)]
+pub(crate) fn row_of(parameters: &Parameters, jobs: &[crate::observe::Measurements]) -> SetRow {
+    let mut set = Gathered::new(SetJobs::new(String::new(), parameters.clone()));
+    for (seed, job) in (0..).zip(jobs) {
+        let averages = job.averages;
+        let facts = JobFacts {
+            outcome: JobOutcome::of(job),
+            slips: Some(job.slips.len() as u64),
+            mean_friction: averages.map(|averages| averages.friction),
+            attached_fraction: averages.map(|averages| averages.attached_fraction),
+            slip_share: averages.map(|averages| averages.slip_share),
+            regime: job.regime(),
+        };
+        set.jobs.push(seed, &facts);
+        job.slips.iter().for_each(|slip| set.push(slip));
+    }
+    set.finish().0.row
+}
