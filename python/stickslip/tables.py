@@ -8,6 +8,8 @@ from pathlib import Path
 import pandas
 import pyarrow.parquet
 
+from .results import Results, Table
+
 
 class MissingResult(Exception):
     """A result that is not there, with the command that makes it."""
@@ -21,8 +23,8 @@ class Sweep:
 
     @cache
     def table(self, name: str) -> pandas.DataFrame:
-        """`slips`, `precursors` or `jobs`."""
-        return read(self.directory / "tables" / name, f"stickslip run sweeps/{self.directory.name}.toml")
+        """`slips`, `precursors` or `jobs`; one that is damaged raises `ResultsError`."""
+        return self._checked(name).to_pandas()
 
     @cache
     def reduced(self, name: str) -> pandas.DataFrame:
@@ -32,13 +34,17 @@ class Sweep:
     @cache
     def slips(self) -> pandas.DataFrame:
         """The slips with all parameters of their jobs, and `frequency` = 1/T in Hz and `tau_over_T` = interval/T."""
-        jobs, slips = self.table("jobs"), self.table("slips")
-        slips = slips.merge(jobs[["job_id", *jobs.columns.difference(slips.columns)]], on="job_id")
+        slips = self._checked("slips", join=True).to_pandas()
         return slips.assign(frequency=(1 / slips["T"]).round(6), tau_over_T=slips["interval"] / slips["T"])
+
+    def _checked(self, name: str, **options: bool) -> Table:
+        if not (self.directory / "tables" / name).exists():
+            raise MissingResult(f"{self.directory}: run `stickslip run sweeps/{self.directory.name}.toml`")
+        return getattr(Results(self.directory), name)(**options)
 
 
 def read(path: Path, remedy: str) -> pandas.DataFrame:
-    """A file, or all files of a folder; `remedy` is the command that makes them."""
+    """A file; `remedy` is the command that makes it."""
     if not path.exists():
         raise MissingResult(f"{path} is missing: run `{remedy}`")
     return pandas.read_parquet(path)

@@ -7,6 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from stickslip import ResultsError
 from stickslip.tables import MissingResult
 
 from . import beyond, friction, intervals, phase
@@ -71,7 +72,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         text = document(options.results)
-    except MissingResult as error:
+    except (MissingResult, ResultsError) as error:
         print(error, file=sys.stderr)
         return 2
     options.to.write_text(text)

@@ -236,7 +236,7 @@ def startup(slips: pandas.DataFrame, numbers: int = 20) -> pandas.Series:
             early = values[values["slip"] < numbers].groupby("slip")[column]
             p = early.apply(lambda sample: stats.mannwhitneyu(sample, later, method="asymptotic").pvalue).sort_values()
             # Holm, Scand. J. Stat. 6, 65 (1979).
-            adjusted = (p * range(len(p), 0, -1)).cummax()
+            adjusted = (p * numpy.arange(len(p), 0, -1)).cummax()
             least = least.combine(adjusted, min, fill_value=1.0)
     return least
 
