@@ -98,17 +98,17 @@ def test_a_copy_that_is_killed_at_any_step_leaves_whole_parts_and_can_be_repeate
 
 
 def test_a_directory_of_another_sweep_is_refused(stickslip, shards, gather, tmp_path):
-    sweep = tmp_path / "other.toml"
+    first, extended = (shutil.copytree(shards / "first", tmp_path / name) for name in ("first", "extended"))
+    other, nothing, sweep = (tmp_path / name for name in ("other", "nothing", "tiny.toml"))
     sweep.write_text(SWEEP.format(seeds=PARTS // 2 + 1))
-    stickslip("run", sweep, "--out", tmp_path / "other", "--no-reduce")
-    target = shutil.copytree(shards / "first", tmp_path / "target")
-    before = tree(target)
-    for source in (tmp_path / "other", tmp_path / "nothing"):
+    for directory in (other, extended):
+        stickslip("run", sweep, "--out", directory, "--no-reduce")
+    for target, source in ((first, other), (first, extended), (extended, first), (first, nothing), (nothing, first)):
+        before = tree(target)
         done = gather(target, shards / "second", source)
-        assert done.returncode == 2 and f"{source} is not of the sweep" in done.stderr
+        assert done.returncode == 2 and "is not of the sweep" in done.stderr
         assert tree(target) == before
-    done = gather(tmp_path / "nothing", shards / "second")
-    assert done.returncode == 2 and not (tmp_path / "nothing").exists()
+    assert not nothing.exists()
 
 
 def test_a_part_that_has_lost_its_slips_is_not_copied(shards, gather, tmp_path):
