@@ -10,7 +10,6 @@ mod man;
 mod merge;
 mod output;
 mod plan;
-mod planning;
 mod plot;
 mod progress;
 mod reduce;

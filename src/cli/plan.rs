@@ -1,9 +1,8 @@
 //! `stickslip plan`: what would run. Nothing is written.
 
 use super::exit::Exit;
-use super::planning::Planning;
+use super::output;
 use super::sweep::{self, Preset};
-use super::{output, signals};
 use crate::results::layout::Layout;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
@@ -108,7 +107,6 @@ struct Axis {
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
-    let planning = Planning::watch(signals::catch()?, None)?;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
@@ -128,7 +126,6 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         at_most: sweep.bounds(),
         directory: Directory::of(&sweep, root)?,
     };
-    drop(planning);
     if arguments.json {
         output::json(&report)?;
     } else {

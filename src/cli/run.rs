@@ -1,7 +1,6 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
 use super::exit::Exit;
-use super::planning::Planning;
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, Preset};
@@ -89,7 +88,6 @@ struct Report<'a> {
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
-    let planning = Planning::watch(stop, arguments.walltime)?;
     let (sweep, default_root) = if let Some(directory) = arguments.sweep.as_deref().filter(|path| path.is_dir()) {
         (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
     } else {
@@ -112,7 +110,6 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let mut progress = Progress::new(threads);
     let mut reporter = arguments.report.then(|| Reporter::new(&layout));
     let report = crate::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
-        drop(planning);
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);

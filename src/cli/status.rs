@@ -1,8 +1,7 @@
 //! `stickslip status`: how far a results directory is.
 
 use super::exit::Exit;
-use super::planning::Planning;
-use super::{output, signals};
+use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::workers::Worker;
@@ -32,11 +31,9 @@ pub struct Arguments {
 }
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let planning = Planning::watch(signals::catch()?, None)?;
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
     let no_slips = if arguments.json { None } else { no_slips(&results) };
-    drop(planning);
     let overview = status.overview;
     if arguments.json {
         output::json(&status)?;

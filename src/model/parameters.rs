@@ -4,7 +4,7 @@
 //! files, flags, table columns, the documentation) goes through [`Symbol`].
 
 use super::fields::fields;
-use super::theory::eta;
+use super::theory::{eta, typical_interval};
 use super::{BreakOn, Value};
 use std::f64::consts::TAU;
 
@@ -27,7 +27,8 @@ fields! {
             "standard deviation of the contact thresholds";
         TauR("tau_r", "τ_r") reattachment_time: f64 = 0.005, "s", positive, "mean reattachment delay";
         Gamma("gamma", "γ") damping_rate: f64 = 6462.0, "1/s", not_negative, "damping rate";
-        V0("V0", "V0") drive_velocity: f64 = 1e-4, "m/s", positive, "drive velocity";
+        V0("V0", "V0") drive_velocity: f64 = 1e-4, "m/s", positive and "not so low that slips are over 1e100 s apart",
+            "drive velocity";
         Delta("Delta", "Δ") modulation_amplitude: f64 = 0.0, "m", not_negative,
             "amplitude of the modulation, 0 is off";
         T("T", "T") modulation_period: Option<f64> = None, "s", positive and "given when Delta > 0",
@@ -51,6 +52,8 @@ fields! {
 
 /// Largest number of contacts; a job holds about 350 bytes for each.
 const MAX_CONTACTS: usize = 10_000_000;
+/// Longest time between slips, in s: far beyond it, times and rates leave the range of doubles, and nothing ever breaks.
+const MAX_INTERVAL: f64 = 1e100;
 /// Longest ramp, in periods: each is one cycle to be stepped over.
 const MAX_RAMPED_PERIODS: f64 = 1e9;
 
@@ -91,6 +94,7 @@ impl Parameters {
         let rules = [
             (Symbol::Ns, self.blocks * self.contacts_per_block <= MAX_CONTACTS),
             (Symbol::Dfs, self.threshold_deviation <= self.mean_threshold),
+            (Symbol::V0, typical_interval(self) <= MAX_INTERVAL),
             (Symbol::T, self.modulation_period.is_some() || !is_modulated),
             (Symbol::TTo, self.turning_period.is_none() || can_ramp),
             (Symbol::DeltaTo, self.turning_amplitude.is_none() || can_ramp),
@@ -215,6 +219,9 @@ mod tests {
         assert_eq!(refused(Symbol::N, 1e6), Symbol::N);
         assert_eq!(refused(Symbol::Dfs, 1.4), Symbol::Dfs);
         assert_eq!(refused(Symbol::Delta, 1e-6), Symbol::T);
+        for velocity in [5e-324, 1e-310, 1e-308, 1e-106] {
+            assert_eq!(refused(Symbol::V0, velocity), Symbol::V0);
+        }
     }
 
     #[test]

@@ -4,7 +4,6 @@ use crate::results::commit::{Commit, alone};
 use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, RUN, RUN_FOLDERS};
 use crate::results::manifest::{self, Manifest};
-use crate::results::missing::no_results;
 use crate::results::parts::DoneParts;
 use crate::results::tables;
 use crate::sweep::{Extension, Job, Part, Plan, Sweep};
@@ -66,7 +65,7 @@ impl<'a> Results<'a> {
 
     /// Reads a directory as it is.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
-        let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| no_results(layout))?;
+        let (manifest, extensions) = manifest::read_with_sweeps(layout)?.ok_or_else(|| layout.no_results())?;
         manifest::refuse(layout, &manifest.difference(&Manifest::new(&extensions)), "use the program that wrote it")?;
         Ok(Self::new(layout, extensions))
     }

@@ -15,6 +15,7 @@
 //! Staging lies on the same file system as the tables, so that a rename moves a whole file at once, but outside their
 //! folders: a stray file of any name there breaks some reader.
 
+use crate::results::error::ResultsError;
 use crate::results::tables;
 use crate::sweep::{Outline, Sweep};
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
@@ -31,7 +32,7 @@ pub const RUN: &str = "run";
 /// Name of the manifest within it.
 const MANIFEST: &str = "manifest.json";
 /// Folder of the results directories that nobody placed elsewhere.
-pub(super) const RESULTS: &str = "results";
+const RESULTS: &str = "results";
 /// Staging folder of a compaction, which only one process uses at a time.
 pub(super) const COMPACTION: &str = "compact";
 /// Staging folder of a merger, likewise.
@@ -66,6 +67,17 @@ impl<'a> Layout<'a> {
 
     pub fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// A directory that is none of ours, for those who look at one.
+    pub(super) fn no_results(&self) -> ResultsError {
+        let is_there = self.storage.exists(&self.root).unwrap_or(true);
+        let problem = if is_there {
+            "is no results directory (it has no run/manifest.json)"
+        } else {
+            "there is no such directory"
+        };
+        ResultsError::refused(&self.root, format!("{problem}; name one that a run made, such as {RESULTS}/fig3"))
     }
 
     pub fn tables(&self) -> PathBuf {

@@ -11,7 +11,7 @@
 //!   events.rs                 what happens, and its log
 //!   compact.rs, merge.rs      many parts in one file, many directories in one
 //!   verify/                   what is damaged, and its repair
-//! error.rs, missing.rs        why a directory cannot be used or changed, and which one was meant
+//! error.rs                    why a directory cannot be used or changed
 //! ```
 
 pub mod claims;
@@ -23,7 +23,6 @@ pub mod handle;
 pub mod layout;
 pub mod manifest;
 pub mod merge;
-mod missing;
 pub mod parts;
 pub mod rounds;
 pub mod tables;

@@ -60,9 +60,9 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Most points of a sweep. Each process that works on it walks through all of them, at 0.14 to 0.2 µs each, and longer
-/// where earlier sweeps of the directory are asked for them; and 4096 jobs a part make 25,000 files in a folder.
-pub const MAX_POINTS: u64 = 100_000_000;
+/// Most points of a sweep. Each process that works on it walks through all of them before it starts a job, at 0.14 to 0.2 µs
+/// each, and longer where earlier sweeps of the directory are asked for them: seconds, in which nothing needs to be watched.
+const MAX_POINTS: u64 = 10_000_000;
 
 /// All checks of a sweep that is read.
 pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
@@ -71,8 +71,8 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     if points.is_none_or(|points| points > MAX_POINTS) {
         let points = points.map_or_else(|| "2^64 points or more".to_owned(), |points| format!("{points} points"));
         let problem = format!(
-            "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions: every worker walks through all of them. \
-             Take fewer, or a sample ([axes.sobol]), or several sweeps"
+            "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample \
+             ([axes.sobol]), or several sweeps"
         );
         return Err(file.source.refuse(place_of("axes"), problem));
     }

@@ -11,7 +11,6 @@ use super::filter::Condition;
 use super::job::{Identity, Job, JobId, SetId, settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
-use super::walked;
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
@@ -77,7 +76,7 @@ impl Sweep {
         })
     }
 
-    /// Number of points of the grid, before the conditions drop some: at most [`MAX_POINTS`](super::MAX_POINTS).
+    /// Number of points of the grid, before the conditions drop some.
     pub fn point_count(&self) -> u64 {
         self.axes.iter().map(Axis::len).product()
     }
@@ -173,9 +172,7 @@ impl Sweep {
     /// Yields canonical points with their numbers.
     fn walk(&self, counts: Vec<u64>, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
-        let end = points.end;
         points.filter_map(move |number| {
-            walked::note(number, end);
             let mut rest = number;
             for (row, count) in rows.iter_mut().zip(&counts).rev() {
                 *row = rest % count;

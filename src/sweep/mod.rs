@@ -28,9 +28,7 @@ mod source;
 mod statistic;
 #[cfg(test)]
 mod tests;
-mod walked;
 
-pub use check::MAX_POINTS;
 pub use cost::predicted_cost;
 pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
@@ -38,7 +36,6 @@ pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Pla
 pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
 pub use source::{Mistake, SweepError, nearest};
 pub use statistic::{STATISTICS, Statistic, StatisticKind};
-pub use walked::walked;
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
 /// is left to [`Sweep::parse`].

@@ -167,6 +167,14 @@ fn a_time_limit_ends_a_simulation() {
 }
 
 #[test]
+fn the_slowest_drives_that_are_allowed_end() {
+    let folder = Folder::new();
+    for velocity in ["1e-50", "1e-104"] {
+        folder.ends(0, &format!("simulate --set V0={velocity} --slips 1 --discard 0"));
+    }
+}
+
+#[test]
 fn a_sweep_file_of_one_job_is_simulated_like_its_flags() {
     let folder = Folder::new();
     let text =

@@ -6,7 +6,6 @@ use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::handle::{Results, is_fresh};
 use crate::results::layout::Layout;
 use crate::results::manifest::{Manifest, WRITER, parse, read_text, refuse};
-use crate::results::missing::no_results;
 use crate::results::tables;
 use crate::sweep::{Extension, Part, Round};
 use crate::table::checksum;
@@ -98,7 +97,7 @@ fn whole_or_copies(layout: &Layout<'_>, problems: &mut Vec<Problem>) -> Result<T
             Some(problem) => problem,
         },
         // A run that begins here has written the copy first.
-        Ok(None) if copies.is_empty() || is_fresh(layout)? => return Err(no_results(layout)),
+        Ok(None) if copies.is_empty() || is_fresh(layout)? => return Err(layout.no_results()),
         Ok(None) => "it is missing".to_owned(),
         Err(error) if error.kind == ErrorKind::Damaged => error.problem,
         Err(error) => return Err(error),

@@ -252,8 +252,8 @@ fn the_sweeps_of_the_figures_are_read_and_take_minutes_at_most() {
 fn ten_million_jobs_are_planned_in_seconds() {
     let text = "where = \"frequency < 1e9\"\n[axes]\nV0 = { log = [3e-5, 2e-4], points = 100 }\n\
                 Delta = { log = [3e-7, 1e-6], points = 10 }\neta = { log = [0.2, 1000], points = 100 }\n\
-                seed = { count = 100 }";
-    let [first, more] = [sweep(text), sweep(&text.replace("count = 100", "count = 101"))];
+                seed = { count = 99 }";
+    let [first, more] = [sweep(text), sweep(&text.replace("count = 99", "count = 100"))];
     let start = std::time::Instant::now();
     let before = extensions([&first]);
     println!("begun in {:?}", start.elapsed());
@@ -267,5 +267,5 @@ fn ten_million_jobs_are_planned_in_seconds() {
     let start = std::time::Instant::now();
     let hashed = first.jobs().take(1_000_000).filter(|job| first.job_id(&job.parameters).as_bytes()[0] > 0);
     println!("{} of 1e6 ids in {:?}", hashed.count(), start.elapsed());
-    assert_eq!((totals.jobs, new), (10_000_000, 100_000));
+    assert_eq!((totals.jobs, new), (9_900_000, 100_000));
 }
