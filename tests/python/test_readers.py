@@ -1,21 +1,21 @@
 """pandas, polars and DuckDB read the tables of a sweep without options, and find what the reduction found."""
 
+import json
+import re
+import subprocess
+import sys
+
 import duckdb
 import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow.parquet as pq
 import pytest
-import read_duckdb
-import read_pandas
-import read_polars
+import read
+
+import stickslip
 
 JOBS, SLIPS = 2 * 5, 2 * 5 * 6
-
-# The same sums in another order: some hundred roundings of 1e-16.
-TOLERANCE = 1e-12
-
-READERS = pytest.mark.parametrize("reader", [read_pandas, read_duckdb, read_polars])
 
 
 def as_pandas(table):
@@ -28,24 +28,29 @@ def as_pandas(table):
     return (table if table.index.name == "set_id" else table.set_index("set_id")).astype(float)
 
 
-@READERS
+@pytest.mark.parametrize("reader", [read.with_pandas, read.with_polars, read.with_duckdb])
 def test_a_reader_finds_what_the_reduction_found(results, reader):
     reduced = pd.read_parquet(results / "reduced" / "sets.parquet").set_index("set_id")
-    found = as_pandas(reader.sets(results)).reindex(reduced.index)
+    found = as_pandas(reader(stickslip.open(results))).reindex(reduced.index)
     assert len(reduced) == 2
     for column in ("tau_mean", "locking_index"):
-        np.testing.assert_allclose(found[column], reduced[column].astype(float), rtol=TOLERANCE, atol=0)
+        # The same sums in another order: some hundred roundings of 1e-16.
+        np.testing.assert_allclose(found[column], reduced[column].astype(float), rtol=1e-12, atol=0)
     assert reduced["tau_mean"].gt(0).all()
     assert reduced["locking_index"].isna().sum() == 1, "null exactly without modulation"
 
 
-@READERS
-def test_a_reader_finds_the_units(results, reader):
-    fields = pq.read_schema(next((results / "tables" / "slips").iterdir()))
-    in_fields = {field.name: field.metadata[b"unit"].decode() for field in fields}
-    units = reader.units(results)
-    assert units == in_fields
-    assert (units["V0"], units["interval"], units["phase"], units["periods"]) == ("m/s", "s", "rad", "")
+def test_the_example_prints_the_units_and_what_each_library_finds(results):
+    done = subprocess.run([sys.executable, read.__file__, results], capture_output=True, text=True, check=True)
+    assert re.search(r"^interval +s$", done.stdout, re.M) and done.stdout.count("tau_mean") == 3
+
+
+def test_units_are_in_the_fields_and_in_the_footer(results):
+    file = next((results / "tables" / "slips").iterdir())
+    in_fields = {field.name: field.metadata[b"unit"].decode() for field in pq.read_schema(file)}
+    query = f"select decode(value) from parquet_kv_metadata('{file}') where decode(key) = 'units'"
+    assert json.loads(duckdb.sql(query).fetchall()[0][0]) == stickslip.open(results).slips().units == in_fields
+    assert [in_fields[name] for name in ("V0", "interval", "phase", "periods")] == ["m/s", "s", "rad", ""]
 
 
 @pytest.mark.parametrize("table, rows", [("slips", SLIPS), ("jobs", JOBS), ("precursors", None)])
