@@ -50,9 +50,7 @@ def drag(results: Path) -> Section:
         ", ".join(texts),
         *followed,
     )
-    section.remark(
-        "Hysteresis is the mean n while T falls minus that while T rises.", f"It is {'; '.join(memories)}."
-    )
+    section.remark("Hysteresis is the mean n while T falls minus that while T rises.", f"It is {'; '.join(memories)}.")
     return section
 
 
@@ -199,9 +197,7 @@ def choices(results: Path) -> Section:
     still = select(slips, Delta=0.0, break_on="magnitude")
     precursors = of_same_jobs(sweep.table("precursors"), still)
     counts = (f"{count_by_slip(still, precursors, size).mean():.2f} at {size}" for size in (5, 10, *SIZES))
-    section.item(
-        f"`precursor_size`: precursors per slip by their least number of breaks: {', '.join(counts)}."
-    )
+    section.item(f"`precursor_size`: precursors per slip by their least number of breaks: {', '.join(counts)}.")
     phases = Sweep(results / "fig3").slips()
     phases = phases[phases["eta"] > WHOLE_WINDOW]
     past = phases["phase"] - numpy.arcsin(1 / phases["eta"])
@@ -254,7 +250,5 @@ def energies(results: Path) -> Section:
                 "lost in broken contacts": broken.text(3),
             }
         )
-    section.remark(
-        "The rest is lost in damping.",
-    )
+    section.remark("The rest is lost in damping.")
     return section

@@ -82,8 +82,7 @@ def at_velocities(section: Section, sweep: Sweep) -> None:
         *reduced,
     )
     section.verdict = Verdict(
-        f"holds for V0 = {sets['V0'].max():g} m/s",
-        f"the median change at small amplitudes is {', '.join(changed)}",
+        f"holds for V0 = {sets['V0'].max():g} m/s", f"the median change at small amplitudes is {', '.join(changed)}"
     )
 
 
@@ -136,7 +135,7 @@ def slow_fronts(results: Path) -> Section:
     )
     section.remark(
         f"A *slow front* is {FRONT_STEPS} or more precursors of fewer than {LARGE} breaks (ten blocks' worth) over more than"
-        f" {1e3 * FRONT_TIME / 5:.0f} ms, within {1e3 * FRONT_TIME:.0f} ms before a slip; this cut was chosen on other seeds.",
+        f" {1e3 * FRONT_TIME / 5:.0f} ms, within {1e3 * FRONT_TIME:.0f} ms before a slip; this cut was chosen on other seeds."
     )
     still = select(slips, Delta=0.0)
     slow_speed, fast_speed = (still[column].median() for column in ("slow_front_speed", "front_speed"))
@@ -189,8 +188,7 @@ def arrest(section: Section, small: pandas.DataFrame) -> None:
 def loading_profile(results: Path) -> Section:
     """Statement 8."""
     section = Section(
-        "8. Eq. 1: exponential decay from the trailing edge",
-        "`sweeps/eq1.toml` (before the first break)",
+        "8. Eq. 1: exponential decay from the trailing edge", "`sweeps/eq1.toml` (before the first break)"
     )
     file = results / "eq1" / "profile.parquet"
     profile = read(file, "scripts/reproduce eq1").sort_values("block")
@@ -212,10 +210,7 @@ def loading_profile(results: Path) -> Section:
 
 def edge(results: Path) -> Section:
     """Statement 12."""
-    section = Section(
-        "12. The modulation is amplified near the loaded edge",
-        "`sweeps/fig2.toml`",
-    )
+    section = Section("12. The modulation is amplified near the loaded edge", "`sweeps/fig2.toml`")
     file = results / "eq1" / "profile.parquet"
     displacement = read(file, "scripts/reproduce eq1").sort_values("block")["displacement"]
     given = parameters(file)

@@ -112,7 +112,7 @@ def stick_slip(results: Path) -> Section:
     drops = share(slips["drops_before"].isin([2, 3]), slips["seed"])
     section.remark(
         "The number of precursors depends on what counts: more than half of the slips have two or three of at least"
-        f" {' or '.join(map(str, most))} breaks, and {drops.text(2)} have two or three drops of 0.5 N.",
+        f" {' or '.join(map(str, most))} breaks, and {drops.text(2)} have two or three drops of 0.5 N."
     )
     return section
 
@@ -163,9 +163,7 @@ def integer_multiples(results: Path) -> Section:
             f"{at_frequencies(found)}; unmodulated {', '.join(f'{chance.value:.3f}' for chance in chances)}",
             *(index.low > max(chance.high, 0.5) for index, chance in zip(found, chances, strict=True)),
         )
-    section.remark(
-        "Shorter intervals between precursors belong to bursts of small ones, with or without modulation.",
-    )
+    section.remark("Shorter intervals between precursors belong to bursts of small ones, with or without modulation.")
     return section
 
 
@@ -197,15 +195,8 @@ def many_periods(results: Path) -> Section:
     expected = {eta: random_load_share(eta) for eta in slips["eta"].unique()}
     slips = slips.assign(near=near_whole(slips["tau_over_T"]), expected=slips["eta"].map(expected))
     whole, locked = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["locked"]]))
-    section.check(
-        "",
-        "more than the 0.2 of chance within 0.1 T of nT, for η > 1",
-        whole.text(),
-        whole.low > 0.2,
-    )
-    section.check(
-        "once locked", "more than 0.5", locked.text(), locked.low > 0.5
-    )
+    section.check("", "more than the 0.2 of chance within 0.1 T of nT, for η > 1", whole.text(), whole.low > 0.2)
+    section.check("once locked", "more than 0.5", locked.text(), locked.low > 0.5)
     for low, high in pairwise((1, 2, 4, 10, 1001)):
         mine = slips[(slips["eta"] >= low) & (slips["eta"] < high)]
         near = share(mine["near"], mine["set_id"])
@@ -272,11 +263,10 @@ def stress_drops(results: Path) -> Section:
     )
     section.remark(
         "Force grows at the rate K_d V0 between slips, so drops follow τ; the square of their correlation is"
-        f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}.",
+        f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}."
     )
     section.verdict = Verdict(
-        "restates statement 3",
-        "drops follow τ; at given τ they vary more with modulation, not less",
+        "restates statement 3", "drops follow τ; at given τ they vary more with modulation, not less"
     )
     return section
 

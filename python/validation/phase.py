@@ -152,12 +152,7 @@ def below_one(results: Path) -> Section:
         rayleigh_p(low["phase"]) > 0.01,
     )
     load_p = rayleigh_p(load_phase(low))
-    section.check(
-        "oscillations have no influence",
-        "p > 0.01 for the load phase",
-        f"p = {load_p:.3f}",
-        load_p > 0.01,
-    )
+    section.check("oscillations have no influence", "p > 0.01 for the load phase", f"p = {load_p:.3f}", load_p > 0.01)
     drawn = [locked_by_chance(*one, 20_000) for one in zip(sets["eta"].round(6), sets["slips"], strict=True)]
     sets = sets.assign(in_load=locked_in_load(sets, slips), chance=[share for share, _ in drawn])
     fast = sets["V0"] > FAST
@@ -191,7 +186,9 @@ def below_one(results: Path) -> Section:
 def stiff_drive(results: Path) -> Section:
     """The phase against η with the experiment's stiffness of the drive."""
     section = Section(
-        "The experiment's drive: K_d = 1e9 N/m", "`sweeps/stiff-drive.toml`, K_d Δ = 20 to 100 N", ("stiff-drive-phase",)
+        "The experiment's drive: K_d = 1e9 N/m",
+        "`sweeps/stiff-drive.toml`, K_d Δ = 20 to 100 N",
+        ("stiff-drive-phase",),
     )
     slips = Sweep(results / "stiff-drive").slips().dropna(subset="phase")
     high = slips[slips["eta"] > 2]
