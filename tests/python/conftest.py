@@ -28,6 +28,16 @@ precursors = true
 """
 
 
+def tree(folder):
+    """The bytes of all files in a folder, by their paths within it."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def results_in(directory):
+    """Those of the tables and the reduced data."""
+    return {path: data for path, data in tree(directory).items() if path.startswith(("tables/", "reduced/"))}
+
+
 @pytest.fixture(scope="session")
 def program():
     """The built program."""

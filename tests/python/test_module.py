@@ -20,7 +20,7 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from conftest import ROOT
+from conftest import ROOT, results_in
 from nbclient import NotebookClient
 
 import stickslip as module
@@ -47,12 +47,6 @@ def opened(results):
 def bare(table):
     """An Arrow table without the metadata of a file."""
     return pa.table(table).replace_schema_metadata(None)
-
-
-def files(directory):
-    """The files of tables and reduced data, by name."""
-    paths = (path for folder in ("tables", "reduced") for path in sorted((directory / folder).rglob("*.parquet")))
-    return {path.relative_to(directory).as_posix(): path.read_bytes() for path in paths}
 
 
 def test_a_simulation_has_the_bits_of_the_command(stickslip, tmp_path):
@@ -90,12 +84,12 @@ def test_a_dict_runs_as_the_file_with_its_text_does(stickslip, tmp_path):
     (tmp_path / "sweep.toml").write_text(ran.sweep)
     stickslip("run", tmp_path / "sweep.toml", "--out", tmp_path / "command")
     module.run(tmp_path / "sweep.toml", out=tmp_path / "file", threads=1, progress=False)
-    expected = files(tmp_path / "command")
+    expected = results_in(tmp_path / "command")
     # Three tables of six parts, one for each job, and the reduced data.
     assert len(expected) == 3 * 6 + 5
-    assert files(tmp_path / "dict") == files(tmp_path / "file") == expected
+    assert results_in(tmp_path / "dict") == results_in(tmp_path / "file") == expected
     again = module.run(tmp_path / "dict", progress=False)
-    assert again.directory == tmp_path / "dict" and files(tmp_path / "dict") == expected
+    assert again.directory == tmp_path / "dict" and results_in(tmp_path / "dict") == expected
 
 
 def test_arrays_of_numpy_are_lists(tmp_path):

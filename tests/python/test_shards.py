@@ -7,7 +7,7 @@ import shutil
 import subprocess
 
 import pytest
-from conftest import ROOT, SWEEP
+from conftest import ROOT, SWEEP, results_in, tree
 
 TABLES = ("slips", "precursors", "jobs")
 PARTS = 6
@@ -22,16 +22,6 @@ if [ "$(wc -l < "$CALLS")" = "$DEADLY" ]; then
 fi
 exec {program} "$@"
 """
-
-
-def tree(*folders):
-    """The bytes of all files in some folders, by their paths within them."""
-    files = {path.relative_to(folder): path for folder in folders for path in folder.rglob("*") if path.is_file()}
-    return {path.as_posix(): file.read_bytes() for path, file in files.items()}
-
-
-def results(directory):
-    return {path: data for path, data in tree(directory).items() if not path.startswith("run/")}
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +63,7 @@ def test_shards_put_together_have_the_bytes_of_one_run(stickslip, shards, gather
     stickslip("verify", target)
     assert tree(target / "tables") == tree(shards / "whole" / "tables")
     stickslip("run", target)
-    assert results(target) == results(shards / "whole")
+    assert results_in(target) == results_in(shards / "whole")
 
 
 def test_a_copy_that_is_killed_at_any_step_leaves_whole_parts_and_can_be_repeated(stickslip, shards, gather, tmp_path):
