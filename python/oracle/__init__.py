@@ -26,7 +26,7 @@ interval of length h that starts at a,
 
 Nothing relies on sampling, so nothing is missed in long intervals either.
 
-Reported, over all breaks:
+Reported as JSON, over all breaks:
     time error      |predicted - logged| in s, worst and median;
     residual        ||k_i (x - a_i)| - f_i| / f_s, with x the oracle's displacement at the *logged* time;
     displacement    |oracle's - logged| displacement at breaks and reattachments, over f_s/k;

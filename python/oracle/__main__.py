@@ -9,30 +9,6 @@ from .contact_log import LogError
 from .replay import Replay, report
 
 
-def table(result: dict) -> str:
-    """The result for people."""
-
-    def where(at: dict | None) -> str:
-        return f"(break {at['break']}, block {at['block']}, t = {at['time']:.9g} s)" if at else ""
-
-    lines = [
-        f"breaks               {result['breaks']}, reattachments {result['reattachments']},"
-        f" to t = {result['end_time']:.9g} s",
-        f"time error           worst {result['worst_time_error']:.1e} s {where(result['worst_time_error_at'])}",
-        f"                     median {result['median_time_error']:.1e} s",
-        f"residual             worst {result['worst_residual']:.1e} f_s {where(result['worst_residual_at'])}",
-        f"                     median {result['median_residual']:.1e} f_s",
-        f"displacement error   worst {result['worst_displacement_error']:.1e} f_s/k",
-        f"missed contacts      {len(result['missed'])}",
-    ]
-    for at in result["missed"][:5]:
-        lines.append(f"                     block {at['block']}, contact {at['contact']} from t = {at['time']:.9g} s")
-    lines.append(f"unreached breaks     {len(result['unreached'])}")
-    lines += [f"                     {where(at)}" for at in result["unreached"][:5]]
-    lines.append("within the limits" if result["within_limits"] else "BEYOND the limits")
-    return "\n".join(lines)
-
-
 def main() -> int:
     """Replays the log that the command line names."""
     parser = contact_log.parser("oracle", description)
@@ -41,7 +17,6 @@ def main() -> int:
     parser.add_argument("--worst", type=float, default=1e-8, help="limit on the worst time error, in s (%(default)g)")
     parser.add_argument("--median", type=float, default=1e-11, help="limit on their median, in s (%(default)g)")
     parser.add_argument("--residual", type=float, default=1e-8, help="limit on the residual, in f_s (%(default)g)")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
     options = parser.parse_args()
     try:
         log, parameters = contact_log.read(options)
@@ -55,7 +30,7 @@ def main() -> int:
         and result["worst_residual"] <= options.residual
         and not result["missed"]
     )
-    print(json.dumps(result, indent=2) if options.json else table(result))
+    print(json.dumps(result, indent=2))
     return 0 if result["within_limits"] else 1
 
 
