@@ -3,8 +3,6 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use stickslip::figure::FigureError;
-use stickslip::reduce::ReduceError;
 use stickslip::run::threads::ThreadsError;
 use stickslip::simulate::{RequestError, mistakes_in};
 use stickslip::table::file::DatasetError;
@@ -91,6 +89,5 @@ of_results!(
     stickslip::table::storage::StorageError,
     arrow_schema::ArrowError,
     DatasetError,
-    FigureError,
-    ReduceError
+    anyhow::Error
 );

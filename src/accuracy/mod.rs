@@ -23,33 +23,12 @@ pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use report::{Report, stability_report, study_report};
 pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
 
-use crate::figure::FigureError;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Measurements, Recording, measure};
 use crate::run::cpu;
-use crate::solver::{Ledger, Limits, Observer, Resolve, SimulationError, Solver, simulate, simulate_audited};
-use crate::table::file::DatasetError;
-use crate::table::storage::StorageError;
+use crate::solver::{Ledger, Limits, Observer, Resolve, Solver, simulate, simulate_audited};
+use anyhow::{Context, Result};
 use std::sync::atomic::AtomicBool;
-
-/// A study that cannot be made or written.
-#[derive(Debug, thiserror::Error)]
-pub enum AccuracyError {
-    #[error("{case}, seed {seed}, {solver}: {source}")]
-    Simulation { case: String, seed: u64, solver: String, source: SimulationError },
-    /// Slips are compared, and there are none.
-    #[error("{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide")]
-    NoSlips { case: String },
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    /// A table cannot be written.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// A file cannot be put in its place.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-}
 
 /// The method of a solver in words; the event-driven one by how it resolves motion, where that is set.
 pub const fn method_in_words(solver: Solver) -> &'static str {
@@ -98,33 +77,31 @@ fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str
 struct Realisation<'a> {
     parameters: &'a Parameters,
     solver: Solver,
-    /// What it is called in errors.
-    in_words: fn(&Parameters) -> String,
 }
 
 impl Realisation<'_> {
     /// Observers end these simulations; none comes near this number of events.
     const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
 
-    fn simulate(&self, observer: &mut dyn Observer) -> Result<(), AccuracyError> {
-        simulate(self.parameters, self.solver, Self::LIMITS, observer).map_err(|source| self.failed(source))?;
+    fn simulate(&self, observer: &mut dyn Observer) -> Result<()> {
+        simulate(self.parameters, self.solver, Self::LIMITS, observer).with_context(|| self.name())?;
         Ok(())
     }
 
-    fn audit(&self, observer: &mut dyn Observer) -> Result<Ledger, AccuracyError> {
+    fn audit(&self, observer: &mut dyn Observer) -> Result<Ledger> {
         let audited = simulate_audited(self.parameters, self.solver, Self::LIMITS, observer);
-        audited.map(|(_, ledger)| ledger).map_err(|source| self.failed(source))
+        Ok(audited.with_context(|| self.name())?.1)
     }
 
     /// CPU time in s, and what a sweep would measure.
-    fn measure(&self, recording: &Recording) -> Result<(f64, Measurements), AccuracyError> {
+    fn measure(&self, recording: &Recording) -> Result<(f64, Measurements)> {
         let never = AtomicBool::new(false);
         let (cpu_seconds, measured) = cpu::timed(|| measure(self.parameters, recording, self.solver, &never));
-        Ok((cpu_seconds, measured.map_err(|source| self.failed(source))?))
+        Ok((cpu_seconds, measured.with_context(|| self.name())?))
     }
 
-    fn failed(&self, source: SimulationError) -> AccuracyError {
-        let (case, solver) = ((self.in_words)(self.parameters), solver_in_words(self.solver));
-        AccuracyError::Simulation { case, seed: self.parameters.seed, solver, source }
+    fn name(&self) -> String {
+        let Self { parameters, solver } = *self;
+        format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, solver_in_words(solver))
     }
 }

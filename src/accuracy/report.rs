@@ -2,7 +2,7 @@
 
 use super::distance::Distance;
 use super::study::{Findings, MethodRow, Quantity, Study};
-use super::{AccuracyError, Stability, cost, method_in_words, other_settings};
+use super::{Stability, cost, method_in_words, other_settings};
 use crate::figure::{ErrorPanel, Look, MethodLine, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::commit::Commit;
@@ -11,13 +11,14 @@ use crate::table::arrow;
 use crate::table::columns::Table;
 use crate::table::file::{DatasetError, Footer, PROGRAM, TableWriter};
 use crate::table::storage::{Disk, Storage, StoredFile};
+use anyhow::Result;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 const FORMAT: u32 = 4;
 
 /// The findings of a study, with a figure for the sets that differ in the modulation alone.
-pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>, AccuracyError> {
+pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>> {
     let settings = json!({
         "seeds": study.seeds,
         "first_set_multiple": study.first_set_multiple,
@@ -81,7 +82,7 @@ impl<'a> Report<'a> {
     }
 
     /// Writes everything into a folder, over what an earlier command left there; returns the files.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, AccuracyError> {
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         Disk.ensure_folder(folder)?;
         let staging = folder.join("staging");
         let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
@@ -111,7 +112,7 @@ impl<'a> Report<'a> {
 
 /// The figure of the sets that are this one without modulation: cost against the error of break times, and against
 /// distances of distributions from those of the reference, in units of the distance that chance alone stays under.
-fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture, AccuracyError> {
+fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Picture> {
     const WORK: &str = "CPU time per slip (s)";
     const NOTE: &str = "W₁: first Wasserstein distance between a method's distribution and that of the reference, over what \
                         equal distributions stay under in 95 of 100 samples; bars: 95 %. \
@@ -139,7 +140,7 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
         note: format!("V0 = {:e} m/s{}. {NOTE}{extrapolated}", set.drive_velocity, others.collect::<String>()),
         ..Look::default()
     };
-    Ok(work_precision(WORK, &panels, &look)?)
+    work_precision(WORK, &panels, &look)
 }
 
 fn unmodulated(set: &Parameters) -> Parameters {

@@ -10,12 +10,13 @@
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
-use super::{AccuracyError, Realisation, set_in_words};
+use super::{Realisation, set_in_words};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
 use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
 use crate::table::selected::{Selected, Selection};
+use anyhow::{Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -277,7 +278,7 @@ impl Ensemble {
 
 impl Study {
     /// Runs it; `report` gets a line before each stage.
-    pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings, AccuracyError> {
+    pub fn run(&self, report: &mut dyn FnMut(&str)) -> Result<Findings> {
         let mut findings = Findings::default();
         for (set, parameters) in self.sets.iter().enumerate() {
             report(&format!("{}: first breaks and energy ledgers", set_in_words(parameters)));
@@ -302,7 +303,10 @@ impl Study {
                 }
             }
             if reference.is_empty() {
-                return Err(AccuracyError::NoSlips { case: set_in_words(parameters) });
+                let case = set_in_words(parameters);
+                bail!(
+                    "{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide"
+                );
             }
             let mean_interval = mean(&Quantity::Interval.sample(&reference));
             let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
@@ -335,15 +339,15 @@ impl Study {
     }
 
     /// Slips of these seeds; not timed, so on all threads of the pool.
-    fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>, AccuracyError> {
+    fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
             let parameters = Parameters { seed, ..parameters.clone() };
             Ok(realisation(&parameters, solver).measure(&self.recording())?.1.slips)
         };
-        Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>, AccuracyError>>()?.concat())
+        Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>>>()?.concat())
     }
 
-    fn break_times(&self, realisation: &Realisation<'_>, reference: &Reference) -> Result<BreakErrors, AccuracyError> {
+    fn break_times(&self, realisation: &Realisation<'_>, reference: &Reference) -> Result<BreakErrors> {
         let takes_too_long = realisation.parameters.drive_velocity < self.fixed_step_breaks_from;
         if takes_too_long && matches!(realisation.solver, Solver::FixedStep { .. }) {
             return Ok(BreakErrors::default());
@@ -353,7 +357,7 @@ impl Study {
         Ok(comparison.errors())
     }
 
-    fn ledger_residual(&self, realisation: &Realisation<'_>) -> Result<Option<f64>, AccuracyError> {
+    fn ledger_residual(&self, realisation: &Realisation<'_>) -> Result<Option<f64>> {
         let is_on_grid = matches!(realisation.solver, Solver::EventDriven { resolve: Resolve::Grid, .. });
         if is_on_grid || self.is_stretch_only(realisation.parameters, realisation.solver) {
             return Ok(None);
@@ -369,7 +373,7 @@ impl Study {
     }
 
     /// Seed by seed, every solver in turn, so that whatever slows the machine down slows down all.
-    fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>, AccuracyError> {
+    fn ensembles(&self, parameters: &Parameters) -> Result<Vec<Ensemble>> {
         let mut ensembles = vec![Ensemble::default(); self.solvers.len()];
         for seed in 0..self.seeds {
             let parameters = Parameters { seed, ..parameters.clone() };
@@ -390,7 +394,7 @@ impl Study {
 }
 
 fn realisation(parameters: &Parameters, solver: Solver) -> Realisation<'_> {
-    Realisation { parameters, solver, in_words: set_in_words }
+    Realisation { parameters, solver }
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.

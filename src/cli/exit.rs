@@ -1,8 +1,7 @@
 //! Exit codes, and which error ends with which.
 
-use crate::figure::FigureError;
-use crate::reduce::ReduceError;
-use crate::report::ReportError;
+use crate::figure::BadOption;
+use crate::reduce::NoJobs;
 use crate::results::{ErrorKind, ResultsError};
 use crate::solver::SimulationError;
 use crate::sweep::SweepError;
@@ -31,7 +30,7 @@ impl Exit {
     }
 
     fn of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Self> {
-        if cause.is::<UsageError>() || cause.is::<SweepError>() {
+        if cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<SweepError>() || cause.is::<NoJobs>() {
             return Some(Self::Usage);
         }
         if let Some(error) = cause.downcast_ref::<SimulationError>() {
@@ -46,25 +45,6 @@ impl Exit {
                 ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
                 ErrorKind::Damaged => Some(Self::Damaged),
                 ErrorKind::Disk => None,
-            };
-        }
-        if let Some(error) = cause.downcast_ref::<ReduceError>() {
-            return match error {
-                ReduceError::Dataset(error) => Self::of_cause(error),
-                ReduceError::NoJobs { .. } => Some(Self::Usage),
-                ReduceError::Storage(_) => None,
-                ReduceError::Results(error) => Self::of_cause(error),
-            };
-        }
-        if let Some(FigureError::Option { .. } | FigureError::TooSmall { .. }) = cause.downcast_ref::<FigureError>() {
-            return Some(Self::Usage);
-        }
-        if let Some(error) = cause.downcast_ref::<ReportError>() {
-            return match error {
-                ReportError::Reduce(error) => Self::of_cause(error),
-                ReportError::Dataset(error) => Self::of_cause(error),
-                ReportError::Results(error) => Self::of_cause(error),
-                ReportError::Storage(_) | ReportError::Encoding(_) => None,
             };
         }
         match cause.downcast_ref::<DatasetError>() {

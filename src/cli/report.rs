@@ -1,9 +1,8 @@
 //! `stickslip report`, and `--report` of `run`: a results directory as one HTML page.
 
 use super::exit::Exit;
-use super::output;
-use crate::reduce::ReduceError;
-use crate::report::ReportError;
+use super::{message, output};
+use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, RunReport};
@@ -81,7 +80,7 @@ impl<'a> Reporter<'a> {
         if let Err(error) = self.write(Some(self.spacing))
             && !std::mem::replace(&mut self.has_failed, true)
         {
-            output::report(&format!("warning: no report is written: {error}"));
+            output::report(&format!("warning: no report is written: {}", message(&error)));
         }
         self.is_due = false;
         self.last = Some(Instant::now());
@@ -91,12 +90,12 @@ impl<'a> Reporter<'a> {
     /// Writes the last report; none if no job is committed.
     pub fn finish(&self, report: &RunReport) -> Result<Option<PathBuf>> {
         let others_run = report.jobs_left > 0 && !report.stopped;
-        Ok(self.write(others_run.then_some(OTHERS_SPACING))?)
+        self.write(others_run.then_some(OTHERS_SPACING))
     }
 
-    fn write(&self, refresh: Option<Duration>) -> Result<Option<PathBuf>, ReportError> {
+    fn write(&self, refresh: Option<Duration>) -> Result<Option<PathBuf>> {
         match crate::report::write(&Results::read(self.layout)?, refresh) {
-            Err(ReportError::Reduce(ReduceError::NoJobs { .. })) => Ok(None),
+            Err(error) if error.is::<NoJobs>() => Ok(None),
             written => Ok(Some(written?)),
         }
     }

@@ -8,7 +8,7 @@ use super::threads::ThreadsFlag;
 use super::{output, reduce, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
-use crate::reduce::ReduceError;
+use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::run::{Options, RunReport, Shard};
@@ -162,7 +162,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
     let results = Results::read(layout)?;
     let summary = match crate::reduce::reduce(&results) {
-        Err(ReduceError::NoJobs { .. }) => {
+        Err(error) if error.is::<NoJobs>() => {
             output::report("no part is committed yet, so there is nothing to reduce");
             return Ok(());
         }

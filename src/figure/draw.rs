@@ -1,28 +1,31 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
-use super::{FigureError, Format, Look, OwnFigure, Picture};
+use super::{BadOption, Format, Look, OwnFigure, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, refined, regimes, staircase};
 use super::{own, sets};
-use crate::reduce::{CellRow, SetRow, WRITER, read_reduced, read_sets};
+use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
-use crate::table::columns::Table;
+use crate::table::columns::{FromRow, Table};
+use crate::table::shown::shown;
+use anyhow::{Result, anyhow};
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
+const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 
 /// Draws the figures of a results directory into `figures/`, each in these formats: those whose data are there.
 ///
 /// Returns the files, in the order in which they were written.
-pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>, FigureError> {
+pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = alone(layout, WRITER)?;
     check_reduced(layout)?;
-    let points = read_reduced(layout)?;
-    let sets = read_sets(layout, MAX_SETS)?;
+    let points = read(layout)?;
+    let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
     let look = &look.with_note(&sets::common(sets.iter().map(|set| &set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
-    pictures.extend(backbone::backbone(&points, &read_reduced(layout)?, &sets, look));
+    pictures.extend(backbone::backbone(&points, &read(layout)?, &sets, look));
     pictures.extend(intervals::intervals(&points, look));
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
@@ -39,18 +42,18 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         }
     }
     if layout.storage.exists(&layout.reduced_file(CellRow::NAME))? {
-        pictures.extend(refined::refined(&read_reduced(layout)?, &sets, look));
+        pictures.extend(refined::refined(&read(layout)?, &sets, look));
     }
     if sets.len() <= histograms::MAX_SETS {
-        pictures.extend(histograms::histograms(&sets, &read_reduced(layout)?, look));
+        pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
     }
     write(layout, &pictures, look, formats)
 }
 
 /// Draws a figure of one's own from the sets of a results directory; writes nothing.
-pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
+pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
     check_reduced(layout)?;
-    let rows: Vec<SetRow> = read_reduced(layout)?;
+    let rows: Vec<SetRow> = read(layout)?;
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &row.parameters.parameters)));
     let picture = own::own(&rows, figure, look)?;
     check_size(&picture, look)?;
@@ -58,41 +61,42 @@ pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<
 }
 
 /// Puts a figure into `figures/`, in these formats.
-pub fn write_own(
-    layout: &Layout<'_>,
-    picture: Picture,
-    look: &Look,
-    formats: &[Format],
-) -> Result<Vec<PathBuf>, FigureError> {
+pub fn write_own(layout: &Layout<'_>, picture: Picture, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = alone(layout, WRITER)?;
     write(layout, &[picture], look, formats)
 }
 
-fn check_reduced(layout: &Layout<'_>) -> Result<(), FigureError> {
+fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
+    read_reduced(layout).map_err(advise(ADVICE))
+}
+
+fn check_reduced(layout: &Layout<'_>) -> Result<()> {
     if layout.storage.exists(&layout.reduced())? {
         return Ok(());
     }
-    Err(FigureError::NotReduced { directory: layout.root().to_owned() })
+    let root = shown(layout.root());
+    Err(anyhow!("{root}: has no reduced data to draw; run `stickslip reduce {root}` first"))
 }
 
 /// A picture is larger than it is asked to be if its frames would be too small to read.
-fn check_size(picture: &Picture, look: &Look) -> Result<(), FigureError> {
+fn check_size(picture: &Picture, look: &Look) -> Result<(), BadOption> {
     const SLACK: f64 = 1.001;
     let size = picture.size();
     match look.size {
         Some(asked) if size.width > SLACK * asked.width || size.height > SLACK * asked.height => {
-            Err(FigureError::TooSmall { figure: picture.name().to_owned(), size })
+            let problem = format!(
+                "--size: figure {} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print",
+                picture.name(),
+                size.width.ceil(),
+                size.height.ceil()
+            );
+            Err(BadOption(problem))
         }
         _ => Ok(()),
     }
 }
 
-fn write(
-    layout: &Layout<'_>,
-    pictures: &[Picture],
-    look: &Look,
-    formats: &[Format],
-) -> Result<Vec<PathBuf>, FigureError> {
+fn write(layout: &Layout<'_>, pictures: &[Picture], look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     pictures.iter().try_for_each(|picture| check_size(picture, look))?;
     let folder = layout.figures();
     layout.ensure_folder(&folder)?;

@@ -44,38 +44,13 @@ pub use simulation::{AttachedMap, Simulation, simulation};
 pub use style::{Look, Size, Style};
 pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 
-use crate::table::file::DatasetError;
-use crate::table::shown::shown;
-use crate::table::storage::StorageError;
-use std::path::PathBuf;
-
-/// A figure that cannot be drawn.
+/// What was asked of a figure that cannot be drawn so: the flag, and what to do.
 #[derive(Debug, thiserror::Error)]
-pub enum FigureError {
-    /// There is nothing to draw.
-    #[error("figure {figure}: there are no {what} to draw")]
-    Empty { figure: &'static str, what: &'static str },
-    /// A file of a picture cannot be made.
-    #[error("figure {figure}: cannot be turned into {}: {reason}", format.extension().to_uppercase())]
-    Encoding { figure: String, format: Format, reason: String },
-    /// A figure does not fit the size that is asked for.
-    #[error("--size: figure {figure} needs at least {:.0}mmx{:.0}mm with its legend and small print, and less in the style print", size.width.ceil(), size.height.ceil())]
-    TooSmall { figure: String, size: Size },
-    /// An option of a figure of one's own does not fit the data.
-    #[error("--{option} {value}: {problem}")]
-    Option {
-        option: &'static str,
-        value: String,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
-    /// There are no reduced data.
-    #[error("{0}: has no reduced data to draw; run `stickslip reduce {0}` first", shown(directory))]
-    NotReduced { directory: PathBuf },
-    /// The reduced data cannot be read.
-    #[error("{0}; if it is missing or damaged, reduce the tables again")]
-    Reduced(#[from] DatasetError),
-    /// A figure cannot be put in its place.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
+#[error("{0}")]
+pub struct BadOption(String);
+
+impl BadOption {
+    fn new(option: &str, value: &str, problem: &str) -> Self {
+        Self(format!("--{option} {value}: {problem}"))
+    }
 }

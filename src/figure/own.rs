@@ -1,6 +1,6 @@
 //! Figures of one's own: any column of the sets against any other, with error bars where there is an interval.
 
-use super::FigureError;
+use super::BadOption;
 use super::axis::{Axis, bounds, logarithmic_bounds};
 use super::frame::{Frame, LEFT, Layout, RIGHT};
 use super::hues::Hues;
@@ -63,7 +63,7 @@ struct Asked<'a> {
 }
 
 /// Draws a dot for each set; sets that differ in a parameter on the x axis alone are joined by a line.
-pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, FigureError> {
+pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, BadOption> {
     let [x, y] = [("x", &figure.x), ("y", &figure.y)].map(|(option, name)| Values::of(rows, option, name));
     let (x, y) = (x?, y?);
     let colour = figure.colour.as_ref().map(|name| Values::of(rows, "colour", name)).transpose()?;
@@ -89,7 +89,7 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     let sets: Vec<usize> = (0..rows.len()).filter(|&set| asked_x.has(set) && asked_y.has(set)).collect();
     if sets.is_empty() {
         let kind = if figure.is_log_x || figure.is_log_y { "no set has a value > 0" } else { "no set has a value" };
-        return Err(asked_y.refuse(format!("{kind} of both {} and {}; nothing can be drawn", figure.x, figure.y)));
+        return Err(asked_y.refuse(&format!("{kind} of both {} and {}; nothing can be drawn", figure.x, figure.y)));
     }
     let (x_axis, y_axis) = (asked_x.axis(&sets)?, asked_y.axis(&sets)?);
     let is_inside = |set: &usize| {
@@ -98,7 +98,7 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     let inside = sets.iter().filter(|set| is_inside(set)).count();
     if inside == 0 {
         return Err(
-            asked_x.refuse(format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len()))
+            asked_x.refuse(&format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len()))
         );
     }
 
@@ -143,14 +143,14 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
 }
 
 impl Asked<'_> {
-    fn refuse(&self, problem: String) -> FigureError {
-        FigureError::Option { option: self.option, value: self.values.column.name.to_string(), problem }
+    fn refuse(&self, problem: &str) -> BadOption {
+        BadOption::new(self.option, &self.values.column.name, problem)
     }
 
-    fn refuse_limits(&self, problem: &str) -> FigureError {
+    fn refuse_limits(&self, problem: &str) -> BadOption {
         let end = |end: Option<f64>| end.map_or_else(String::new, |end| end.to_string());
         let value = format!("{}:{}", end(self.limits.0), end(self.limits.1));
-        FigureError::Option { option: self.limits_option, value, problem: problem.to_owned() }
+        BadOption::new(self.limits_option, &value, problem)
     }
 
     /// Whether a set has a place on the axis.
@@ -159,24 +159,23 @@ impl Asked<'_> {
     }
 
     /// The axis, from one limit or end of the data to the other.
-    fn axis(&self, sets: &[usize]) -> Result<Axis, FigureError> {
+    fn axis(&self, sets: &[usize]) -> Result<Axis, BadOption> {
         const SLACK: f64 = 1e-9;
         let label = self.label.clone().unwrap_or_else(|| self.values.label());
         if self.values.is_worded() {
             let name = &self.values.column.name;
             if self.is_log {
-                return Err(FigureError::Option {
-                    option: "log",
-                    value: self.option.to_owned(),
-                    problem: format!("{name} holds words; a logarithmic axis takes numbers"),
-                });
+                let problem = format!("{name} holds words; a logarithmic axis takes numbers");
+                return Err(BadOption::new("log", self.option, &problem));
             }
             if self.limits != (None, None) {
                 return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
             }
             if self.values.words.len() > MAX_WORDS {
                 let count = self.values.words.len();
-                return Err(self.refuse(format!("has {count} words, and {MAX_WORDS} fit an axis; take another column")));
+                return Err(
+                    self.refuse(&format!("has {count} words, and {MAX_WORDS} fit an axis; take another column"))
+                );
             }
             let short_label = self.label.is_none().then(|| self.values.short_label());
             return Ok(self.values.categories(&label).with_short_label(short_label));
@@ -191,7 +190,7 @@ impl Asked<'_> {
         };
         let values = || sets.iter().flat_map(ends);
         let natural = if self.is_log { logarithmic_bounds(values()) } else { bounds(values()).map(widened) };
-        let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value".to_owned()))?;
+        let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value"))?;
         // Values at a limit are shown, however they are rounded.
         let low = self.limits.0.map_or(low, |end| end - SLACK * end.abs());
         let high = self.limits.1.map_or(high, |end| end + SLACK * end.abs());
@@ -214,21 +213,20 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
 }
 
 /// The colours of a column.
-fn hues(values: &Values) -> Result<Hues, FigureError> {
+fn hues(values: &Values) -> Result<Hues, BadOption> {
     if values.is_worded() && values.words.len() > INKS.len() {
         let problem =
             format!("has {} words, and there are {} colours; take another column", values.words.len(), INKS.len());
-        return Err(FigureError::Option { option: "colour", value: values.column.name.to_string(), problem });
+        return Err(BadOption::new("colour", &values.column.name, &problem));
     }
     let Some(_) = values.numbers.iter().flatten().next() else {
-        let problem = "no set has a value of it".to_owned();
-        return Err(FigureError::Option { option: "colour", value: values.column.name.to_string(), problem });
+        return Err(BadOption::new("colour", &values.column.name, "no set has a value of it"));
     };
     Ok(Hues::of(&values.short_label(), values.numbers.iter().copied().flatten(), |value| values.setting(value)))
 }
 
 /// The sets of each panel and its title.
-fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, FigureError> {
+fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, BadOption> {
     let Some(values) = panels else { return Ok(vec![(String::new(), sets.to_vec())]) };
     let of = |value: f64| sets.iter().copied().filter(|&set| values.numbers[set] == Some(value)).collect::<Vec<_>>();
     let groups: Vec<(String, Vec<usize>)> =
@@ -239,7 +237,7 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
         1..=MAX_PANELS => return Ok(groups),
         count => format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour"),
     };
-    Err(FigureError::Option { option: "panels", value: values.column.name.to_string(), problem })
+    Err(BadOption::new("panels", &values.column.name, &problem))
 }
 
 fn layout(panels: usize, right: f64) -> Layout<'static> {

@@ -1,8 +1,8 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
-use super::FigureError;
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
+use anyhow::{Result, anyhow};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
@@ -62,7 +62,7 @@ impl Picture {
     }
 
     /// The figure in a format.
-    pub fn encoded(&self, format: Format) -> Result<Vec<u8>, FigureError> {
+    pub fn encoded(&self, format: Format) -> Result<Vec<u8>> {
         match format {
             Format::Svg => Ok(self.svg().into_bytes()),
             Format::Png => self.png(),
@@ -88,20 +88,20 @@ impl Picture {
     }
 
     /// The figure as a PDF file of one page.
-    pub fn pdf(&self) -> Result<Vec<u8>, FigureError> {
-        pdf(&self.scene, self.style.points()).map_err(|reason| FigureError::Encoding {
-            figure: self.name.clone(),
-            format: Format::Pdf,
-            reason,
-        })
+    pub fn pdf(&self) -> Result<Vec<u8>> {
+        pdf(&self.scene, self.style.points()).map_err(|reason| self.not_encoded(Format::Pdf, &reason))
     }
 
     /// The figure as a PNG file.
-    pub fn png(&self) -> Result<Vec<u8>, FigureError> {
+    pub fn png(&self) -> Result<Vec<u8>> {
         RasterBackend::new()
             .with_scale(self.style.pixels())
             .render_scene(&self.scene)
-            .map_err(|reason| FigureError::Encoding { figure: self.name.clone(), format: Format::Png, reason })
+            .map_err(|reason| self.not_encoded(Format::Png, &reason))
+    }
+
+    fn not_encoded(&self, format: Format, reason: &str) -> anyhow::Error {
+        anyhow!("figure {}: cannot be turned into {}: {reason}", self.name, format.extension().to_uppercase())
     }
 }
 

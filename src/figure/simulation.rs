@@ -1,7 +1,6 @@
 //! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of detached
 //! contacts (Fig. 4b, d) with the onsets of slips.
 
-use super::FigureError;
 use super::axis::{Axis, bounds};
 use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
@@ -10,6 +9,7 @@ use super::picture::{Picture, Sheet, Stroke, snapped};
 use super::sets::{MICROMETRES, common};
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
+use anyhow::{Result, anyhow};
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
@@ -55,10 +55,10 @@ pub struct Simulation<'a> {
 }
 
 /// Draws what is given: the shear force against time, the map, or the map under the force; above them the modulation.
-pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture, FigureError> {
+pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
     let Simulation { parameters, trace, map, onsets } = *shown;
     let look = &look.with_note(&format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed));
-    let empty = |what| FigureError::Empty { figure: NAME, what };
+    let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
     if map.is_some_and(|map| map.times.len() < 2 || map.fractions.len() != map.times.len() * map.blocks) {
         return Err(empty("fractions for every instant and block"));
     }

@@ -1,7 +1,7 @@
 //! Columns of the sets as numbers for axes, colours and panels: words become places in their order. Beside those of the
 //! table there is the frequency, which follows from a parameter.
 
-use super::FigureError;
+use super::BadOption;
 use super::axis::Axis;
 use super::sets::{ETA, FREQUENCY, symbol_of, three_digits};
 use crate::model::Symbol;
@@ -44,7 +44,7 @@ pub fn columns() -> Vec<Column> {
 
 impl Values {
     /// The values of the column with a name that an option gives.
-    pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, FigureError> {
+    pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
         let columns = columns();
         let index = |name: &str| columns.iter().position(|column| column.name == name);
         let column = index(name).ok_or_else(|| unknown(option, name, &columns))?;
@@ -162,13 +162,13 @@ fn number_cells(row: &SetRow) -> Vec<Option<Given>> {
     cells
 }
 
-fn unknown(option: &'static str, name: &str, columns: &[Column]) -> FigureError {
+fn unknown(option: &'static str, name: &str, columns: &[Column]) -> BadOption {
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
     let problem = match nearest(name, &names) {
         Some(near) => format!("no such column; did you mean {near}? `stickslip plot --list` shows all"),
         None => format!("no such column; there are {}", names.join(", ")),
     };
-    FigureError::Option { option, value: name.to_owned(), problem }
+    BadOption::new(option, name, &problem)
 }
 
 fn capitalised(text: &str) -> String {

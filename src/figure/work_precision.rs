@@ -1,12 +1,12 @@
 //! Work against precision: what an error costs with each method, a panel for each kind of error; all logarithmic. A
 //! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
-use super::FigureError;
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::{Frame, Layout, RIGHT};
 use super::legend::{Mark, entry};
 use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
 use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
+use anyhow::{Result, anyhow};
 
 const NAME: &str = "work-precision";
 const WIDTH: f64 = 250.0;
@@ -68,8 +68,8 @@ impl ErrorPanel {
 
 /// Draws panels side by side, one for each kind of error, with a line per method and drive through its settings in the
 /// given order; values that are not > 0 are left out.
-pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture, FigureError> {
-    let empty = || FigureError::Empty { figure: NAME, what: "errors and costs" };
+pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> Result<Picture> {
+    let empty = || anyhow!("figure {NAME}: there are no errors and costs to draw");
     let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
     let columns = panels.len();

@@ -74,6 +74,14 @@ impl From<SetRow> for SetSummary {
     }
 }
 
+/// An error of a table, with what to do.
+pub fn advise(advice: &'static str) -> impl Fn(DatasetError) -> anyhow::Error {
+    move |error| {
+        let advised = format!("{error}; {advice}");
+        anyhow::Error::new(error).context(advised)
+    }
+}
+
 /// The rows of a reduced table, such as [`Point`](super::Point).
 pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, DatasetError> {
     let batches = Dataset::new(layout.storage, vec![layout.reduced_file(R::NAME)]).rows();

@@ -8,13 +8,13 @@ use super::histogram::{HistogramBin, histogram};
 use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
+use crate::results::Results;
 use crate::results::commit::{Commit, alone};
 use crate::results::tables::JOBS;
-use crate::results::{Results, ResultsError};
 use crate::table::columns::Table;
-use crate::table::file::{DatasetError, TableWriter};
+use crate::table::file::TableWriter;
 use crate::table::shown::shown;
-use crate::table::storage::StorageError;
+use anyhow::{Result, bail};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,24 +24,12 @@ pub const WRITER: &str = "reduce";
 /// Version of [`ReductionSummary`] as JSON.
 pub const SUMMARY_FORMAT: u32 = 1;
 
-/// A directory that cannot be reduced.
+/// There is nothing to reduce.
 #[derive(Debug, thiserror::Error)]
-pub enum ReduceError {
-    /// A table cannot be read, or reduced data cannot be written.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// A folder or file cannot be prepared or put in its place.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// The directory is not the one that was opened.
-    #[error(transparent)]
-    Results(#[from] ResultsError),
-    /// There is nothing to reduce.
-    #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", shown(tables))]
-    NoJobs {
-        /// Folder of the jobs table.
-        tables: PathBuf,
-    },
+#[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", shown(tables))]
+pub struct NoJobs {
+    /// Folder of the jobs table.
+    tables: PathBuf,
 }
 
 /// What a reduction found, in brief.
@@ -64,11 +52,11 @@ pub struct ReductionSummary {
 /// Reduces the tables of a results directory to `reduced/{sets,histograms,backbone,points}.parquet`, over those
 /// of an earlier reduction, with the sweep that was asked for last in their footers.
 /// On an error, earlier reduced files stay whole.
-pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary, ReduceError> {
+pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary> {
     reduce_by(results, MAX_SLIPS)
 }
 
-fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, ReduceError> {
+fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> {
     let layout = results.layout();
     let _alone = alone(layout, WRITER)?;
     let (commit, summary) = layout.read_tables(|| stage(results, max_slips))??;
@@ -83,12 +71,12 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary, 
 }
 
 /// Reads the tables, and stages what they are reduced to.
-fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary), ReduceError> {
+fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
     let gathering = Gathering::of_jobs(layout, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
-        return Err(ReduceError::NoJobs { tables: layout.table(JOBS) });
+        bail!(NoJobs { tables: layout.table(JOBS) });
     }
     let total = all_jobs.iter().map(|set| set.slips).fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {

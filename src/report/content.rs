@@ -1,16 +1,18 @@
 //! All that a page shows.
 
-use super::ReportError;
+use super::ADVICE;
 use super::slips::Slips;
 use super::tables::{Census, Columns, Sets, backbone};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
+use crate::reduce::advise;
 use crate::results::Results;
 use crate::run::{RunEvent, Status, status_with};
 use crate::sweep::PLAN_VERSION;
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
+use anyhow::Result;
 use serde::Serialize;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -91,14 +93,16 @@ struct Run {
 
 impl Content {
     /// Reads a directory with reduced data.
-    pub(super) fn read(results: &Results<'_>, refresh: Option<Duration>) -> Result<(Self, Vec<u8>), ReportError> {
+    pub(super) fn read(results: &Results<'_>, refresh: Option<Duration>) -> Result<(Self, Vec<u8>)> {
         let layout = results.layout();
         let sweep = results.sweep();
         let (cost, runs) = logs(results)?;
-        let census = Census::read(layout)?;
+        let damaged = advise(ADVICE);
+        let census = Census::read(layout).map_err(&damaged)?;
         let sets_every = census.spacing();
-        let sets = Sets::read(layout, sweep, sets_every)?;
-        let slips = layout.read_tables(|| Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)))??;
+        let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
+        let slips_every = census.slips.div_ceil(sets_every);
+        let slips = layout.read_tables(|| Slips::read(results, &sets.places, slips_every))?.map_err(&damaged)?;
         let live = refresh.map(|refresh| Live {
             refresh: refresh.as_secs_f64(),
             written: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64()),
@@ -119,7 +123,7 @@ impl Content {
             sets_every,
             sets,
             slips,
-            backbone: backbone(layout)?,
+            backbone: backbone(layout).map_err(&damaged)?,
             curves: curves(),
             cost,
             runs,

@@ -15,49 +15,33 @@ mod page;
 mod slips;
 mod tables;
 
-use crate::reduce::{ReduceError, SetRow, WRITER, reduce};
+use crate::reduce::{SetRow, WRITER, reduce};
+use crate::results::Results;
 use crate::results::commit::{Commit, alone};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
-use crate::results::{Results, ResultsError};
 use crate::table::columns::Table;
-use crate::table::file::DatasetError;
 use crate::table::storage::StorageError;
+use anyhow::{Context, Result};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A report that cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The directory cannot be reduced.
-    #[error(transparent)]
-    Reduce(#[from] ReduceError),
-    /// A table cannot be read.
-    #[error("{0}; `stickslip verify` says what to do about damage")]
-    Dataset(#[from] DatasetError),
-    /// The directory cannot be looked through.
-    #[error(transparent)]
-    Results(#[from] ResultsError),
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// The content cannot be put into the page.
-    #[error("the report cannot be encoded: {0}")]
-    Encoding(#[from] page::EncodingError),
-}
+/// What to do about a table that cannot be read.
+const ADVICE: &str = "`stickslip verify` says what to do about damage";
 
 /// The report of a directory as HTML. Reduces the tables first if they are newer than the reduced data.
 ///
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
-pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String, ReportError> {
+pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> {
     if !is_reduced(results.layout())? {
         reduce(results)?;
     }
     let (content, slips) = content::Content::read(results, refresh)?;
-    Ok(page::html(&content, &slips)?)
+    page::html(&content, &slips).context("the report cannot be encoded")
 }
 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.
-pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf, ReportError> {
+pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf> {
     let (layout, page) = (results.layout(), page(results, refresh)?);
     let _alone = alone(layout, WRITER)?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;

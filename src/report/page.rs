@@ -1,6 +1,7 @@
 //! The page: its files put together, with the content compressed, so that no text of it can be taken for HTML.
 
 use super::content::Content;
+use anyhow::Result;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
@@ -23,18 +24,8 @@ const SCRIPTS: [&str; 9] = [
     include_str!("main.js"),
 ];
 
-/// Content that cannot be put into a page.
-#[derive(Debug, thiserror::Error)]
-pub enum EncodingError {
-    /// It has no form as JSON.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    #[error(transparent)]
-    Compression(#[from] io::Error),
-}
-
 /// The page of this content and these bytes of its slips.
-pub(super) fn html(content: &Content, slips: &[u8]) -> Result<String, EncodingError> {
+pub(super) fn html(content: &Content, slips: &[u8]) -> Result<String> {
     let data = data(&serde_json::to_vec(content)?, slips)?;
     let script = format!("\"use strict\";\n{}", SCRIPTS.concat());
     // Scripts and styles other than these do not count, and nothing is loaded.

@@ -6,7 +6,7 @@ use super::faults::{files_below, results, small_sweep, small_sweep_in_rounds};
 use super::host::Host;
 use super::schedule::{Schedule, random_index};
 use super::*;
-use crate::reduce::{ReduceError, reduce};
+use crate::reduce::{NoJobs, reduce};
 use crate::results::commit::tests::KNOWN_NUMBER;
 use crate::results::tables::Names;
 use crate::results::verify::{Remedy, Verification};
@@ -193,7 +193,7 @@ fn is_allowed(error: &anyhow::Error, process: Process, processes: &[Process], th
         let is_busy = error.kind == ErrorKind::Busy && (!is_run(&process) || processes.iter().any(is_change));
         return is_busy || (error.kind == ErrorKind::Refused && there == There::Nothing && !is_run(&process));
     }
-    matches!(error.downcast_ref::<ReduceError>(), Some(ReduceError::NoJobs { .. }))
+    error.is::<NoJobs>()
 }
 
 /// Goes through one schedule; who did what.
