@@ -36,8 +36,6 @@ impl Reference {
 }
 
 impl Observer for Reference {
-    fn advance(&mut self, _segment: &Segment<'_>) {}
-
     fn contact(&mut self, event: &ContactEvent) {
         if event.change == Change::Break && self.times.len() < self.wanted {
             self.order.insert(key(event), self.times.len());

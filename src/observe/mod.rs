@@ -6,16 +6,16 @@ mod drops;
 mod measure;
 mod phase;
 mod recording;
+mod records;
 mod regime;
 mod rupture;
-mod sample;
 mod slip;
 
 pub use drops::Drops;
 pub use measure::{Measurements, measure};
 pub use phase::{OVERSHOOT, phase};
 pub use recording::{Recording, RecordingKey};
+pub use records::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
 pub use regime::{Averages, Regime};
 pub use rupture::{Rupture, advance_speed};
-pub use sample::{AttachedMap, ContactLog, ContactRow, MapRow, Observers, Profile, ProfileRow, Trace, TraceRow};
 pub use slip::{Energies, Modulation, Precursor, Slip, SlipObserver};

@@ -251,10 +251,6 @@ mod tests {
             self.events.push(*event);
         }
 
-        fn is_satisfied(&self) -> bool {
-            false
-        }
-
         fn end(&mut self, _: f64, displacement: &[f64]) {
             self.displacement = displacement.to_vec();
         }

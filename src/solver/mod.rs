@@ -112,15 +112,13 @@ pub const TOLERANCES: RangeInclusive<f64> = 1e-12..=1e-2;
 /// Follows a simulation and says when it has seen enough.
 pub trait Observer {
     /// Time passes without a contact event. Segments come in order and without gaps.
-    fn advance(&mut self, segment: &Segment<'_>);
+    fn advance(&mut self, _segment: &Segment<'_>) {}
 
     /// A contact breaks or attaches, at the end of the segment before.
-    fn contact(&mut self, event: &ContactEvent);
+    fn contact(&mut self, _event: &ContactEvent) {}
 
     /// What is spent up to the break that comes next, if a ledger is kept.
-    fn spent(&mut self, spent: Spent) {
-        let _ = spent;
-    }
+    fn spent(&mut self, _spent: Spent) {}
 
     /// Whether it wants to be told of attachments. Those that do not need none of the segments that end there.
     fn follows_attachments(&self) -> bool {
@@ -128,13 +126,13 @@ pub trait Observer {
     }
 
     /// Whether the simulation may end. Asked after each segment and its events.
-    fn is_satisfied(&self) -> bool;
+    fn is_satisfied(&self) -> bool {
+        false
+    }
 
     /// The simulation has ended, at a time in s, with the blocks at these displacements in m. Called once, and only if
     /// nothing went wrong.
-    fn end(&mut self, time: f64, displacement: &[f64]) {
-        let _ = (time, displacement);
-    }
+    fn end(&mut self, _time: f64, _displacement: &[f64]) {}
 }
 
 /// Bounds on a simulation, whatever its observer wants.

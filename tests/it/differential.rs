@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use stickslip::model::equation::largest_frequency;
 use stickslip::model::{BreakOn, Change, ContactEvent, Parameters};
 use stickslip::observe::{Observers, Recording, Slip, SlipObserver};
-use stickslip::solver::{Limits, Observer, Resolve, Segment, Solver, simulate};
+use stickslip::solver::{Limits, Observer, Resolve, Solver, simulate};
 
 /// Block, contact and generation.
 type Life = (usize, usize, u32);
@@ -43,8 +43,6 @@ struct Breaks {
 }
 
 impl Observer for Breaks {
-    fn advance(&mut self, _segment: &Segment<'_>) {}
-
     fn contact(&mut self, event: &ContactEvent) {
         if event.change == Change::Break {
             let life = (event.block, event.contact, event.generation);

@@ -2,7 +2,7 @@
 
 use stickslip::model::equation::{ContactSums, acceleration};
 use stickslip::model::{Change, ContactEvent, Drive, Parameters};
-use stickslip::solver::{Limits, Observer, Segment, Solver, simulate};
+use stickslip::solver::{Limits, Observer, Solver, simulate};
 
 /// Keeps the stiffness of the attached contacts of each block at the start, the number of breaks, and the displacements at
 /// the end.
@@ -14,15 +14,9 @@ struct Contacts {
 }
 
 impl Observer for Contacts {
-    fn advance(&mut self, _segment: &Segment<'_>) {}
-
     fn contact(&mut self, event: &ContactEvent) {
         self.breaks += usize::from(event.change == Change::Break);
         self.sums[event.block].stiffness += event.stiffness;
-    }
-
-    fn is_satisfied(&self) -> bool {
-        false
     }
 
     fn end(&mut self, _time: f64, displacement: &[f64]) {

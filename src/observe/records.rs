@@ -111,10 +111,6 @@ impl Observer for Trace {
             Change::Break => self.attached -= 1,
         }
     }
-
-    fn is_satisfied(&self) -> bool {
-        false
-    }
 }
 
 columns! {
@@ -166,10 +162,6 @@ impl Observer for AttachedMap {
             Change::Break => self.attached[event.block] -= 1,
         }
     }
-
-    fn is_satisfied(&self) -> bool {
-        false
-    }
 }
 
 columns! {
@@ -199,14 +191,6 @@ impl Profile {
 }
 
 impl Observer for Profile {
-    fn advance(&mut self, _segment: &Segment<'_>) {}
-
-    fn contact(&mut self, _event: &ContactEvent) {}
-
-    fn is_satisfied(&self) -> bool {
-        false
-    }
-
     fn end(&mut self, time: f64, displacement: &[f64]) {
         self.rows = (1..)
             .zip(displacement)
@@ -290,13 +274,7 @@ pub struct ContactLog {
 }
 
 impl Observer for ContactLog {
-    fn advance(&mut self, _segment: &Segment<'_>) {}
-
     fn contact(&mut self, event: &ContactEvent) {
         self.events.push(*event);
-    }
-
-    fn is_satisfied(&self) -> bool {
-        false
     }
 }
