@@ -9,7 +9,7 @@ import numpy
 import pandas
 import pytest
 from conftest import ROOT
-from validation import beyond, document, friction, intervals, kinematics, phase
+from validation import beyond, document, friction, intervals, kinematics, phase, scaling
 
 import stickslip as module
 from stickslip import statistics
@@ -86,6 +86,12 @@ def test_start_up_ends_with_the_last_slip_that_differs_from_the_later_ones():
     p = beyond.startup(slips)
     assert list(p.index[p < 0.05]) == [1, 2, 3]
     assert (beyond.startup(slips[slips["slip"] < 20]) == 1).all()
+
+
+def test_breaks_grow_as_the_contacts_of_the_slider():
+    small, large = (scaling.per_slip(20_000, N=blocks, Ns=20, tolerance=1e-3) for blocks in (35, 70))
+    assert 1.5 < large["breaks"] / small["breaks"] < 2.5
+    assert 20 * 70 < large["breaks"] < 20 * 20 * 70
 
 
 def test_curves_are_below_a_level_from_their_last_crossing_on():
