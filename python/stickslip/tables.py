@@ -38,7 +38,7 @@ class Sweep:
         return slips.assign(frequency=(1 / slips["T"]).round(6), tau_over_T=slips["interval"] / slips["T"])
 
     def _checked(self, name: str, **options: bool) -> Table:
-        if not (self.directory / "tables" / name).exists():
+        if not (self.directory / "tables" / "jobs").exists():
             raise MissingResult(f"{self.directory}: run `stickslip run sweeps/{self.directory.name}.toml`")
         return getattr(Results(self.directory), name)(**options)
 
