@@ -10,7 +10,6 @@ from .replay import Replay, report
 
 
 def main() -> int:
-    """Replays the log that the command line names."""
     parser = contact_log.parser("oracle", description)
     parser.add_argument("--breaks", type=int, default=sys.maxsize, help="number of breaks to replay (default: all)")
     parser.add_argument("--follow", action="store_true", help="continue from the logged times of breaks (see above)")

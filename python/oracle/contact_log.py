@@ -61,7 +61,6 @@ class Parameters:
 
     @property
     def contacts(self) -> int:
-        """Number of contacts at all blocks."""
         return self.N * self.Ns
 
     @property
@@ -120,7 +119,6 @@ class ContactLog:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Reads the file of a log."""
         names = [field.name for field in dataclasses.fields(cls) if field.name != "is_break"]
         table = pyarrow.parquet.read_table(path)
         columns = {name: table.column(name).to_numpy() for name in names}
@@ -128,11 +126,9 @@ class ContactLog:
         return cls(**columns, is_break=np.array(table.column("event").to_pylist()) == "break")
 
     def __len__(self) -> int:
-        """Number of events."""
         return len(self.time)
 
     def place(self, row: int) -> tuple[int, int]:
-        """Block and contact of a row."""
         return int(self.block[row]), int(self.contact[row])
 
     def place_text(self, row: int) -> str:

@@ -37,7 +37,6 @@ class Contacts:
         )
 
     def detach(self, place: tuple[int, int]) -> None:
-        """Breaks a contact."""
         self.attached[place] = self.watched[place] = False
 
     def block_stiffness(self) -> np.ndarray:
@@ -158,7 +157,6 @@ class Motion:
         return ((y + drift + cosine) @ shape)[0], ((rate + self.drift_rate + cosine_rate) @ shape)[0]
 
     def bounds(self, tau: np.ndarray) -> Bounds:
-        """Motion and bounds at some times."""
         y, rate, second = self.free_motion(tau)
         drift, cosine, cosine_rate = self.driven_motion(tau)
         shape, magnitude = self.shape.T, np.abs(self.shape.T)

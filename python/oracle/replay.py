@@ -14,8 +14,6 @@ MAX_LATENESS = 10.0
 
 
 class Replay:
-    """The replay of one log."""
-
     def __init__(
         self, parameters: Parameters, log: ContactLog, max_breaks: int, slack: float, follow: bool = False
     ) -> None:
@@ -103,7 +101,6 @@ class Replay:
         return np.nan, 1.0 if upper - x < x - lower else -1.0
 
     def judge(self, row: int, tau: float) -> None:
-        """Compares a predicted break with the log."""
         place = self.log.place(row)
         moved, _ = self.motion.at(self.log.time[row] - self.time, place[0])
         x = self.displacement[place[0]] + moved
@@ -128,7 +125,6 @@ class Replay:
             self.missed.append((self.time + found.time, found.block, int(contact)))
 
     def moved(self, tau: float) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement and velocity after `tau` s."""
         displacement, velocity = self.motion.at(tau)
         return self.displacement + displacement, velocity
 

@@ -147,7 +147,6 @@ def break_times(integration: Integration, replay: Replay, wanted: int) -> np.nda
 
 
 def main() -> int:
-    """Integrates the log that the command line names."""
     parser = contact_log.parser("oracle.scipy_check", __doc__)
     parser.add_argument("--breaks", type=int, default=40, help="number of breaks to compare (%(default)d)")
     parser.add_argument("--worst", type=float, default=1e-8, help="limit on the time differences, in s (%(default)g)")

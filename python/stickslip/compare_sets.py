@@ -27,7 +27,6 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
 
 
 def main() -> None:
-    """The command line."""
     parser = argparse.ArgumentParser(
         prog="python -m stickslip.compare_sets",
         description=__doc__,

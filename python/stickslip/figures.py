@@ -199,7 +199,6 @@ def _in_units_of_pi(axes: "Axes") -> None:
 
 
 def _named(one: "pandas.Series") -> str:
-    """The modulation of a set."""
     if not one["Delta"] > 0:
         return r"$\Delta$ = 0"
     return rf"$\Delta$ = {one['Delta'] * 1e6:.3g} µm, $1/T$ = {1 / one['T']:.4g} Hz"

@@ -63,7 +63,6 @@ class Estimate:
         return self.low > 0 or self.high < 0
 
     def scaled(self, factor: float) -> "Estimate":
-        """The estimate in another unit."""
         return Estimate(factor * self.value, factor * self.low, factor * self.high, self.units)
 
     def text(self, digits: int = 3) -> str:

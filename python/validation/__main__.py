@@ -38,7 +38,6 @@ QUESTIONS = (
 
 
 def document(results: Path) -> str:
-    """The document in Markdown."""
     figures = {title: [section(results) for section in sections] for title, sections in STATEMENTS.items()}
     questions = [section(results) for section in QUESTIONS]
     statements = sorted(sum(figures.values(), []), key=lambda section: float(section.number()))
@@ -63,7 +62,6 @@ def document(results: Path) -> str:
 
 
 def main() -> int:
-    """The command line."""
     parser = argparse.ArgumentParser(prog="python -m validation", description=__doc__)
     parser.add_argument(
         "results", nargs="?", type=Path, default=Path("results"), help="folder of all results (%(default)s)"

@@ -23,7 +23,6 @@ WHOLE_WINDOW = 1.014
 
 
 def drag(results: Path) -> Section:
-    """Whether intervals follow a period that changes slowly, and whether they remember where it came from."""
     section = Section(
         "Drag: T changed slowly within one run",
         "`sweeps/drag.toml` (Δ = 1 µm) and `sweeps/drag-strong.toml` (3 µm)",
@@ -55,7 +54,6 @@ def drag(results: Path) -> Section:
 
 
 def locking_map(results: Path) -> Section:
-    """Where slips lock, over period and amplitude."""
     title = "Arnold tongues: locking over period and amplitude"
     section = Section(title, "`sweeps/locking-map.toml`", ("locking-map",))
     sweep = Sweep(results / "locking-map")
@@ -119,7 +117,6 @@ def median_periods(slips: pandas.DataFrame) -> tuple[pandas.Series, pandas.Serie
 
 
 def staircase(results: Path) -> Section:
-    """How wide the steps of τ = nT are."""
     title = "Devil's staircase: intervals in periods against the period"
     section = Section(title, "`sweeps/staircase.toml`", ("staircase",))
     slips = Sweep(results / "staircase").slips().dropna(subset="interval")
@@ -138,7 +135,6 @@ def staircase(results: Path) -> Section:
 
 
 def dependences(results: Path) -> Section:
-    """How interval and locking depend on the parameters of the interface."""
     title = "Locking against blocks, contacts and disorder"
     section = Section(
         title,
@@ -173,7 +169,6 @@ def dependences(results: Path) -> Section:
 
 
 def choices(results: Path) -> Section:
-    """What would change if the model's choices were others."""
     source = "`sweeps/choices.toml`, `sweeps/startup.toml`, `sweeps/fig3.toml`"
     section = Section("What the model's choices change", source, ("choices",))
     sweep = Sweep(results / "choices")
@@ -238,7 +233,6 @@ def startup(slips: pandas.DataFrame, numbers: int = 20) -> pandas.Series:
 
 
 def energies(results: Path) -> Section:
-    """Where the work of the drive goes."""
     section = Section("Where the work of the drive goes", "`sweeps/energies.toml`, Δ = 0 and 1 µm")
     slips = Sweep(results / "energies").slips()
     for period, mine in slips.groupby("T", dropna=False):

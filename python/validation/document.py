@@ -58,15 +58,12 @@ class Section:
         return {"statement": self.title, "verdict": verdict.word, "why": verdict.reason}
 
     def check(self, claim: str, criterion: str, measured: str, *agrees: bool) -> None:
-        """Adds a check."""
         self.checks.append(Check(claim, criterion, measured, tuple(map(bool, agrees))))
 
     def remark(self, *sentences: str) -> None:
-        """Adds a paragraph."""
         self.remarks.append(paragraph(*sentences))
 
     def item(self, *sentences: str) -> None:
-        """Adds an item of a list."""
         self.remarks.append("- " + textwrap.indent(paragraph(*sentences, width=WIDTH - 2), "  ").lstrip())
 
     def number(self) -> str:
@@ -74,7 +71,6 @@ class Section:
         return next(iter(re.findall(r"^\d+\. ", self.title)), "")
 
     def markdown(self) -> str:
-        """The section alone."""
         return figure(self.title, [self])
 
 

@@ -21,7 +21,6 @@ FRONT_STEPS, FRONT_TIME = 3, 0.05
 
 
 def friction(results: Path) -> Section:
-    """Statement 6."""
     section = Section(
         "6. Small perturbations do not change the mean friction",
         "`sweeps/friction.toml` and `sweeps/friction-drives.toml`",
@@ -94,7 +93,6 @@ def first_below(curve: list[tuple[float, float]], level: float) -> float:
 
 
 def slow_fronts(results: Path) -> Section:
-    """Statement 7."""
     section = Section("7. Modulation removes the slow fronts", "`sweeps/fronts.toml`", ("fig4d",))
     sweep = Sweep(results / "fronts")
     of_slip = ["job_id", "slip"]
@@ -186,7 +184,6 @@ def arrest(section: Section, small: pandas.DataFrame) -> None:
 
 
 def loading_profile(results: Path) -> Section:
-    """Statement 8."""
     section = Section(
         "8. Eq. 1: exponential decay from the trailing edge", "`sweeps/eq1.toml` (before the first break)"
     )
@@ -209,7 +206,6 @@ def loading_profile(results: Path) -> Section:
 
 
 def edge(results: Path) -> Section:
-    """Statement 12."""
     section = Section("12. The modulation is amplified near the loaded edge", "`sweeps/fig2.toml`")
     file = results / "eq1" / "profile.parquet"
     displacement = read(file, "scripts/reproduce eq1").sort_values("block")["displacement"]

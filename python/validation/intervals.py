@@ -32,7 +32,6 @@ def without_modulation(slips: pandas.DataFrame) -> pandas.DataFrame:
 
 
 def of_same_jobs(rows: pandas.DataFrame, slips: pandas.DataFrame) -> pandas.DataFrame:
-    """The rows of the jobs that some slips are of."""
     return rows[rows["job_id"].isin(slips["job_id"])]
 
 
@@ -58,7 +57,6 @@ def count_by_slip(slips: pandas.DataFrame, precursors: pandas.DataFrame, size: i
 
 
 def stick_slip(results: Path) -> Section:
-    """Statement 1."""
     section = Section("1. Stick-slip is regular but stochastic", "`sweeps/fig2.toml`", ("fig2",))
     sweep = Sweep(results / "fig2")
     slips = without_modulation(sweep.slips())
@@ -118,7 +116,6 @@ def stick_slip(results: Path) -> Section:
 
 
 def identical_contacts(results: Path) -> Section:
-    """Statement 2."""
     section = Section("2. Identical contacts keep the distribution broad", "`sweeps/fig2.toml`")
     slips = Sweep(results / "fig2").slips()
     identical, disordered = (
@@ -135,7 +132,6 @@ def identical_contacts(results: Path) -> Section:
 
 
 def integer_multiples(results: Path) -> Section:
-    """Statement 3."""
     section = Section("3. Intervals are integer multiples of the period", "`sweeps/fig2.toml`")
     sweep = Sweep(results / "fig2")
     slips, precursors = sweep.slips(), sweep.table("precursors")
@@ -174,7 +170,6 @@ def index_of(column: str, rows: pandas.DataFrame, frequency: float) -> Estimate:
 
 
 def at_frequencies(found: list[Estimate], digits: int = 3, unit: str = "") -> str:
-    """One estimate for each frequency of FREQUENCIES."""
     return ", ".join(f"{one.text(digits)}{unit} at {f} Hz" for one, f in zip(found, FREQUENCIES, strict=True))
 
 
@@ -187,7 +182,6 @@ def lead_times(sweep: Sweep) -> pandas.DataFrame:
 
 
 def many_periods(results: Path) -> Section:
-    """Statement 4."""
     section = Section("4. τ = nT over a broad range of loading", "`sweeps/fig3.toml`", ("fig3-tau-T",))
     sweep = Sweep(results / "fig3")
     slips = sweep.slips().merge(sweep.reduced("sets")[["set_id", "locked"]], on="set_id")
@@ -226,7 +220,6 @@ def beyond_text(slips: pandas.DataFrame) -> str:
 
 
 def stress_drops(results: Path) -> Section:
-    """Statement 9."""
     section = Section("9. Stress drops synchronise in part", "`sweeps/fig2.toml`")
     slips = Sweep(results / "fig2").slips()
     still = without_modulation(slips).dropna(subset="interval")
@@ -272,7 +265,6 @@ def stress_drops(results: Path) -> Section:
 
 
 def stochasticity(results: Path) -> Section:
-    """Identical contacts on sliders of different stiffness."""
     section = Section(
         "10. Stochasticity needs many more than √(K_int/K_s) blocks",
         "`sweeps/stochasticity.toml` (identical contacts, N = 35 to 140, K = 3e7 to 1e10 N/m)",

@@ -26,7 +26,6 @@ FAST = 9e-5
 
 
 def phase(results: Path) -> Section:
-    """Statement 5."""
     section = Section("5. The phase against η, above η = 1", "`sweeps/fig3.toml`", ("fig3-phase",))
     sweep = Sweep(results / "fig3")
     slips = sweep.slips().dropna(subset="phase")
@@ -137,7 +136,6 @@ def envelope(slips: pandas.DataFrame) -> tuple[str, str, str, bool]:
 
 
 def below_one(results: Path) -> Section:
-    """Statement 11."""
     section = Section("11. No phase-locking below η ≃ 1", "`sweeps/fig3.toml`")
     sweep = Sweep(results / "fig3")
     sets, slips = sweep.reduced("sets"), sweep.slips().dropna(subset="phase")
@@ -184,7 +182,6 @@ def below_one(results: Path) -> Section:
 
 
 def stiff_drive(results: Path) -> Section:
-    """The phase against η with the experiment's stiffness of the drive."""
     section = Section(
         "The experiment's drive: K_d = 1e9 N/m",
         "`sweeps/stiff-drive.toml`, K_d Δ = 20 to 100 N",

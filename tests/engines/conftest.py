@@ -12,7 +12,6 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def program():
-    """The built program."""
     target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
     program = Path(os.environ.get("STICKSLIP", target / "release" / "stickslip")).resolve()
     if not program.exists():

@@ -24,7 +24,6 @@ class HyperQueue:
         self.workers = {}
 
     def start_worker(self, host, cores):
-        """Starts a worker on a host of that name."""
         log = (self.folder / f"{host}.log").open("wb")
         command = [sys.executable, __file__, self.folder / "server", self.folder / host, cores]
         self.workers[host] = Host(host, command, log)
@@ -32,7 +31,6 @@ class HyperQueue:
         wait_until(file.exists, 20, f"worker {host} starts")
 
     def kill_worker(self, host):
-        """Kills a worker and its tasks."""
         self.workers.pop(host).kill()
 
     def submit(self, job: Job):
@@ -42,7 +40,6 @@ class HyperQueue:
         return lambda: client.wait_for_jobs([submitted])
 
     def stop(self):
-        """Ends workers and server."""
         for host in list(self.workers):
             self.kill_worker(host)
         self.cluster.stop()

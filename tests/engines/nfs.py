@@ -15,8 +15,6 @@ HOSTS = ("h1", "h2", "h3")
 
 @dataclass
 class Command:
-    """A command that runs on a host of the guest."""
-
     files: Path
 
     def status(self):
@@ -79,6 +77,5 @@ class Guest:
         return self.folder / name
 
     def power_off(self):
-        """Ends the guest."""
         self.process.kill()
         self.process.wait()

@@ -49,7 +49,6 @@ def prepare_screen(screen: str, folder: Path, slips: int) -> str:
 
 
 def done_parts(results: Path) -> int:
-    """The number of parts that are done."""
     return len(list(results.glob("tables/jobs/part-*")))
 
 

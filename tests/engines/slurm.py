@@ -85,12 +85,10 @@ class Slurm:
         return done.stdout
 
     def start_node(self, node):
-        """Starts the daemon of a node on a host of that name."""
         log = (self.folder / f"{node}.out").open("ab")
         self.nodes[node] = Host(node, ["slurmd", "-D", "-N", node], log, env=self.environment, cwd=self.folder)
 
     def kill_node(self, node):
-        """Kills all processes of a node."""
         self.nodes.pop(node).kill()
 
     def is_idle(self):

@@ -40,7 +40,6 @@ def results_in(directory):
 
 @pytest.fixture(scope="session")
 def program():
-    """The built program."""
     target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
     program = Path(os.environ.get("STICKSLIP", target / "release" / "stickslip"))
     if not program.exists():
@@ -62,7 +61,6 @@ def stickslip(program):
 
 @pytest.fixture(scope="session")
 def results(stickslip, tmp_path_factory):
-    """The results folder of the sweep."""
     folder = tmp_path_factory.mktemp("sweep")
     sweep, results = folder / "tiny.toml", folder / "results"
     for seeds in (3, 5):

@@ -40,12 +40,10 @@ LONG = {"name": "long", "axes": {"seed": {"count": 5000}}, "record": {"slips": 2
 
 @pytest.fixture(scope="module")
 def opened(results):
-    """The results of a sweep that the program has run."""
     return module.open(results)
 
 
 def bare(table):
-    """An Arrow table without the metadata of a file."""
     return pa.table(table).replace_schema_metadata(None)
 
 

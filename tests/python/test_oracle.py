@@ -19,7 +19,6 @@ def log(stickslip, tmp_path_factory):
 
 
 def run(module, *arguments):
-    """The command ``python -m MODULE``."""
     command = [sys.executable, "-m", module, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
