@@ -8,13 +8,21 @@ use std::num::NonZeroUsize;
 /// `HQ_CPUS` is not among them: it lists the cores by their ids.
 const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
 
-/// A variable that holds no number of threads.
+/// Most threads of one process, more than nearly any machine has cores. Starting so many takes seconds, and four times as
+/// many minutes, in which no signal stops a run.
+pub const MAX_THREADS: usize = 1024;
+
+/// What is no number of threads.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{variable}={value}: must be a whole number >= 1; unset it, or give --threads")]
-pub struct ThreadsError {
-    pub variable: &'static str,
-    /// What it holds, as it can be shown.
-    pub value: String,
+pub enum ThreadsError {
+    #[error("{variable}={value}: must be a whole number from 1 to {MAX_THREADS}; unset it, or give --threads")]
+    Variable {
+        variable: &'static str,
+        /// What it holds, as it can be shown.
+        value: String,
+    },
+    #[error("{0} threads: must be a whole number from 1 to {MAX_THREADS}")]
+    Asked(NonZeroUsize),
 }
 
 /// How many threads, and who said so.
@@ -34,18 +42,26 @@ impl Threads {
     ) -> Result<Self, ThreadsError> {
         let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
         let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| asked.is_none()) else {
-            return Ok(Self { count: asked, variable: None });
+            let too_many = asked.filter(|count| !is_bearable(*count));
+            return too_many.map_or(Ok(Self { count: asked, variable: None }), |count| Err(ThreadsError::Asked(count)));
         };
         // OpenMP's may be a list, of one number for each level of nesting.
         let count = value.to_str().and_then(|value| value.split(',').next()?.trim().parse().ok());
-        let count = count.ok_or_else(|| ThreadsError { variable, value: shown(value.as_ref()).to_string() })?;
+        let count = count.filter(|count| is_bearable(*count));
+        let count =
+            count.ok_or_else(|| ThreadsError::Variable { variable, value: shown(value.as_ref()).to_string() })?;
         Ok(Self { count: Some(count), variable: Some(variable) })
     }
 }
 
+fn is_bearable(count: NonZeroUsize) -> bool {
+    count.get() <= MAX_THREADS
+}
+
 /// A number of threads, as a flag has it.
-pub fn parse(text: &str) -> Result<NonZeroUsize, &'static str> {
-    text.parse().map_err(|_| "must be a whole number >= 1")
+pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
+    let count = text.parse().ok().filter(|count| is_bearable(*count));
+    count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
 }
 
 #[cfg(test)]
@@ -74,10 +90,23 @@ mod tests {
     }
 
     #[test]
+    fn too_many_are_refused_whoever_asks_for_them() {
+        assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
+        for count in [1025, 1 << 62] {
+            let error = choose(Some(count), &[]).unwrap_err().to_string();
+            assert_eq!(error, format!("{count} threads: must be a whole number from 1 to 1024"));
+            assert!(parse(&count.to_string()).is_err());
+        }
+    }
+
+    #[test]
     fn a_bad_variable_is_named_with_its_value() {
-        for value in ["0", "-1", "many", "1.5", "2(x3)"] {
+        for value in ["0", "-1", "many", "1.5", "2(x3)", "1025", "99999999"] {
             let error = choose(None, &[("LSB_DJOB_NUMPROC", value)]).unwrap_err().to_string();
-            assert!(error.starts_with(&format!("LSB_DJOB_NUMPROC={value}: must be a whole number >= 1")), "{error}");
+            assert!(
+                error.starts_with(&format!("LSB_DJOB_NUMPROC={value}: must be a whole number from 1 to 1024")),
+                "{error}"
+            );
         }
     }
 }
