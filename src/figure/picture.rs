@@ -2,7 +2,9 @@
 
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
+use super::BadOption;
 use anyhow::{Result, anyhow};
+use crate::table::shown::shown_text;
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
@@ -11,6 +13,9 @@ use kuva::render::render::{Primitive, Scene};
 
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
+
+/// Most pixels of a PNG, of 4 bytes each in memory: those of 420 mm x 420 mm in print.
+const MAX_PIXELS: f64 = 1e8;
 
 pub struct Picture {
     name: String,
@@ -94,6 +99,17 @@ impl Picture {
 
     /// The figure as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
+        let pixels = self.scene.width * self.scene.height * f64::from(self.style.pixels()).powi(2);
+        if pixels > MAX_PIXELS {
+            return Err(BadOption(format!(
+                "figure {}: a PNG of {:.0} million pixels is too large, the most is {:.0} million; take a smaller --size, \
+                 or --format svg or pdf",
+                self.name,
+                1e-6 * pixels,
+                1e-6 * MAX_PIXELS
+            ))
+            .into());
+        }
         RasterBackend::new()
             .with_scale(self.style.pixels())
             .render_scene(&self.scene)
@@ -276,7 +292,8 @@ impl Sheet {
         anchor: Anchor,
         color: Option<Color>,
     ) {
-        let content = text.to_owned();
+        // An SVG may hold no control characters.
+        let content = shown_text(text).to_string();
         self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
     }
 
