@@ -11,7 +11,7 @@ pub enum DatasetError {
     /// A file operation failed, which says nothing about what the file holds.
     #[error(transparent)]
     Storage(StorageError),
-    #[error("{}: cannot be written: {source}; all that was committed before is kept", shown(path))]
+    #[error("{}: cannot be written: {source}", shown(path))]
     Write { path: PathBuf, source: ParquetError },
     /// A file is cut off, changed or no table.
     #[error(

@@ -229,7 +229,7 @@ pub enum Lock {
 
 /// A file operation that failed.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot {action}: {source}; all that was committed before is kept", shown(path))]
+#[error("{}: cannot {action}: {source}", shown(path))]
 pub struct StorageError {
     pub action: &'static str,
     pub path: PathBuf,
@@ -329,6 +329,9 @@ impl Storage for Disk {
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError> {
         match fs::create_dir(folder) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
+            Err(_) if folder.is_symlink() => {
+                Err(StorageError::at("create", folder)(io::Error::other("it is a link that leads nowhere")))
+            }
             created => created.map_err(StorageError::at("create", folder)),
         }
     }
