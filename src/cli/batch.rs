@@ -4,10 +4,10 @@
 
 use super::exit::{Exit, UsageError};
 use super::output::{self, quoted};
+use super::sweep::{self, PresetFlag};
 use super::time;
 use crate::results::layout::Layout;
 use crate::run::threads;
-use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -34,10 +34,12 @@ pub struct Arguments {
     #[arg(value_enum)]
     engine: Engine,
     /// Sweep file
-    #[arg(value_name = "SWEEP.toml")]
-    sweep: PathBuf,
+    #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
+    sweep: Option<PathBuf>,
+    #[command(flatten)]
+    preset: PresetFlag,
     /// Results directory [default: results/<name of the sweep>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Workers at the same time
     #[arg(long, value_name = "N")]
@@ -77,55 +79,67 @@ fn time_in_queue(text: &str) -> Result<Duration, String> {
     if time < MIN_TIME { Err("must be at least 1m".to_owned()) } else { Ok(time) }
 }
 
-struct Submission<'a> {
-    name: &'a str,
-    workers: u32,
-    starts: u32,
-    threads: NonZeroUsize,
-    time: Duration,
-    logs: String,
-    /// The command of a worker, as a shell reads it.
-    command: String,
-    options: &'a [String],
-}
+/// The scripts, with {{names}} where values go. A job script lies within Slurm's, as the folder of the logs must be there
+/// before a job starts. HyperQueue gets relative paths of logs, as it reads a colon in one as a separator.
+const SLURM: &str = include_str!("batch/slurm.sh");
+const HYPERQUEUE: &str = include_str!("batch/hyperqueue.sh");
 
 pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
-    let sweep = Sweep::from_file(&arguments.sweep)?;
+    let Arguments { time, threads, workers, options, .. } = arguments;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
     let program = match program {
         Some(program) => program.to_owned(),
         None => std::env::current_exe().context("cannot find out where this program lies")?,
     };
-    let (program, file, root) = (whole_path(&program)?, whole_path(&arguments.sweep)?, whole_path(&root)?);
-    let (workers, starts) = (arguments.workers.get(), arguments.starts.unwrap_or(arguments.workers).get());
-    if starts < workers {
+    let (program, root) = (whole_path(&program)?, whole_path(&root)?);
+    let source = match (&arguments.sweep, arguments.preset.preset) {
+        (Some(file), _) => quoted(&whole_path(file)?),
+        (None, preset) => format!("--preset {}", preset.map_or("", |preset| preset.name)),
+    };
+    let starts = arguments.starts.unwrap_or(*workers);
+    if starts < *workers {
         return Err(UsageError(format!("--starts {starts}: must be >= --workers, here {workers}")).into());
     }
-    if let Some(option) = arguments.options.iter().find(|option| option.contains(char::is_control)) {
+    if let Some(option) = options.iter().find(|option| option.contains(char::is_control)) {
         return Err(UsageError(format!("{option:?}: must hold no control characters")).into());
     }
-    let walltime = time::with_units(arguments.time.saturating_sub(margin(arguments.time)));
-    let submission = Submission {
-        name: sweep.name(),
-        workers,
-        starts,
-        threads: arguments.threads,
-        time: arguments.time,
-        logs: format!("{root}/run/batch"),
-        command: format!(
-            "{} run {} --out {} --worker --walltime {walltime}",
-            quoted(&program),
-            quoted(&file),
-            quoted(&root)
-        ),
-        options: &arguments.options,
+    let (program, out, logs) = (quoted(&program), quoted(&root), format!("{root}/run/batch"));
+    let walltime = time::with_units(time.saturating_sub(margin(*time)));
+    let command = format!("{program} run {source} --out {out} --worker --walltime {walltime}");
+    let (script, array, time, options) = match arguments.engine {
+        Engine::Slurm => {
+            let limit = if starts > *workers { format!("%{workers}") } else { String::new() };
+            let minutes = format!("{}:{:02}", time.as_secs() / 60, time.as_secs() % 60);
+            let output = format!("--output={}/%A_%a.log", logs.replace('%', "%%"));
+            let warning = (margin(*time) == MAX_MARGIN).then(|| format!("--signal=B:USR1@{WARNING}"));
+            let options = [output].iter().chain(&warning).chain(options).map(|text| directive(text)).collect();
+            (SLURM, format!("1-{starts}{limit}"), minutes, options)
+        }
+        Engine::Hyperqueue => {
+            let options: String = options.iter().map(|option| format!("{} ", quoted(option))).collect();
+            (HYPERQUEUE, format!("1-{starts}"), time::with_units(*time), options)
+        }
     };
-    output::print(&match arguments.engine {
-        Engine::Slurm => submission.slurm(),
-        Engine::Hyperqueue => submission.hyperqueue(),
-    })?;
+    output::print(&filled(script, |name| match name {
+        "name" => sweep.name().to_owned(),
+        "logs" => quoted(&logs),
+        "array" => array.clone(),
+        "threads" => threads.to_string(),
+        "time" => time.clone(),
+        "options" => options.clone(),
+        "command" => command.clone(),
+        _ => unreachable!("the scripts have these names"),
+    }))?;
     Ok(Exit::Done)
+}
+
+/// A text with values in the places of {{names}}.
+fn filled(text: &str, value: impl Fn(&str) -> String) -> String {
+    let mut pieces = text.split("{{");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces.filter_map(|piece| piece.split_once("}}")).fold(first, |text, (name, rest)| text + &value(name) + rest)
 }
 
 /// How long before the end of its time a worker stops.
@@ -143,73 +157,13 @@ fn whole_path(path: &Path) -> Result<String> {
     })?)
 }
 
-impl Submission<'_> {
-    /// A job script within a script, as the folder of the logs must be there before Slurm starts a job.
-    fn slurm(&self) -> String {
-        let Self { name, workers, starts, threads, .. } = self;
-        let limit = if starts > workers { format!("%{workers}") } else { String::new() };
-        let warning = (margin(self.time) == MAX_MARGIN).then(|| format!("--signal=B:USR1@{WARNING}"));
-        let mut directives = vec![
-            format!("--job-name={name}"),
-            format!("--array=1-{starts}{limit}"),
-            format!("--cpus-per-task={threads}"),
-            format!("--time={}", time::for_slurm(self.time)),
-            "--requeue".to_owned(),
-            "--open-mode=append".to_owned(),
-            format!("--output={}/%A_%a.log", self.logs.replace('%', "%%")),
-        ];
-        directives.extend(warning);
-        directives.extend_from_slice(self.options);
-        let directives: Vec<_> = directives.iter().map(|text| format!("#SBATCH {}\n", directive(text))).collect();
-        format!(
-            "\
-#!/bin/sh
-# Submits the sweep {name} to Slurm. Run it with sh; its options go to sbatch.
-mkdir -p {logs} && exec sbatch \"$@\" <<'EOF'
-#!/bin/sh
-{directives}\
-# Elements share what is left, whatever their number; any of them may be missing or come twice. More elements than
-# workers, such as --array=1-200%40, keep 40 at work until all is done; those that find nothing to do end at once.
-# Threads are those of --cpus-per-task. Stops before --time is over, and on USR1 and TERM, with what is done kept.
-exec {command}
-EOF
-",
-            logs = quoted(&self.logs),
-            directives = directives.concat(),
-            command = self.command,
-        )
-    }
-
-    /// Logs by relative paths, as `hq` reads a colon in one as a separator.
-    fn hyperqueue(&self) -> String {
-        let Self { name, starts, threads, command, .. } = self;
-        let time = time::with_units(self.time);
-        let options: Vec<_> = self.options.iter().map(|option| format!("{} ", quoted(option))).collect();
-        format!(
-            "\
-#!/bin/sh
-# Submits the sweep {name} to HyperQueue. Run it with sh; its options go to `hq submit`.
-# Tasks share what is left, whatever their number, and as many run as have room. More tasks follow those whose time is
-# over until all is done; those that find nothing to do end at once.
-mkdir -p {logs} && cd {logs} && exec hq submit \\
-    --name={name} --array=1-{starts} --cpus={threads} --time-limit={time} \\
-    --stdout='%{{JOB_ID}}_%{{TASK_ID}}_%{{INSTANCE_ID}}.out' \\
-    --stderr='%{{JOB_ID}}_%{{TASK_ID}}_%{{INSTANCE_ID}}.err' \\
-    {options}\"$@\" -- \\
-    {command} --threads {threads}
-",
-            logs = quoted(&self.logs),
-            options = options.concat(),
-        )
-    }
-}
-
-/// An option as sbatch reads it from a script: with quotes, and a backslash before what else would mean something.
+/// The line of an option as sbatch reads it from a script: with quotes, and a backslash before what else would mean
+/// something.
 fn directive(option: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
     if option.chars().all(plain) {
-        option.to_owned()
+        format!("#SBATCH {option}\n")
     } else {
-        format!("\"{}\"", option.replace('\\', r"\\").replace('"', "\\\""))
+        format!("#SBATCH \"{}\"\n", option.replace('\\', r"\\").replace('"', "\\\""))
     }
 }

@@ -76,7 +76,7 @@ fn the_script_for_slurm_submits_as_it_is_and_its_job_runs_what_is_left() {
         "--job-name=small",
         "--array=1-40",
         "--cpus-per-task=2",
-        "--time=1-01:30:00",
+        "--time=1530:00",
         "--requeue",
         "--open-mode=append",
         &format!("\"--output={output}\""),
@@ -142,7 +142,7 @@ fn threads_are_those_that_a_batch_system_grants() {
     said(start("openmp", &[], &[openmp, ("HQ_CPUS", "4,5,6")]), "on 3 threads (OMP_NUM_THREADS)\n");
     let ended = start("bad", &[], &[("NSLOTS", "many")]);
     assert_eq!(ended.code, Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("NSLOTS=many: must be a whole number >= 1; unset it"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("NSLOTS=many: must be a whole number from 1 to 1024; unset it"), "{}", ended.stderr);
     assert!(!folder.path("bad").exists());
 }
 
