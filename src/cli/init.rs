@@ -3,16 +3,12 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::sweep::Preset;
-use crate::model::{Description, Parameters, Symbol, Value};
-use crate::observe::{Recording, RecordingKey};
-use crate::solver::Solver;
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::Args;
-use std::fmt::Write as _;
 use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write as _};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Write a commented sweep file to start from
@@ -31,13 +27,14 @@ pub struct Arguments {
     preset: Option<Preset>,
 }
 
+/// A sweep that runs as it is, with all other keys as comments.
+const TEMPLATE: Preset = Preset { name: "sweep", text: include_str!("init/template.toml") };
+
 pub fn init(arguments: &Arguments) -> Result<Exit> {
     let file = &arguments.file;
     let name = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-    let text = match arguments.preset {
-        Some(preset) => preset.text.replace(&format!("name = \"{}\"", preset.name), &format!("name = \"{name}\"")),
-        None => template(name),
-    };
+    let preset = arguments.preset.unwrap_or(TEMPLATE);
+    let text = preset.text.replace(&format!("name = \"{}\"", preset.name), &format!("name = \"{name}\""));
     Sweep::parse(&text, file).with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
     write_new(file, &text)?;
     let quoted = output::quoted_path(file);
@@ -62,101 +59,38 @@ fn write_new(path: &Path, text: &str) -> Result<()> {
     written.with_context(|| format!("{}: cannot be written", shown(path)))
 }
 
-/// A sweep that runs as it is, with all other keys as comments.
-fn template(name: &str) -> String {
-    let (parameters, recording) = (Parameters::default(), Recording::default());
-    // The axes below set the others.
-    let model = Symbol::ALL
-        .into_iter()
-        .filter(|symbol| !matches!(symbol, Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed));
-    let model = commented(model.map(|symbol| (symbol.description(), parameters.get(symbol))));
-    let record = RecordingKey::ALL.into_iter().filter(|key| *key != RecordingKey::Slips);
-    let record = commented(record.map(|key| (key.description(), recording.get(key))));
-    let tolerance = match Solver::default() {
-        Solver::EventDriven { tolerance, .. } => tolerance,
-        Solver::FixedStep { .. } => unreachable!("the default is event-driven"),
-    };
-    format!(
-        "\
-# A sweep of the model of Capozza et al., Phys. Rev. Lett. 107, 024301 (2011). Quantities are in SI units.
-# Keys behind a # have the value shown; remove the # to change one. All of [model] can be axes, too.
-name = \"{name}\"                   # results go to results/{name}
-# where = \"frequency < 500\"   # drops points
-
-[axes]                          # every combination is a job
-V0        = {{ log = [5e-5, 2e-4], points = 3 }}   # m/s; also {{ linear = [..], points = n }} or a list
-Delta     = [0, 1e-6]           # m; amplitude of the modulation
-frequency = [29, 58]            # Hz; or T = 1/frequency in s, or eta = 2 pi Delta / (T V0)
-seed      = {{ count = 2 }}       # realisations of the disorder
-
-[model]
-{model}
-[record]
-slips = {slips}                      # slips to record after start-up; then the job ends
-{record}
-[solver]
-# tolerance = {tolerance:e}        # target error of displacement, relative to fs/k
-
-# Seeds until the error bars are short enough, in place of seed in [axes]:
-# [precision]
-# of       = \"tau_mean\"           # or mean_friction, locking_index, ...; or a list
-# relative = 0.01                 # largest half-width of the 95 % interval; or absolute = .., in its unit
-# seeds    = {{ from = 8, to = 64 }}
-
-# Further values of V0 between neighbours that differ:
-# [refine]
-# axes = \"V0\"                     # ranges of [axes], such as V0
-# by   = \"locked\"                 # or regime; or a number with threshold = .. or step = ..
-# to   = {{ V0 = 0.05 }}            # smallest distance: a share of the value, as V0 is log
-# sets = 100                      # at most
-",
-        slips = recording.slips,
-    )
-}
-
-/// Keys with their defaults, each a comment.
-fn commented(fields: impl IntoIterator<Item = (Description, Value)>) -> String {
-    fields.into_iter().fold(String::new(), |mut text, (field, default)| {
-        let Description { key, unit, meaning, .. } = field;
-        let default = match default {
-            Value::BreakOn(rule) => format!("\"{}\"", rule.word()),
-            default => default.to_string(),
-        };
-        let setting = format!("# {key} = {default}");
-        let unit = if unit.is_empty() { String::new() } else { format!("{unit}; ") };
-        // What comes behind is in the reference of all keys.
-        let meaning = meaning.split("; ").next().unwrap_or_default();
-        let _ = writeln!(text, "{setting:26} # {unit}{meaning}");
-        text
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Symbol;
+    use crate::observe::RecordingKey;
+
+    fn sweep(text: &str) -> Sweep {
+        Sweep::parse(text, Path::new("template.toml")).unwrap()
+    }
 
     #[test]
-    fn the_template_runs_as_it_is_and_every_default_in_it_may_stand() {
-        let text = template("mine");
-        let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
-        assert_eq!((sweep.name(), sweep.jobs().count()), ("mine", 3 * 3 * 2));
-        // What has no default stays a comment.
-        let is_setting = |line: &&str| {
-            line.starts_with("# ") && line.contains(" = ") && !line.contains("= none") && !line.contains("where")
-        };
+    fn the_template_runs_as_it_is_and_names_every_key_with_its_default() {
         // The tables of rounds stand as a whole or not at all.
-        let alone = text.split("\n# Seeds until").next().unwrap();
-        let settings: Vec<&str> = alone.lines().filter(is_setting).collect();
-        assert!(settings.len() > 15, "{settings:?}");
-        for line in settings {
-            let changed = text.replace(line, &line[2..]);
-            assert_eq!(Sweep::parse(&changed, Path::new("mine.toml")).unwrap().jobs().count(), 18, "{line}");
+        let text = TEMPLATE.text.split("\n# Seeds until").next().unwrap();
+        // What has no default stays a comment.
+        let is_setting = |line: &str| line.contains(" = ") && !line.contains("= none") && !line.contains("where");
+        let uncommented = |line: &str| line.strip_prefix("# ").filter(|line| is_setting(line)).map(ToOwned::to_owned);
+        let all: Vec<String> = text.lines().map(|line| uncommented(line).unwrap_or_else(|| line.to_owned())).collect();
+        let (sparse, full) = (sweep(TEMPLATE.text), sweep(&all.join("\n")));
+        assert_eq!(sparse.jobs().count(), 3 * 3 * 2);
+        assert!(sparse.jobs().map(|job| job.parameters).eq(full.jobs().map(|job| job.parameters)));
+        assert_eq!((sparse.recording(), sparse.solver()), (full.recording(), full.solver()));
+        let keys = Symbol::ALL.map(Symbol::key).into_iter().chain(RecordingKey::ALL.map(RecordingKey::key));
+        for key in keys.filter(|key| *key != "T") {
+            let is_of = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} "));
+            assert!(text.lines().any(is_of), "{key}");
         }
     }
 
     #[test]
     fn the_tables_of_rounds_in_the_template_may_stand() {
-        let text = template("mine");
+        let text = TEMPLATE.text;
         for table in ["[precision]", "[refine]"] {
             let start = text.find(&format!("# {table}")).unwrap();
             let end = text[start..].find("\n\n").map_or(text.len(), |length| start + length);
@@ -165,8 +99,7 @@ mod tests {
             let changed = format!("{}{table}{}", &text[..start], &text[end..]);
             let changed =
                 if table.contains("seeds") { changed.replace("seed      =", "# seed      =") } else { changed };
-            let sweep = Sweep::parse(&changed, Path::new("mine.toml")).unwrap();
-            assert!(sweep.bounds().is_some(), "{table}");
+            assert!(sweep(&changed).bounds().is_some(), "{table}");
         }
     }
 
