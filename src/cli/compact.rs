@@ -3,12 +3,10 @@
 use super::exit::Exit;
 use super::output;
 use crate::results::Results;
-use crate::results::compact::Compacted;
 use crate::results::layout::Layout;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Merge the tables of a results directory into a few large files, with the same bytes whatever its history
@@ -27,20 +25,13 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Report`] as JSON.
+/// Version of the JSON.
 const FORMAT: u32 = 1;
-
-#[derive(Serialize)]
-struct Report {
-    format: u32,
-    #[serde(flatten)]
-    compacted: Compacted,
-}
 
 pub fn compact(arguments: &Arguments) -> Result<Exit> {
     let compacted = Results::read(&Layout::new(&Disk, &arguments.directory))?.compact()?;
     if arguments.json {
-        output::json(&Report { format: FORMAT, compacted })?;
+        output::json(FORMAT, &compacted)?;
     } else {
         output::pairs(&[
             (

@@ -3,11 +3,10 @@
 use super::exit::Exit;
 use super::output;
 use crate::results::layout::Layout;
-use crate::results::merge::{Merged, merge as merge_all};
+use crate::results::merge::merge as merge_all;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Put together the directories of shards that were run without a common disk
@@ -32,21 +31,14 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Report`] as JSON.
+/// Version of the JSON.
 const FORMAT: u32 = 1;
-
-#[derive(Serialize)]
-struct Report {
-    format: u32,
-    #[serde(flatten)]
-    merged: Merged,
-}
 
 pub fn merge(arguments: &Arguments) -> Result<Exit> {
     let sources: Vec<Layout<'_>> = arguments.sources.iter().map(|source| Layout::new(&Disk, source)).collect();
     let merged = merge_all(&sources, &Layout::new(&Disk, &arguments.out))?;
     if arguments.json {
-        output::json(&Report { format: FORMAT, merged })?;
+        output::json(FORMAT, &merged)?;
     } else {
         let parts_and_jobs =
             |parts, jobs| format!("{} with {}", output::count(parts, "part"), output::count(jobs, "job"));

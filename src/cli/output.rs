@@ -1,12 +1,16 @@
 //! Text for people and JSON for programs.
 
+use super::exit::UsageError;
 use crate::results::rounds::RoundsSoFar;
 use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown};
 use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use std::io::{ErrorKind, Write};
+use std::fs::{self, OpenOptions};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
 pub fn print(text: &str) -> Result<()> {
@@ -28,8 +32,19 @@ pub fn warn(warnings: &[String]) {
     }
 }
 
-/// Prints a value as JSON.
-pub fn json(value: &impl Serialize) -> Result<()> {
+/// Prints a value as JSON, with the version of its form.
+pub fn json(format: u32, value: &impl Serialize) -> Result<()> {
+    #[derive(Serialize)]
+    struct Versioned<'a, T> {
+        format: u32,
+        #[serde(flatten)]
+        value: &'a T,
+    }
+    plain_json(&Versioned { format, value })
+}
+
+/// Prints a value as JSON that has its version, or needs none.
+pub fn plain_json(value: &impl Serialize) -> Result<()> {
     print(&format!("{}\n", serde_json::to_string_pretty(value)?))
 }
 
@@ -52,6 +67,11 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
+/// Bytes of memory, rounded up.
+pub fn memory(bytes: f64) -> String {
+    if bytes < 1e9 { format!("{:.0} MB", (1e-6 * bytes).ceil()) } else { format!("{:.1} GB", 1e-9 * bytes) }
+}
+
 /// A count with its noun, in the plural where that fits.
 pub fn count(number: u64, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
@@ -69,18 +89,58 @@ pub fn rounds(rounds: &RoundsSoFar) -> String {
     capped.into_iter().flatten().fold(sets, |text, more| text + &more)
 }
 
-/// Writes a file beside its place and moves it there, so that no half of it looks whole.
+/// Writes a file whole: beside its place, and then moved there, so that no half of it looks whole. Where a link leads to a
+/// file, that is its place; a pipe or a device is written to.
 pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let mut draft = path.as_os_str().to_owned();
-    draft.push(".draft");
-    let draft = PathBuf::from(draft);
-    write(&draft)
-        .and_then(|()| Ok(std::fs::rename(&draft, path)?))
-        .inspect_err(|_| {
-            // What remains of a draft is of no use; the first error is the one to report.
-            let _ = std::fs::remove_file(&draft);
-        })
-        .with_context(|| format!("cannot write {}", shown(path)))
+    let cannot = || format!("cannot write {}", shown(path));
+    let refused = |problem| Err(UsageError(format!("{}: {problem}", shown(path))).into());
+    let place = match fs::metadata(path) {
+        Ok(there) if there.is_dir() => return refused("is a folder; name a file in it"),
+        Ok(there) if !there.is_file() => return write(path).with_context(cannot),
+        Ok(_) => fs::canonicalize(path).with_context(cannot)?,
+        Err(_) if path.is_symlink() => return refused("is a link that leads nowhere; remove it, or name another file"),
+        Err(_) => path.to_owned(),
+    };
+    let draft = new_draft(&place).with_context(cannot)?;
+    let written = write(&draft).and_then(|()| Ok(fs::rename(&draft, &place)?));
+    if written.is_err() {
+        // What remains of a draft is of no use; the first error is the one to report.
+        let _ = fs::remove_file(&draft);
+    }
+    written.with_context(cannot)
+}
+
+/// A new file beside a place, under a name that nothing has.
+fn new_draft(place: &Path) -> io::Result<PathBuf> {
+    let mut number = 0_u32;
+    loop {
+        let draft = place.with_file_name(format!(".stickslip-{number}.draft"));
+        match OpenOptions::new().write(true).create_new(true).open(&draft) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+            created => return created.map(|_| draft),
+        }
+    }
+}
+
+/// A line on a terminal, with the time so far, until it is dropped.
+pub struct Waiting(ProgressBar);
+
+impl Waiting {
+    pub fn for_what(what: String) -> Self {
+        let line = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg}") {
+            line.set_style(style);
+        }
+        line.set_message(what);
+        line.enable_steady_tick(Duration::from_secs(1));
+        Self(line)
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
 }
 
 /// A text as a shell reads it.
@@ -105,4 +165,46 @@ pub fn quoted_path(path: &Path) -> String {
         })
         .collect();
     format!("$'{escaped}'")
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{FileTypeExt, symlink};
+    use std::process::Command;
+
+    fn put(path: &Path, text: &str) -> Result<()> {
+        replace(path, |draft| Ok(fs::write(draft, text)?))
+    }
+
+    #[test]
+    fn a_file_is_replaced_where_its_links_lead_and_drafts_take_no_name_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link, draft] = ["page", "link", ".stickslip-0.draft"].map(|name| folder.path().join(name));
+        fs::write(&draft, "mine").unwrap();
+        symlink("page", &link).unwrap();
+        assert!(put(&link, "a").unwrap_err().to_string().contains("is a link that leads nowhere"));
+        put(&file, "b").unwrap();
+        put(&link, "c").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!([&file, &draft].map(|path| fs::read_to_string(path).unwrap()), ["c", "mine"]);
+        assert!(put(folder.path(), "d").unwrap_err().to_string().contains("is a folder"));
+        replace(&file, |draft| fs::write(draft, "half").and(Err(io::Error::other("full"))).map_err(Into::into))
+            .unwrap_err();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "c");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn a_pipe_is_written_to_and_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        std::thread::scope(|scope| {
+            let read = scope.spawn(|| fs::read_to_string(&pipe).unwrap());
+            put(&pipe, "page").unwrap();
+            assert_eq!(read.join().unwrap(), "page");
+        });
+        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output;
-use super::sweep::{self, Preset};
+use super::sweep::{self, PresetFlag};
 use crate::results::layout::Layout;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
@@ -26,11 +26,10 @@ pub struct Arguments {
     /// Sweep file
     #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
-    /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
-    preset: Option<Preset>,
+    #[command(flatten)]
+    preset: PresetFlag,
     /// Results directory to compare with, if it is there [default: results/<name of the sweep>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON
     #[arg(long)]
@@ -40,9 +39,14 @@ pub struct Arguments {
 /// Version of [`Report`] as JSON.
 const FORMAT: u32 = 1;
 
+/// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction; and for each thread, for
+/// a contact of its job, and for a slip of a part that is not whole yet. As measured, rounded up.
+const MEMORY: f64 = 80e6;
+const MEMORY_OF_A_CONTACT: f64 = 350.0;
+const MEMORY_OF_A_SLIP: f64 = 400.0;
+
 #[derive(Serialize)]
 struct Report {
-    format: u32,
     name: String,
     axes: Vec<Axis>,
     points: u64,
@@ -52,6 +56,8 @@ struct Report {
     predicted_cpu_seconds: f64,
     predicted_wall_seconds: f64,
     threads: usize,
+    worker_memory_bytes: f64,
+    thread_memory_bytes: f64,
     /// What all rounds of a sweep that decides for itself may add up to; the numbers above are those of the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_most: Option<Bounds>,
@@ -107,13 +113,12 @@ struct Axis {
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset)?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {
-        format: FORMAT,
         name: sweep.name().to_owned(),
         axes: sweep.axes().map(|(keys, points)| Axis { keys, points }).collect(),
         points: sweep.point_count(),
@@ -123,11 +128,13 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         predicted_cpu_seconds: totals.cost,
         predicted_wall_seconds: totals.cost / threads as f64,
         threads,
+        worker_memory_bytes: MEMORY,
+        thread_memory_bytes: MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part,
         at_most: sweep.bounds(),
         directory: Directory::of(&sweep, root)?,
     };
     if arguments.json {
-        output::json(&report)?;
+        output::json(FORMAT, &report)?;
     } else {
         let axes: Vec<String> = report.axes.iter().map(|axis| format!("{} ({})", axis.keys, axis.points)).collect();
         let directory =
@@ -143,8 +150,19 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             ("jobs", format!("{} {which}", report.jobs)),
             ("parts", report.parts.to_string()),
             ("slips to record", report.slips.to_string()),
-            ("predicted CPU time", output::duration(totals.cost)),
+            (
+                "predicted CPU time",
+                format!("{}, {:.1} core-hours", output::duration(totals.cost), totals.cost / 3600.0),
+            ),
             ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
+            (
+                "worker memory",
+                format!(
+                    "{} and {} for each thread",
+                    output::memory(MEMORY),
+                    output::memory(report.thread_memory_bytes)
+                ),
+            ),
         ];
         if let Some(Bounds { sets, jobs, predicted_cost }) = report.at_most {
             let cost = output::duration(predicted_cost);

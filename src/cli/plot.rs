@@ -51,7 +51,7 @@ pub struct Arguments {
     ylabel: Option<String>,
     /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
     #[arg(short, long, value_name = "FILE", requires = "x", conflicts_with = "format", help_heading = OWN)]
-    output: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// Formats, separated by commas [default: svg,png]
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<FileFormat>,
@@ -159,7 +159,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
             if look.style == Style::Print {
                 output::report(&format!("for the caption: {}", picture.note()));
             }
-            match &arguments.output {
+            match &arguments.out {
                 None => write_own(layout, picture, &look, &arguments.formats())?,
                 Some(file) => {
                     let format = format_of(file)?;

@@ -27,7 +27,7 @@ pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
-        output::json(&summary)?;
+        output::plain_json(&summary)?;
     } else {
         output::pairs(&summary_lines(&summary, results.layout()))?;
     }

@@ -30,12 +30,12 @@ pub struct Arguments {
     directory: PathBuf,
     /// File to write [default: report.html in DIR]
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    out: Option<PathBuf>,
 }
 
 pub fn report(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    let path = match &arguments.output {
+    let path = match &arguments.out {
         None => crate::report::write(&results, None)?,
         Some(path) => {
             let page = crate::report::page(&results, None)?;

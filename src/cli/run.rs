@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::progress::Progress;
 use super::report::Reporter;
-use super::sweep::{self, Preset};
+use super::sweep::{self, PresetFlag};
 use super::threads::ThreadsFlag;
 use super::{output, reduce, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
@@ -11,12 +11,11 @@ use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::{Options, RunReport, Shard};
+use crate::run::{Options, RunEvent, RunReport, Shard};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -44,11 +43,10 @@ pub struct Arguments {
     /// Sweep file, or results directory to resume
     #[arg(value_name = "SWEEP.toml|DIR", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
-    /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
-    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
-    preset: Option<Preset>,
+    #[command(flatten)]
+    preset: PresetFlag,
     /// Results directory [default: results/<name of the sweep>, or the one to resume]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadsFlag,
@@ -76,22 +74,15 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Report`] as JSON.
+/// Version of [`RunReport`] as JSON.
 const FORMAT: u32 = 2;
-
-#[derive(Serialize)]
-struct Report<'a> {
-    format: u32,
-    #[serde(flatten)]
-    report: &'a RunReport,
-}
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
     let (sweep, default_root) = if let Some(directory) = arguments.sweep.as_deref().filter(|path| path.is_dir()) {
         (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
     } else {
-        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset)?;
+        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
         let root = Layout::default_root(&sweep);
         (sweep, root)
     };
@@ -109,16 +100,19 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &root);
     let mut progress = Progress::new(threads);
     let mut reporter = arguments.report.then(|| Reporter::new(&layout));
+    let mut has_results = false;
     let report = crate::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
         let report =
             joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
                 progress.show(event);
+                has_results |=
+                    matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
                 if let Some(reporter) = &mut reporter {
                     reporter.follow(event);
                 }
             })?;
         if arguments.json {
-            output::json(&Report { format: FORMAT, report: &report })?;
+            output::json(FORMAT, &report)?;
         } else {
             output::pairs(&summary_lines(&report))?;
         }
@@ -136,6 +130,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
             output::print(&format!("report  {}\n", shown(&path)))?;
         }
         Ok(report)
+    });
+    let report = report.map_err(|error| match Exit::of(&error) {
+        Exit::Stopped if has_results => error.context("the run stopped; what was committed is kept"),
+        _ => error,
     })?;
     if report.stopped {
         output::report(&resume_hint(&report, arguments.walltime.is_some()));

@@ -36,7 +36,7 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
     let no_slips = if arguments.json { None } else { no_slips(&results) };
     let overview = status.overview;
     if arguments.json {
-        output::json(&status)?;
+        output::plain_json(&status)?;
     } else {
         let left = match (overview.jobs_missing, status.time_left) {
             (0, _) => "nothing left to run".to_owned(),

@@ -4,9 +4,8 @@ use super::exit::UsageError;
 use crate::simulate as single;
 use crate::sweep::{Sweep, SweepError};
 use anyhow::Result;
-use clap::ValueEnum;
 use clap::builder::PossibleValue;
-use std::collections::BTreeMap;
+use clap::{Args, ValueEnum};
 use std::path::Path;
 
 /// A sweep file that the program holds.
@@ -78,6 +77,14 @@ impl ValueEnum for Preset {
     }
 }
 
+/// The flag that stands in place of a sweep file, the argument `sweep`.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PresetFlag {
+    /// Take a sweep of the paper, or beyond it, in place of a file; `stickslip init --help` lists them
+    #[arg(long, value_name = "NAME", conflicts_with = "sweep", hide_possible_values = true)]
+    pub preset: Option<Preset>,
+}
+
 /// Reads a sweep file, or takes a preset; the command line asks for one of them.
 pub fn read(file: Option<&Path>, preset: Option<Preset>) -> Result<Sweep, SweepError> {
     match (file, preset) {
@@ -87,24 +94,32 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>) -> Result<Sweep, SweepE
     }
 }
 
-/// The values of `--set`, as a sweep file has them.
-pub fn written_settings(settings: &[String]) -> Result<single::Written, UsageError> {
+/// The values of a flag that sets keys, such as `--set V0=1e-5`, as a sweep file has them.
+pub fn written(flag: &str, example: &str, settings: &[String]) -> Result<single::Written, UsageError> {
     let mut written = single::Written::new();
     for setting in settings {
-        let no_setting = || UsageError(format!("--set {setting}: must be KEY=VALUE, such as --set V0=1e-5"));
+        let no_setting = || UsageError(format!("{flag} {setting}: must be KEY=VALUE, such as {flag} {example}"));
         let (key, value) = setting.split_once('=').ok_or_else(no_setting)?;
         let (key, value) = (key.trim(), value.trim());
         if written.iter().any(|(earlier, _)| earlier == key) {
-            return Err(UsageError(format!("--set {setting}: {key} is set before; keep one")));
+            return Err(UsageError(format!("{flag} {setting}: {key} is set before; keep one")));
         }
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return Err(no_setting());
         }
         // A word such as tension needs quotes in a sweep file.
-        let value = number(value).unwrap_or_else(|_| format!("{value:?}"));
+        let value = match value {
+            "true" | "false" => value.to_owned(),
+            value => number(value).unwrap_or_else(|_| format!("{value:?}")),
+        };
         written.push((key.to_owned(), value));
     }
     Ok(written)
+}
+
+/// The values of `--set`.
+pub fn written_settings(settings: &[String]) -> Result<single::Written, UsageError> {
+    written("--set", "V0=1e-5", settings)
 }
 
 /// A number in the form that a sweep file takes.
@@ -121,7 +136,7 @@ pub fn real(text: &str) -> Result<f64, &'static str> {
 
 /// A sweep with one set, of the values of `--set`.
 pub fn settings_as_sweep(settings: &[String]) -> Result<Sweep> {
-    let text = single::sweep_text(&written_settings(settings)?, &BTreeMap::new(), &single::Written::new());
+    let text = single::sweep_text(&written_settings(settings)?, &single::Written::new(), &single::Written::new());
     Sweep::parse(&text, Path::new("flags")).map_err(as_flags)
 }
 

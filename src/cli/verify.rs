@@ -51,7 +51,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let repaired = arguments.repair && verification.wants_repair();
     let commands = commands(layout, &verification, !arguments.repair);
     if arguments.json {
-        output::json(&Report { verification: &verification, repaired, commands })?;
+        output::plain_json(&Report { verification: &verification, repaired, commands })?;
     } else {
         print_summary(&verification, &commands, repaired)?;
     }

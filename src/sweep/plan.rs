@@ -9,6 +9,8 @@
 use super::grid::Sweep;
 use super::job::Job;
 use super::rounds::{Round, contains};
+use crate::model::theory::typical_interval;
+use crate::observe::Recording;
 use std::ops::{Deref, Range, RangeInclusive};
 
 /// Predicted CPU time of a part, in s, where neither few nor many parts ask for another: little is lost with one.
@@ -85,6 +87,10 @@ pub struct Totals {
     pub parts: u64,
     /// Predicted CPU time, in s.
     pub cost: f64,
+    /// Most contacts of a job.
+    pub contacts: usize,
+    /// Most slips that the jobs of one part may record together, as far as their longest time allows.
+    pub slips_of_part: f64,
 }
 
 impl Extension {
@@ -189,10 +195,17 @@ impl<'a> Plan<'a> {
 
     /// Walks through the plan and adds up.
     pub fn totals(self) -> Totals {
-        self.outlines().fold(Totals::default(), |totals, part| Totals {
-            jobs: totals.jobs + part.job_count as u64,
-            parts: totals.parts + 1,
-            cost: totals.cost + part.cost,
+        self.parts().fold(Totals::default(), |totals, part| {
+            let Recording { slips, max_time, .. } = *self.extensions[part.extension].sweep.recording();
+            let jobs = part.jobs.iter().map(|job| &job.parameters);
+            let in_time = |job| max_time.map_or(f64::INFINITY, |time| time / typical_interval(job));
+            Totals {
+                jobs: totals.jobs + part.job_count as u64,
+                parts: totals.parts + 1,
+                cost: totals.cost + part.cost,
+                contacts: jobs.clone().map(|job| job.blocks * job.contacts_per_block).fold(totals.contacts, usize::max),
+                slips_of_part: totals.slips_of_part.max(jobs.map(|job| in_time(job).min(slips as f64)).sum()),
+            }
         })
     }
 }
