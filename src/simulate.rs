@@ -9,7 +9,6 @@ use crate::observe::{
 };
 use crate::solver::{self, Observer, SimulationError};
 use crate::sweep::{Job, Mistake, Sweep};
-use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 /// More samples than this, of 24 bytes each, are a mistake.
@@ -40,21 +39,17 @@ pub enum RequestError {
 pub type Written = Vec<(String, String)>;
 
 /// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
-pub fn sweep_text(model: &Written, record: &BTreeMap<RecordingKey, String>, solver: &Written) -> String {
-    let recorded = |key| match (key, record.get(&key)) {
-        (_, Some(value)) => Some(value.as_str()),
+pub fn sweep_text(model: &Written, record: &Written, solver: &Written) -> String {
+    let is_given = |key: RecordingKey| record.iter().any(|(given, _)| given == key.key());
+    let slips = match (is_given(RecordingKey::Slips), is_given(RecordingKey::MaxTime)) {
+        (true, _) => "",
         // With a time alone, slips do not end the run.
-        (RecordingKey::Slips, None) if record.contains_key(&RecordingKey::MaxTime) => Some("10000000"),
-        (RecordingKey::Slips, None) => Some("20"),
-        (RecordingKey::Discard, None) => Some("5"),
-        _ => None,
+        (false, true) => "slips = 10000000\n",
+        (false, false) => "slips = 20\n",
     };
-    let line = |(key, value): (&str, &str)| format!("{key} = {value}");
-    let lines = |entries: &Written| entries.iter().map(|(key, value)| line((key, value))).collect::<Vec<_>>();
-    let record = RecordingKey::ALL.into_iter().filter_map(|key| Some(line((key.key(), recorded(key)?))));
-    let sections = [("model", lines(model)), ("record", record.collect()), ("solver", lines(solver))];
-    let sections = sections.map(|(title, lines)| format!("[{title}]\n{}\n", lines.join("\n")));
-    format!("name = \"simulate\"\n{}", sections.concat())
+    let lines = |entries: &Written| entries.iter().map(|(key, value)| format!("{key} = {value}\n")).collect::<String>();
+    let [model, record, solver] = [model, record, solver].map(lines);
+    format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }
 
 /// The mistakes in such a text, as those in what it was made from, which has neither sections nor lines.

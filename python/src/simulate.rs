@@ -17,10 +17,11 @@ use stickslip::table::columns::{Cell, Row};
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
 pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
-    let (mut model, mut record, mut solver, mut unknown) = (Vec::new(), BTreeMap::new(), Vec::new(), Vec::new());
+    let [mut model, mut record, mut solver] = [Vec::new(), Vec::new(), Vec::new()];
+    let mut unknown = Vec::new();
     for (key, value) in keys {
         match (section(&key), RecordingKey::from_key(&key)) {
-            (_, Some(key)) => drop(record.insert(key, value)),
+            (_, Some(_)) => record.push((key, value)),
             (Some(SOLVER), None) => solver.push((key, value)),
             (Some(_), None) => model.push((key, value)),
             (None, None) => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),

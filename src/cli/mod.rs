@@ -3,10 +3,9 @@
 mod accuracy;
 mod batch;
 mod compact;
-mod completions;
 mod exit;
+mod generate;
 mod init;
-mod man;
 mod merge;
 mod output;
 mod plan;
@@ -15,7 +14,6 @@ mod progress;
 mod reduce;
 mod report;
 mod run;
-mod schema;
 mod signals;
 mod simulate;
 mod status;
@@ -62,9 +60,8 @@ enum Command {
     Merge(merge::Arguments),
     Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
-    Schema(schema::Arguments),
-    Completions(completions::Arguments),
-    Man(man::Arguments),
+    #[command(hide = true)]
+    Generate(generate::Arguments),
 }
 
 /// Parses a command line, does what it asks, and returns the exit code. `program` is what starts this program again, by
@@ -84,9 +81,7 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Merge(arguments) => merge::merge(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
-        Command::Schema(_) => schema::schema(),
-        Command::Completions(arguments) => completions::completions(&arguments),
-        Command::Man(arguments) => man::man(&arguments),
+        Command::Generate(arguments) => generate::generate(&arguments),
     };
     let exit = ended.unwrap_or_else(|error| {
         output::report(&format!("error: {}", message(&error)));

@@ -7,36 +7,61 @@ mod outputs;
 
 use self::outputs::{check_outputs, write_pictures, write_records, write_table};
 use super::exit::{Exit, UsageError};
-use super::output;
-use super::sweep::{as_flags, number, real, written_settings};
-use crate::model::{Description, Parameters, Symbol, Value};
-use crate::observe::{Measurements, Recording, RecordingKey, Regime};
+use super::output::{self, Waiting};
+use super::sweep::{self, PresetFlag, as_flags, number, real, written, written_settings};
+use crate::model::{Parameters, Symbol};
+use crate::observe::{Measurements, RecordingKey, Regime};
 use crate::results::tables;
 use crate::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
-use crate::simulate::{self as single, Request};
+use crate::simulate::{self as single, Request, Written};
 use crate::sweep::Sweep;
 use crate::table::file::Footer;
 use anyhow::Result;
-use clap::{Arg, ArgGroup, ArgMatches, Args, FromArgMatches, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
-#[command(after_help = after_help(), group(ArgGroup::new(JOB).multiple(true)))]
+#[command(after_help = after_help(), group(ArgGroup::new(JOB).multiple(true).conflicts_with_all(["sweep", "preset"])))]
 pub struct Arguments {
     /// Sweep file with exactly one job, in place of the flags that describe one
-    #[arg(value_name = "SWEEP.toml", conflicts_with = JOB)]
+    #[arg(value_name = "SWEEP.toml")]
     sweep: Option<PathBuf>,
+    #[command(flatten)]
+    preset: PresetFlag,
+    #[command(flatten)]
+    job: JobFlags,
+    #[command(flatten)]
+    tables: TableFlags,
+    #[command(flatten)]
+    plot: PlotFlags,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// The group of the flags of a job; a sweep takes their place.
+const JOB: &str = "job";
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "The job")]
+struct JobFlags {
     /// Set a parameter of the model; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE", group = JOB)]
     settings: Vec<String>,
-    #[command(flatten)]
-    recording: RecordingFlags,
+    /// Slips to record after start-up [default: 20, unless --time is given]
+    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "N")]
+    slips: Option<String>,
+    /// Model time at which the job ends even without its slips, in s
+    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    time: Option<String>,
+    /// Set what else is recorded, as [record] of a sweep file has it; repeatable
+    #[arg(long = "record", value_name = "KEY=VALUE", group = JOB)]
+    records: Vec<String>,
     /// Method
     #[arg(long, value_enum, default_value_t = Method::EventDriven, group = JOB)]
     solver: Method,
@@ -49,121 +74,86 @@ pub struct Arguments {
     /// Step of the fixed-step solver, in s [default: 1e-6]
     #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
-    /// Write shear force, displacement and attached fraction over time, as Parquet
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Tables, as Parquet")]
+struct TableFlags {
+    /// Write shear force, displacement and attached fraction over time
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Write the attached fraction of every block over time, as Parquet
+    /// Write the attached fraction of every block over time
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
-    /// Write the displacement of every block at the end, as Parquet
+    /// Write the displacement of every block at the end
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
-    /// Write every contact event, as Parquet
+    /// Write every contact event
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
-    /// Write the slips with the columns of a sweep, as Parquet
+    /// Write the slips with the columns of a sweep
     #[arg(long, value_name = "FILE")]
     slip_table: Option<PathBuf>,
-    /// Draw the shear force and the attached fraction, as .svg, .png or .pdf; repeatable
-    #[arg(long, value_name = "FILE")]
-    plot: Vec<PathBuf>,
-    /// Panels of the plot
-    #[arg(long, value_enum, default_value_t = Panel::Both, requires = "plot")]
-    panel: Panel,
     /// Time between samples of trace, map and plot, in s
     #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
     sample: f64,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "A plot")]
+struct PlotFlags {
+    /// Draw the shear force and the attached fraction, as .svg, .png or .pdf; repeatable
+    #[arg(long = "plot", value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Panels of the plot
+    #[arg(long, value_enum, default_value_t = Panel::Both, requires = "files")]
+    panel: Panel,
     /// First instant of the plot, in s
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "plot")]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "files")]
     from: f64,
     /// Last instant of the plot, in s [default: the end]
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", requires = "plot")]
+    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", requires = "files")]
     until: Option<f64>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
 }
 
 impl Arguments {
     fn request(&self) -> Request {
+        let TableFlags { sample, trace, map, profile, contacts, .. } = &self.tables;
         Request {
-            sample: self.sample,
-            trace: self.trace.is_some() || self.draws(Panel::Force),
-            map: self.map.is_some() || self.draws(Panel::Map),
-            profile: self.profile.is_some(),
-            contacts: self.contacts.is_some(),
+            sample: *sample,
+            trace: trace.is_some() || self.plot.draws(Panel::Force),
+            map: map.is_some() || self.plot.draws(Panel::Map),
+            profile: profile.is_some(),
+            contacts: contacts.is_some(),
         }
-    }
-
-    /// Whether there is a plot with this panel.
-    fn draws(&self, panel: Panel) -> bool {
-        !self.plot.is_empty() && (self.panel == panel || self.panel == Panel::Both)
     }
 }
 
-/// The group of the flags of a job; a sweep file takes their place.
-const JOB: &str = "job";
+impl PlotFlags {
+    /// Whether there is a plot with this panel.
+    fn draws(&self, panel: Panel) -> bool {
+        !self.files.is_empty() && (self.panel == panel || self.panel == Panel::Both)
+    }
+}
 
 fn after_help() -> String {
-    let keys: Vec<String> = Symbol::ALL
-        .chunks(17)
-        .map(|keys| keys.iter().map(|symbol| symbol.key()).collect::<Vec<_>>().join(" "))
-        .collect();
+    let lines = |keys: &[&str]| keys.chunks(17).map(|keys| keys.join(" ")).collect::<Vec<_>>().join("\n");
     format!(
         "\
 Examples:
   stickslip simulate --slips 20
   stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
-  stickslip simulate --set dfs=0 --slips 1 --contacts contacts.parquet
-  stickslip simulate sweeps/fig1d.toml --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
+  stickslip simulate --set dfs=0 --slips 1 --record discard=0 --contacts contacts.parquet
+  stickslip simulate --preset fig1d --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
 
-Every key of the model can be set, in SI units; and eta or frequency (Hz) in place of T:
+Keys of --set, in SI units; and eta or frequency (Hz) in place of T:
+{}
+
+Keys of --record:
 {}",
-        keys.join("\n")
+        lines(&Symbol::ALL.map(Symbol::key)),
+        lines(&RecordingKey::ALL.map(RecordingKey::key)),
     )
-}
-
-/// What a job records, as given by flags: one flag for each key of `[record]` that has one.
-#[derive(Debug)]
-struct RecordingFlags(BTreeMap<RecordingKey, String>);
-
-impl Args for RecordingFlags {
-    fn augment_args(command: clap::Command) -> clap::Command {
-        let flag = |key: RecordingKey| {
-            let Description { key: id, unit, meaning, .. } = key.description();
-            let default = match (key, Recording::default().get(key)) {
-                (RecordingKey::Slips, _) => " [default: 20, unless --time is given]".to_owned(),
-                (_, Value::Absent) => String::new(),
-                (_, default) => format!(" [default: {default}]"),
-            };
-            let value_name = match unit {
-                "s" => "SECONDS",
-                "m" => "METRES",
-                "N" => "NEWTONS",
-                _ => "N",
-            };
-            let flag = Arg::new(id).long(key.flag()?).value_name(value_name).help(format!("{meaning}{default}"));
-            Some(flag.value_parser(number).allow_negative_numbers(true).group(JOB))
-        };
-        command.args(RecordingKey::ALL.into_iter().filter_map(flag))
-    }
-
-    fn augment_args_for_update(command: clap::Command) -> clap::Command {
-        Self::augment_args(command)
-    }
-}
-
-impl FromArgMatches for RecordingFlags {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        // A key without a flag is no argument of the command.
-        let given = |key: RecordingKey| Some((key, matches.try_get_one::<String>(key.key()).ok()??.clone()));
-        Ok(Self(RecordingKey::ALL.into_iter().filter_map(given).collect()))
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Self::from_arg_matches(matches)?;
-        Ok(())
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -184,7 +174,6 @@ const FORMAT: u32 = 1;
 
 #[derive(Serialize)]
 struct Report {
-    format: u32,
     job_id: String,
     simulated_seconds: f64,
     slips: usize,
@@ -203,9 +192,9 @@ struct Report {
 }
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
-    let sweep = match &arguments.sweep {
-        Some(path) => Sweep::from_file(path)?,
-        None => Sweep::parse(&as_sweep(arguments)?, Path::new("flags")).map_err(as_flags)?,
+    let sweep = match (&arguments.sweep, arguments.preset.preset) {
+        (None, None) => Sweep::parse(&arguments.job.as_sweep()?, Path::new("flags")).map_err(as_flags)?,
+        (file, preset) => sweep::read(file.as_deref(), preset)?,
     };
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
@@ -213,13 +202,15 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
+    let waiting = Waiting::for_what(format!("simulating; about {} predicted", output::duration(job.cost)));
     let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
+    drop(waiting);
     let wall = begin.elapsed().as_secs_f64();
 
     let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
     write_records(arguments, &footer, &recorded)?;
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    if let Some(path) = &arguments.slip_table {
+    if let Some(path) = &arguments.tables.slip_table {
         let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
         write_table(path, &footer, rows)?;
     }
@@ -228,33 +219,48 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// The flags as the text of a sweep with one point.
-fn as_sweep(arguments: &Arguments) -> Result<String> {
-    let solver = match (arguments.solver, &arguments.dt) {
-        (Method::EventDriven, None) => {
-            let resolve = arguments.resolve.as_ref().map(|word| format!("{word:?}"));
-            vec![
-                ("method", Some("\"event-driven\"".to_owned())),
-                ("tolerance", arguments.tolerance.clone()),
-                ("resolve", resolve),
-            ]
+impl JobFlags {
+    /// The text of a sweep with one point.
+    fn as_sweep(&self) -> Result<String, UsageError> {
+        let solver = match (self.solver, &self.dt) {
+            (Method::EventDriven, None) => {
+                let resolve = self.resolve.as_ref().map(|word| format!("{word:?}"));
+                vec![
+                    ("method", Some("\"event-driven\"".to_owned())),
+                    ("tolerance", self.tolerance.clone()),
+                    ("resolve", resolve),
+                ]
+            }
+            (Method::EventDriven, Some(_)) => {
+                return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()));
+            }
+            (Method::FixedStep, _) if self.tolerance.is_some() => {
+                return Err(UsageError("--tolerance: goes with --solver event-driven; use --dt".to_owned()));
+            }
+            (Method::FixedStep, _) if self.resolve.is_some() => {
+                return Err(UsageError("--resolve: goes with --solver event-driven".to_owned()));
+            }
+            (Method::FixedStep, dt) => {
+                let step = dt.as_deref().unwrap_or("1e-6").to_owned();
+                vec![("method", Some("\"fixed-step\"".to_owned())), ("dt", Some(step))]
+            }
+        };
+        let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
+        Ok(single::sweep_text(&written_settings(&self.settings)?, &self.recorded()?, &solver))
+    }
+
+    /// What is recorded, by `--slips`, `--time` and `--record`.
+    fn recorded(&self) -> Result<Written, UsageError> {
+        let mut recorded = written("--record", "energies=true", &self.records)?;
+        for (flag, key, value) in [("--slips", "slips", &self.slips), ("--time", "max_time", &self.time)] {
+            let Some(value) = value else { continue };
+            if recorded.iter().any(|(given, _)| given == key) {
+                return Err(UsageError(format!("{flag} {value}: --record sets {key}, too; keep one")));
+            }
+            recorded.push((key.to_owned(), value.clone()));
         }
-        (Method::EventDriven, Some(_)) => {
-            return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()).into());
-        }
-        (Method::FixedStep, _) if arguments.tolerance.is_some() => {
-            return Err(UsageError("--tolerance: goes with --solver event-driven; use --dt".to_owned()).into());
-        }
-        (Method::FixedStep, _) if arguments.resolve.is_some() => {
-            return Err(UsageError("--resolve: goes with --solver event-driven".to_owned()).into());
-        }
-        (Method::FixedStep, dt) => {
-            let step = dt.as_deref().unwrap_or("1e-6").to_owned();
-            vec![("method", Some("\"fixed-step\"".to_owned())), ("dt", Some(step))]
-        }
-    };
-    let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
-    Ok(single::sweep_text(&written_settings(&arguments.settings)?, &arguments.recording.0, &solver))
+        Ok(recorded)
+    }
 }
 
 /// The parameters as JSON, under their keys.
@@ -268,7 +274,6 @@ fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Resul
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
     let report = Report {
-        format: FORMAT,
         job_id: job_id.to_owned(),
         simulated_seconds: summary.end_time,
         slips: slips.len(),
@@ -286,7 +291,7 @@ fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Resul
         wall_seconds: wall,
     };
     if json {
-        return output::json(&report);
+        return output::json(FORMAT, &report);
     }
     if !slips.is_empty() {
         output::print("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors\n")?;

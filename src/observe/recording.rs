@@ -43,17 +43,6 @@ impl Recording {
     }
 }
 
-impl RecordingKey {
-    /// The flag of `stickslip simulate`, without its dashes; none for what has an effect in the tables of a sweep only.
-    pub fn flag(self) -> Option<String> {
-        match self {
-            Self::Precursors => None,
-            Self::MaxTime => Some("time".to_owned()),
-            _ => Some(self.key().replace('_', "-")),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

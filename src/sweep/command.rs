@@ -19,10 +19,12 @@ impl Sweep {
         }
         for key in RecordingKey::ALL {
             let value = self.recording.get(key);
-            // The default of slips is another there.
-            let is_needed = key == RecordingKey::Slips || value != Recording::default().get(key);
-            if let Some(flag) = key.flag().filter(|_| is_needed) {
-                words.push(format!("--{flag} {value}"));
+            match key {
+                // Its default is another there.
+                RecordingKey::Slips => words.push(format!("--slips {value}")),
+                _ if value == Recording::default().get(key) => {}
+                RecordingKey::MaxTime => words.push(format!("--time {value}")),
+                _ => words.push(format!("--record {}={value}", key.key())),
             }
         }
         match self.solver {

@@ -277,7 +277,7 @@ fn a_pipe_gets_the_report_and_nothing_else() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);
     let report = folder.ends(0, "run tiny.toml --json --out r").stdout;
-    assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    assert_eq!((json(&report)["jobs_run"].as_u64(), json(&report)["format"].as_u64()), (Some(TINY_JOBS), Some(2)));
     for command in [
         "plan tiny.toml --json",
         "status r --json",
@@ -304,7 +304,7 @@ fn a_reader_that_leaves_does_not_end_a_run() {
     drop((child.stdout.take(), child.stderr.take()));
     assert_eq!(child.wait().unwrap().code(), Some(1));
     assert_eq!(folder.table("r", "jobs").cells.len(), 6);
-    let mut child = folder.start("completions bash");
+    let mut child = folder.start("generate completions bash");
     drop(child.stdout.take());
     assert_eq!(wait(child), (Some(0), String::new(), String::new()));
 }
@@ -313,7 +313,7 @@ fn a_reader_that_leaves_does_not_end_a_run() {
 fn completions_are_there_for_the_usual_shells() {
     let folder = Folder::new();
     for shell in ["bash", "zsh", "fish"] {
-        let script = folder.ends(0, &format!("completions {shell}")).stdout;
+        let script = folder.ends(0, &format!("generate completions {shell}")).stdout;
         for word in ["stickslip", "simulate", "retry-failed"] {
             assert!(script.contains(word), "{shell}: {word}");
         }
@@ -325,23 +325,8 @@ fn the_help_of_every_command_holds_an_example() {
     let folder = Folder::new();
     assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
     let commands = [
-        "",
-        "init",
-        "plan",
-        "run",
-        "batch",
-        "status",
-        "reduce",
-        "plot",
-        "report",
-        "verify",
-        "compact",
-        "merge",
-        "simulate",
-        "accuracy",
-        "schema",
-        "completions",
-        "man",
+        "", "init", "plan", "run", "batch", "status", "reduce", "plot", "report", "verify", "compact", "merge",
+        "simulate", "accuracy", "generate",
     ];
     for command in commands {
         let help = folder.ends(0, &format!("{command} --help")).stdout;

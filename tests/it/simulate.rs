@@ -210,7 +210,7 @@ fn a_plot_shows_the_panels_and_the_time_that_were_asked_for_in_every_file() {
 #[test]
 fn what_is_hardly_meant_is_warned_of_and_a_plot_after_the_end_is_refused() {
     let folder = Folder::new();
-    let fast = folder.ends(0, "simulate --set V0=100 --set N=2 --slips 1 --discard 0");
+    let fast = folder.ends(0, "simulate --set V0=100 --set N=2 --slips 1 --record discard=0");
     assert!(fast.stderr.contains("warning: V0 = 100 m/s is far too fast for stick-slip"), "{}", fast.stderr);
     folder.write("slow.toml", "name = \"slow\"\n[model]\nDelta = 1e-6\neta = 1e-4\n");
     assert!(folder.ends(0, "plan slow.toml").stderr.contains("warning: eta = 1.000e-4"));

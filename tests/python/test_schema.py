@@ -51,7 +51,7 @@ BAD = [
 
 @pytest.fixture(scope="module")
 def validator(stickslip):
-    schema = json.loads(stickslip("schema").stdout)
+    schema = json.loads(stickslip("generate", "schema").stdout)
     jsonschema.Draft7Validator.check_schema(schema)
     return jsonschema.Draft7Validator(schema)
 

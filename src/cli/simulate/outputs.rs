@@ -20,31 +20,32 @@ use std::path::Path;
 pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &Parameters) -> Result<()> {
     let recording = sweep.recording();
     arguments.request().check(parameters, recording).map_err(|error| UsageError(format!("--{error}")))?;
-    if !(arguments.from >= 0.0 && arguments.from.is_finite()) {
-        return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.from)).into());
+    if !(arguments.plot.from >= 0.0 && arguments.plot.from.is_finite()) {
+        return Err(UsageError(format!("--from {}: must be a finite number >= 0, in s", arguments.plot.from)).into());
     }
     let longest = recording.max_time.unwrap_or(f64::INFINITY);
-    if arguments.from >= longest {
-        let problem = format!("--from {}: must lie before the end, {longest} s", arguments.from);
+    if arguments.plot.from >= longest {
+        let problem = format!("--from {}: must lie before the end, {longest} s", arguments.plot.from);
         return Err(UsageError(problem).into());
     }
-    if let Some(until) = arguments.until.filter(|until| !(*until > arguments.from && until.is_finite())) {
-        let problem = format!("--until {until}: must be a finite number > {}, the first instant, in s", arguments.from);
+    if let Some(until) = arguments.plot.until.filter(|until| !(*until > arguments.plot.from && until.is_finite())) {
+        let problem =
+            format!("--until {until}: must be a finite number > {}, the first instant, in s", arguments.plot.from);
         return Err(UsageError(problem).into());
     }
-    for path in &arguments.plot {
+    for path in &arguments.plot.files {
         format_of(path).map_err(|error| UsageError(format!("--plot {error}")))?;
     }
     let tables = [
-        ("--trace", &arguments.trace),
-        ("--map", &arguments.map),
-        ("--profile", &arguments.profile),
-        ("--contacts", &arguments.contacts),
-        ("--slip-table", &arguments.slip_table),
+        ("--trace", &arguments.tables.trace),
+        ("--map", &arguments.tables.map),
+        ("--profile", &arguments.tables.profile),
+        ("--contacts", &arguments.tables.contacts),
+        ("--slip-table", &arguments.tables.slip_table),
     ];
     let tables = tables.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?)));
     let mut paths = Vec::new();
-    for (flag, path) in tables.chain(arguments.plot.iter().map(|path| ("--plot", path))) {
+    for (flag, path) in tables.chain(arguments.plot.files.iter().map(|path| ("--plot", path))) {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // A device is not to be replaced by a file.
         if !folder.is_dir() || (path.exists() && !path.is_file()) {
@@ -62,16 +63,16 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
 }
 
 pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: &Records) -> Result<()> {
-    if let Some(path) = &arguments.trace {
+    if let Some(path) = &arguments.tables.trace {
         write_table(path, footer, recorded.trace.iter().copied())?;
     }
-    if let Some(path) = &arguments.map {
+    if let Some(path) = &arguments.tables.map {
         write_table(path, footer, recorded.map.iter().copied())?;
     }
-    if let Some(path) = &arguments.profile {
+    if let Some(path) = &arguments.tables.profile {
         write_table(path, footer, recorded.profile.iter().copied())?;
     }
-    if let Some(path) = &arguments.contacts {
+    if let Some(path) = &arguments.tables.contacts {
         write_table(path, footer, recorded.contacts.iter().map(ContactRow::from))?;
     }
     Ok(())
@@ -96,19 +97,19 @@ pub(super) fn write_pictures(
     recorded: &Records,
     slips: &[Slip],
 ) -> Result<()> {
-    if arguments.plot.is_empty() {
+    if arguments.plot.files.is_empty() {
         return Ok(());
     }
     let Records { trace, map, .. } = recorded;
     let last = trace.last().map(|row| row.time).or(map.last().map(|row| row.time)).unwrap_or(0.0);
-    if arguments.from >= last {
-        let from = arguments.from;
+    if arguments.plot.from >= last {
+        let from = arguments.plot.from;
         let problem =
             format!("--from {from}: the simulation ended at {last} s; take an earlier instant, or a longer --time");
         return Err(UsageError(problem).into());
     }
     let picture = draw(arguments, parameters, recorded, slips)?;
-    for path in &arguments.plot {
+    for path in &arguments.plot.files {
         let bytes = picture.encoded(format_of(path)?)?;
         replace(path, |draft| Ok(std::fs::write(draft, &bytes)?))?;
     }
@@ -118,8 +119,8 @@ pub(super) fn write_pictures(
 fn draw(arguments: &Arguments, parameters: &Parameters, recorded: &Records, slips: &[Slip]) -> Result<Picture> {
     let Records { trace, map, .. } = recorded;
     // The sample at an end is shown, however its time is rounded.
-    let slack = 1e-6 * arguments.sample;
-    let shown = arguments.from - slack..=arguments.until.unwrap_or(f64::INFINITY) + slack;
+    let slack = 1e-6 * arguments.tables.sample;
+    let shown = arguments.plot.from - slack..=arguments.plot.until.unwrap_or(f64::INFINITY) + slack;
     let samples: Vec<(f64, f64)> =
         trace.iter().filter(|row| shown.contains(&row.time)).map(|row| (row.time, row.force)).collect();
     let cells = || map.iter().filter(|row| shown.contains(&row.time));
@@ -134,10 +135,10 @@ fn draw(arguments: &Arguments, parameters: &Parameters, recorded: &Records, slip
     let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
     let simulation = Simulation {
         parameters,
-        trace: arguments.draws(Panel::Force).then_some(samples.as_slice()),
-        map: arguments.draws(Panel::Map).then_some(map),
+        trace: arguments.plot.draws(Panel::Force).then_some(samples.as_slice()),
+        map: arguments.plot.draws(Panel::Map).then_some(map),
         onsets: &onsets,
     };
     figure::simulation(&simulation, &Look::default())
-        .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.from))))
+        .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.plot.from))))
 }

@@ -644,7 +644,11 @@ fn a_job_that_takes_long_is_told_while_it_runs() {
     })
     .unwrap();
     assert!(ticks >= 2, "{ticks}");
-    assert_eq!(told, vec!["stickslip simulate --set seed=7 --slips 1 --discard 0"; 2], "again when it has doubled");
+    assert_eq!(
+        told,
+        vec!["stickslip simulate --set seed=7 --slips 1 --record discard=0"; 2],
+        "again when it has doubled"
+    );
 }
 
 #[test]
