@@ -208,7 +208,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
         ("simulate --slips few", &["--slips", "must be a number"]),
         ("simulate --record discard=-1", &["discard = -1", "must be a whole number from 0"]),
         ("simulate --record energies=1", &["energies = 1", "must be true or false"]),
-        ("simulate --record slip=3", &["slip = 3: unknown key; did you mean slips?"]),
+        ("simulate --record slip=3", &["slip = 3: unknown key in [record]; did you mean slips?"]),
         ("simulate --record slips=3 --slips 4", &["--slips 4: --record sets slips, too; keep one"]),
         ("simulate --record energies", &["--record energies: must be KEY=VALUE, such as --record energies=true"]),
         ("simulate --time nan", &["max_time = nan", "must be a finite number > 0, in s"]),
