@@ -47,7 +47,9 @@ pub fn sweep_text(model: &Written, record: &Written, solver: &Written) -> String
         (false, true) => "slips = 10000000\n",
         (false, false) => "slips = 20\n",
     };
-    let lines = |entries: &Written| entries.iter().map(|(key, value)| format!("{key} = {value}\n")).collect::<String>();
+    let lines = |entries: &Written| {
+        entries.iter().flat_map(|(key, value)| [key.as_str(), " = ", value, "\n"]).collect::<String>()
+    };
     let [model, record, solver] = [model, record, solver].map(lines);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }

@@ -118,7 +118,7 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
             (SLURM, format!("1-{starts}{limit}"), minutes, options)
         }
         Engine::Hyperqueue => {
-            let options: String = options.iter().map(|option| format!("{} ", quoted(option))).collect();
+            let options: String = options.iter().map(|option| quoted(option) + " ").collect();
             (HYPERQUEUE, format!("1-{starts}"), time::with_units(*time), options)
         }
     };
