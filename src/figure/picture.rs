@@ -1,10 +1,10 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
+use super::BadOption;
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
-use super::BadOption;
-use anyhow::{Result, anyhow};
 use crate::table::shown::shown_text;
+use anyhow::{Result, anyhow};
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
