@@ -170,7 +170,7 @@ fn a_time_limit_ends_a_simulation() {
 fn the_slowest_drives_that_are_allowed_end() {
     let folder = Folder::new();
     for velocity in ["1e-50", "1e-104"] {
-        folder.ends(0, &format!("simulate --set V0={velocity} --slips 1 --discard 0"));
+        folder.ends(0, &format!("simulate --set V0={velocity} --slips 1 --record discard=0"));
     }
 }
 
