@@ -3,10 +3,9 @@
 Each returns its axes, so that anything can be added or changed: `axes.set_xlim(...)`, `axes.figure.savefig(...)`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import wraps
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from ._stickslip import ResultsError, minimum_phase
 
@@ -48,26 +47,14 @@ MAX_MEANS = 60
 #: Size of a slip.
 MARKER = 3.5
 
-_Draw = TypeVar("_Draw", bound=Callable[..., Any])
-
 
 @contextmanager
 def _styled() -> Iterator[None]:
+    """In the program's look, whatever is set elsewhere."""
     from matplotlib import rc_context
 
     with rc_context(STYLE):
         yield
-
-
-def _in_style(draw: _Draw) -> _Draw:
-    """Draws in the program's look, whatever is set elsewhere."""
-
-    @wraps(draw)
-    def styled(*arguments: Any, **options: Any) -> Any:
-        with _styled():
-            return draw(*arguments, **options)
-
-    return styled  # type: ignore[return-value]
 
 
 def _new_axes() -> "Axes":
@@ -82,7 +69,7 @@ class Plot:
     def __init__(self, results: "Results") -> None:
         self._results = results
 
-    @_in_style
+    @_styled()
     def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
         """Phases of slips (rad) against eta, with means over locked sets and where Eq. 2 lets slips begin (Fig. 3e)."""
         points = self._slips("phase")
@@ -101,7 +88,7 @@ class Plot:
         axes.legend(loc="lower right", markerscale=1.5)
         return axes
 
-    @_in_style
+    @_styled()
     def intervals(self, axes: "Axes | None" = None) -> "Axes":
         """Intervals in periods, tau/T, against the period T (s), with a line for each of the most frequent n (Fig. 3c)."""
         points = self._slips("interval")
@@ -120,7 +107,7 @@ class Plot:
         axes.legend(loc="best", markerscale=1.5)
         return axes
 
-    @_in_style
+    @_styled()
     def histograms(self, sets: "list[str] | None" = None) -> "numpy.ndarray":
         """Histograms of the interval tau (s), a panel for each set, by rising frequency; at most 8 (Fig. 2).
 

@@ -8,32 +8,6 @@ from dataclasses import dataclass, field
 WIDTH = 120
 
 
-@dataclass(frozen=True)
-class Check:
-    """Measured numbers against one sentence of the paper."""
-
-    #: Empty where the criterion says it.
-    claim: str
-    criterion: str
-    measured: str
-    #: Whether each of them meets the criterion.
-    agrees: tuple[bool, ...]
-
-    def row(self, number: str) -> dict:
-        """Its row of a table, with the number of its statement if it has one."""
-        agrees = "yes" if all(self.agrees) else "in part" if any(self.agrees) else "**no**"
-        claim = number + ": ".join(filter(None, (self.claim, self.criterion)))
-        return {"claim: criterion": claim, "measured": self.measured, "agrees": agrees}
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What is to be said of a statement: "holds", "holds for ...", "holds in part", "restates ..."; and why."""
-
-    word: str
-    reason: str = ""
-
-
 @dataclass
 class Section:
     """A statement of the paper, or a question beyond it."""
@@ -44,21 +18,26 @@ class Section:
     source: str
     #: Pictures in results/, by the stems of their names.
     pictures: tuple[str, ...] = ()
-    checks: list[Check] = field(default_factory=list)
+    #: Rows of the table of checks: measured numbers against one sentence of the paper each; and whether each number agrees.
+    checks: list[dict] = field(default_factory=list)
+    agrees: list[bool] = field(default_factory=list)
     #: Of a table: the cells of each row by the heads of their columns.
     rows: list[dict] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
-    #: Where the checks alone do not say it.
-    verdict: Verdict | None = None
+    #: Where the checks alone do not say it: "holds", "holds for ...", "holds in part", "restates ..."; and why.
+    verdict: tuple[str, str] | None = None
 
     def summary(self) -> dict:
         """Its row of the table of verdicts."""
-        agrees = all(all(check.agrees) for check in self.checks)
-        verdict = self.verdict or Verdict("holds" if agrees else "does not hold")
-        return {"statement": self.title, "verdict": verdict.word, "why": verdict.reason}
+        word, why = self.verdict or ("holds" if all(self.agrees) else "does not hold", "")
+        return {"statement": self.title, "verdict": word, "why": why}
 
     def check(self, claim: str, criterion: str, measured: str, *agrees: bool) -> None:
-        self.checks.append(Check(claim, criterion, measured, tuple(map(bool, agrees))))
+        """`claim` is empty where the criterion says it; `agrees` are whether each measured number meets it."""
+        self.agrees += map(bool, agrees)
+        claim = self.number() + ": ".join(filter(None, (claim, criterion)))
+        word = "yes" if all(agrees) else "in part" if any(agrees) else "**no**"
+        self.checks.append({"claim: criterion": claim, "measured": measured, "agrees": word})
 
     def remark(self, *sentences: str) -> None:
         self.remarks.append(paragraph(*sentences))
@@ -79,7 +58,7 @@ def figure(title: str, sections: list[Section]) -> str:
     sources = "; ".join(dict.fromkeys(section.source for section in sections))
     parts = [f"### {title}", paragraph(f"From {sources}.")]
     parts += [f"![{picture}](../results/{picture}.png)" for section in sections for picture in section.pictures]
-    checks = [check.row(section.number()) for section in sections for check in section.checks]
+    checks = [check for section in sections for check in section.checks]
     parts += [table(rows) for rows in (checks, *(section.rows for section in sections)) if rows]
     return "\n\n".join([*parts, *(remark for section in sections for remark in section.remarks)])
 

@@ -10,7 +10,7 @@ from scipy import stats
 from stickslip.statistics import Estimate, difference, jackknife, share
 from stickslip.tables import Sweep, parameters, read, select
 
-from .document import Section, Verdict
+from .document import Section
 from .intervals import LARGE, without_modulation
 from .kinematics import under_minimum
 
@@ -80,7 +80,7 @@ def at_velocities(section: Section, sweep: Sweep) -> None:
         f"at {', '.join(thresholds)}; {', '.join(strongest)} at 0.5",
         *reduced,
     )
-    section.verdict = Verdict(
+    section.verdict = (
         f"holds for V0 = {sets['V0'].max():g} m/s", f"the median change at small amplitudes is {', '.join(changed)}"
     )
 
@@ -151,7 +151,7 @@ def slow_fronts(results: Path) -> Section:
         (first <= 7).mean() > 0.5,
     )
     arrest(section, precursors[~is_large])
-    section.verdict = Verdict(
+    section.verdict = (
         f"holds for {', '.join(str(frequency) for frequency, is_gone in gone.items() if is_gone)} Hz",
         "" if gone[200] else "at 200 Hz slow fronts remain, arrested in each period, which is shorter than a front",
     )
@@ -231,7 +231,7 @@ def edge(results: Path) -> Section:
         f" {carried:.3f} of F_S.",
         "After precursors it may spread otherwise.",
     )
-    section.verdict = Verdict(
+    section.verdict = (
         "holds in part",
         f"the first block carries {given['N'] * carried:.1f} times the mean, but 4 to 5 % of the peak force are"
         f" {100 * of_strength[0]:.0f} to {100 * of_strength[1]:.0f} % of its strength, not 20 %",

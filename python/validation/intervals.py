@@ -13,7 +13,7 @@ from scipy import signal, stats
 from stickslip.statistics import Estimate, jackknife, locking_index, mean, near_whole, share
 from stickslip.tables import Sweep, select
 
-from .document import Section, Verdict
+from .document import Section
 from .kinematics import random_load_share
 
 #: Frequencies in Hz of Fig. 2e and 2f.
@@ -101,7 +101,7 @@ def stick_slip(results: Path) -> Section:
         f"{seen.text(2)} have any, of {VISIBLE * peak:.1f} N",
         seen.low > 0.5,
     )
-    section.verdict = Verdict(
+    section.verdict = (
         "holds in part",
         f"τ has {len(modes)} modes, not two, with {', '.join(f'{len(rows) / len(slips):.0%}' for rows in of_modes)} of"
         f" the slips; {two_or_three[SIZES[0]].value:.2f} of the slips, not most, have two or three precursors",
@@ -206,7 +206,7 @@ def many_periods(results: Path) -> Section:
         )
     slow = slips[slips["V0"] < 9e-5]
     excess = share(slow["near"], slow["set_id"]).value - slow["expected"].mean()
-    section.verdict = Verdict(
+    section.verdict = (
         "holds; for slow drives it follows from kinematics",
         f"random loads give as many intervals near nT (difference {excess:.3f} below 1e-4 m/s)",
     )
@@ -258,7 +258,7 @@ def stress_drops(results: Path) -> Section:
         "Force grows at the rate K_d V0 between slips, so drops follow τ; the square of their correlation is"
         f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}."
     )
-    section.verdict = Verdict(
+    section.verdict = (
         "restates statement 3", "drops follow τ; at given τ they vary more with modulation, not less"
     )
     return section

@@ -10,7 +10,7 @@ from scipy import stats
 from stickslip.statistics import Estimate, bootstrap, jackknife, mean, proportion, rayleigh_p, resultant_length, share
 from stickslip.tables import Sweep
 
-from .document import Section, Verdict
+from .document import Section
 from .kinematics import (
     load_phase,
     locked_by_chance,
@@ -63,7 +63,7 @@ def phase(results: Path) -> Section:
         f" {others['attached_before'].mean():.3f}: the load seems to break contacts at its maximum, and a period is too"
         " short for all to reattach.",
     )
-    section.verdict = Verdict(
+    section.verdict = (
         "holds in part; for slow drives it follows from kinematics",
         f"onsets lie above φ_min by definition; of first breaks {last.value:.2f} lie below for η > 200; φ begins at"
         f" −{-start.value:.2f}, not −π; the resultant exceeds that of random loads by {slow.value:.3f} below 1e-4 m/s, by"
@@ -173,7 +173,7 @@ def below_one(results: Path) -> Section:
         f" (median {ratios.median():.2f}).",
         "Why fast drives lock although the load never falls was not investigated.",
     )
-    section.verdict = Verdict(
+    section.verdict = (
         "holds for V0 below 1e-4 m/s",
         f"by the load phase {slow_locked} sets are locked there, from 1e-4 m/s on {fast_locked}; by φ"
         f" {sets['locked'].sum()} of {len(sets)}, random loads {sets['chance'].sum():.0f}",
@@ -192,7 +192,7 @@ def stiff_drive(results: Path) -> Section:
     high = high.assign(first=nucleation_phase(high))
     under = first_breaks(section, high)
     section.check(*envelope(high))
-    section.verdict = Verdict(
+    section.verdict = (
         "holds in part",
         f"the envelope of first breaks has the exponent, but {under.value:.2f} lie below it for η from 30 to 200",
     )
