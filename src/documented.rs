@@ -1,7 +1,8 @@
 //! Pages and tables in `docs/` that follow from the code: the tests hold them against it, and write them with
 //! `UPDATE_DOCS=1`.
 
-use crate::model::{Description, Value};
+use crate::model::{Description, Symbol, Value};
+use crate::table::columns::{Column, Kind, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -48,3 +49,40 @@ fn table(fields: &[(Description, Value)]) -> String {
     }
     text
 }
+
+/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
+/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
+pub(crate) fn markdown<T: Table>() -> String {
+    let is_parameter = |column: &Column| {
+        Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
+    };
+    let share_a_line = |one: &Column, next: &Column| {
+        let is_pair = one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
+        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
+    };
+    let line = |columns: &[Column]| {
+        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
+        let names = names.join(" ");
+        let Column { unit, meaning, kind, nullable, .. } = &columns[0];
+        if is_parameter(&columns[0]) {
+            return format!("| {names} | | [parameters](model.md#parameters) |\n");
+        }
+        let unit = match kind {
+            Kind::Real if unit.is_empty() => "1",
+            Kind::Real => unit,
+            kind => kind.word(),
+        };
+        let nullable = if *nullable { "?" } else { "" };
+        let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
+        format!("| {names} | {unit}{nullable} | {meaning} |\n")
+    };
+    let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
+    format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
+}
+
+/// How the meaning of the lower end of an interval begins.
+const LOWER_END: &str = "lower end of";
+
+/// How the pages of tables show units and kinds.
+pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
+    A `?` marks columns that may be null.\n";

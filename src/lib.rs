@@ -8,10 +8,10 @@
 //!                               model/
 //! ```
 //!
-//! Imports run one way: `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
+//! Imports run one way: `table` <- `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
 //! `reduce` <- `figure`; `run`, `figure` <- `report`.
-//! Rows are described in `table`, which knows `model` alone; its files and all folders but the first three need the feature
-//! `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
+//! Values and rows are described in `table`, which knows no physics but its versions; its files and all folders but `model`,
+//! `solver` and `observe` need the feature `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
 //! to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |

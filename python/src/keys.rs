@@ -63,7 +63,7 @@ fn object(py: Python<'_>, value: Value) -> PyResult<Bound<'_, PyAny>> {
         Value::Count(count) => Ok(count.into_pyobject(py)?.into_any()),
         Value::Real(real) => Ok(real.into_pyobject(py)?.into_any()),
         Value::Flag(flag) => Ok(flag.into_pyobject(py)?.to_owned().into_any()),
-        Value::BreakOn(rule) => Ok(rule.word().into_pyobject(py)?.into_any()),
-        Value::Absent => Ok(py.None().into_bound(py)),
+        Value::Text(word) => Ok(word.into_pyobject(py)?.into_any()),
+        Value::Null => Ok(py.None().into_bound(py)),
     }
 }

@@ -12,7 +12,7 @@ use stickslip::observe::{ContactRow, RecordingKey};
 use stickslip::results::tables::{All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel};
 use stickslip::simulate::{self as single, Records, Request, only_job};
 use stickslip::sweep::Sweep;
-use stickslip::table::columns::{Cell, Row};
+use stickslip::table::columns::{Row, Value};
 
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
@@ -105,11 +105,11 @@ fn as_dict<'py, R: Row>(py: Python<'py>, row: &R) -> PyResult<Bound<'py, PyDict>
         let Some(column) = columns.get(dict.len()) else { return };
         let name = column.name.as_ref();
         let set = match cell {
-            Cell::Null => dict.set_item(name, py.None()),
-            Cell::Real(real) => dict.set_item(name, real),
-            Cell::Count(count) => dict.set_item(name, count),
-            Cell::Flag(flag) => dict.set_item(name, flag),
-            Cell::Text(text) => dict.set_item(name, text),
+            Value::Null => dict.set_item(name, py.None()),
+            Value::Real(real) => dict.set_item(name, real),
+            Value::Count(count) => dict.set_item(name, count),
+            Value::Flag(flag) => dict.set_item(name, flag),
+            Value::Text(text) => dict.set_item(name, text),
         };
         written = std::mem::replace(&mut written, Ok(())).and(set);
     });

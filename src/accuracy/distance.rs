@@ -5,7 +5,7 @@
 //! have a sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is
 //! keyed: the same samples give the same intervals.
 
-use crate::table::columns::{Cell, Column, Kind, Part, columns};
+use crate::table::columns::{Column, Kind, Part, Value, columns};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -40,13 +40,13 @@ macro_rules! with_columns_about_it {
                 [("", meaning), $(($suffix, $meaning)),*].map(column).to_vec()
             }
 
-            fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
+            fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
                 for value in [self.value, $(self.$field),*] {
-                    give(Cell::Real(value));
+                    give(Value::Real(value));
                 }
             }
 
-            fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+            fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
                 let mut read = || Part::take(name, next);
                 Ok(Self { value: read()?, $($field: read()?),* })
             }

@@ -288,8 +288,8 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
 
 /// Every case, group by group.
 pub fn hard_cases() -> Vec<HardCase> {
+    use crate::table::value::Value::{Count, Real};
     use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, Ki, L, M, N, Ns, Seed, T, TauR, V0};
-    use Value::{Count, Real};
     let case = HardCase::new;
     let mut cases = Vec::new();
 

@@ -177,9 +177,9 @@ mod tests {
     use super::super::distance::distances as measured;
     use super::super::study::DistanceRow;
     use super::*;
+    use crate::model::selected::Selected;
     use crate::solver::Solver;
     use crate::table::file::Dataset;
-    use crate::table::selected::Selected;
 
     fn findings() -> Findings {
         let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });

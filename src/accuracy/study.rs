@@ -11,11 +11,12 @@ use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
 use super::{Realisation, set_in_words};
+use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
-use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
-use crate::table::selected::{Selected, Selection};
+use crate::table::columns::{Table, columns};
+use crate::table::value::words;
 use anyhow::{Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -155,48 +156,39 @@ impl Table for MethodRow {
     const MEANING: &'static str = "One row per set of parameters and solver setting";
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Interval τ, in s.
-    Interval,
-    /// Phase φ, in rad.
-    Phase,
-    /// Stress drop, in N.
-    Drop,
-    /// Shear force at the onset, in N.
-    PeakForce,
-    /// Time from the first to the last break, in s.
-    Duration,
-    /// Speed of the rupture front, in m/s.
-    FrontSpeed,
+words! {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Quantity {
+        /// Interval τ, in s.
+        Interval = "interval",
+        /// Phase φ, in rad.
+        Phase = "phase",
+        /// Stress drop, in N.
+        Drop = "drop",
+        /// Shear force at the onset, in N.
+        PeakForce = "peak_force",
+        /// Time from the first to the last break, in s.
+        Duration = "duration",
+        /// Speed of the rupture front, in m/s.
+        FrontSpeed = "front_speed",
+    }
 }
 
 impl Quantity {
-    pub const ALL: [Self; 6] =
-        [Self::Interval, Self::Phase, Self::Drop, Self::PeakForce, Self::Duration, Self::FrontSpeed];
-
-    pub const fn name(self) -> &'static str {
-        self.column().0
-    }
-
     fn sample(self, slips: &[Slip]) -> Vec<f64> {
-        slips.iter().filter_map(self.column().1).collect()
+        slips.iter().filter_map(self.column()).collect()
     }
 
-    const fn column(self) -> (&'static str, fn(&Slip) -> Option<f64>) {
+    const fn column(self) -> fn(&Slip) -> Option<f64> {
         match self {
-            Self::Interval => ("interval", |slip| slip.interval),
-            Self::Phase => ("phase", |slip| slip.phase),
-            Self::Drop => ("drop", |slip| Some(slip.drop)),
-            Self::PeakForce => ("peak_force", |slip| Some(slip.peak_force)),
-            Self::Duration => ("duration", |slip| Some(slip.duration)),
-            Self::FrontSpeed => ("front_speed", |slip| slip.front_speed),
+            Self::Interval => |slip| slip.interval,
+            Self::Phase => |slip| slip.phase,
+            Self::Drop => |slip| Some(slip.drop),
+            Self::PeakForce => |slip| Some(slip.peak_force),
+            Self::Duration => |slip| Some(slip.duration),
+            Self::FrontSpeed => |slip| slip.front_speed,
         }
     }
-}
-
-fields! {
-    Quantity: Text, |quantity| quantity.name(), |name| Quantity::ALL.into_iter().find(|quantity| quantity.name() == name);
 }
 
 columns! {

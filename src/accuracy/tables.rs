@@ -3,7 +3,7 @@
 //! Unlike the tables of a sweep these hold times, of the machine that they were measured on. Their JSON has the same fields.
 
 use crate::solver::{Resolve, Solver};
-use crate::table::columns::{Cell, Column, Kind, Part};
+use crate::table::columns::{Column, Kind, Part, Value};
 
 const FIXED_STEP: &str = "fixed-step";
 
@@ -27,19 +27,19 @@ impl Part for Solver {
         ]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
-        give(Cell::Text(method(*self)));
-        give(Cell::Real(match *self {
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(Value::Text(method(*self)));
+        give(Value::Real(match *self {
             Self::EventDriven { tolerance, .. } => tolerance,
             Self::FixedStep { time_step } => time_step,
         }));
     }
 
-    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+    fn take<'a>(_: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         match (next(), next()) {
-            (Cell::Text(FIXED_STEP), Cell::Real(time_step)) => Ok(Self::FixedStep { time_step }),
-            (Cell::Text("event-driven"), Cell::Real(tolerance)) => Ok(Self::event_driven(tolerance)),
-            (Cell::Text(word), Cell::Real(tolerance)) if let Some(resolve) = Resolve::from_word(word) => {
+            (Value::Text(FIXED_STEP), Value::Real(time_step)) => Ok(Self::FixedStep { time_step }),
+            (Value::Text("event-driven"), Value::Real(tolerance)) => Ok(Self::event_driven(tolerance)),
+            (Value::Text(word), Value::Real(tolerance)) if let Some(resolve) = Resolve::from_word(word) => {
                 Ok(Self::EventDriven { tolerance, resolve })
             }
             (method, setting) => Err(format!("columns method and setting cannot hold {method:?} and {setting:?}")),

@@ -243,7 +243,7 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
     let Some(slips) = quantities.first().and_then(found) else { return Vec::new() };
     let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<Vec<_>>().concat();
     let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
-    let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.name(), unit(quantity))).collect();
+    let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.word(), unit(quantity))).collect();
     let mut lines = vec![
         format!(
             "bias of the mean ± 95 % interval: {} slips compared with {} of one reference, so that marks in a column come together",
@@ -305,8 +305,8 @@ mod tests {
     use super::*;
     use crate::accuracy::Cost;
     use crate::accuracy::breaks::BreakErrors;
+    use crate::model::selected::Selected;
     use crate::solver::Solver;
-    use crate::table::selected::Selected;
 
     /// The lines below the tables of a study with one solver, of which this number of slips was timed.
     fn explained(timed_slips: u64, together_throughout: bool) -> String {

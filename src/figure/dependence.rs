@@ -127,8 +127,8 @@ pub(super) fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
         (Symbol::Dfs, _) => Some(parameters.threshold_deviation / parameters.mean_threshold),
         (_, Value::Real(real)) => Some(real),
         (_, Value::Count(count)) => Some(count as f64),
-        (_, Value::BreakOn(rule)) => Some(if rule == BreakOn::Magnitude { 0.0 } else { 1.0 }),
-        (_, Value::Flag(_) | Value::Absent) => None,
+        (_, Value::Text(word)) => Some(if word == BreakOn::Magnitude.word() { 0.0 } else { 1.0 }),
+        (_, Value::Flag(_) | Value::Null) => None,
     }
 }
 

@@ -11,6 +11,7 @@ pub use super::values::columns;
 use super::values::{FREQUENCY_COLUMN, Values};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
+use std::cmp::Ordering;
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 400.0;
@@ -260,13 +261,12 @@ fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<u
     let Some(symbol) = symbol else { return Vec::new() };
     let others = |set: usize| {
         let others = Symbol::ALL.into_iter().filter(|other| *other != symbol && *other != Symbol::Seed);
-        others.map(|other| rows[set].parameters.get(other).bits()).collect::<Vec<_>>()
+        others.map(|other| rows[set].parameters.get(other)).collect::<Vec<_>>()
     };
-    let mut lines: std::collections::BTreeMap<Vec<(u8, u64)>, Vec<usize>> = std::collections::BTreeMap::new();
-    for &set in sets {
-        lines.entry(others(set)).or_default().push(set);
-    }
-    let mut lines: Vec<Vec<usize>> = lines.into_values().filter(|line| line.len() > 1).collect();
+    let mut sets: Vec<_> = sets.iter().map(|&set| (others(set), set)).collect();
+    sets.sort_by(|(left, _), (right, _)| left.partial_cmp(right).unwrap_or(Ordering::Equal));
+    let lines = sets.chunk_by(|(left, _), (right, _)| left == right).filter(|line| line.len() > 1);
+    let mut lines: Vec<Vec<usize>> = lines.map(|line| line.iter().map(|(_, set)| *set).collect()).collect();
     if lines.len() > MAX_LINES {
         return Vec::new();
     }
@@ -324,8 +324,8 @@ impl Drawn<'_> {
 pub(super) mod tests {
     use super::*;
     use crate::model::Parameters;
+    use crate::model::selected::Selected;
     use crate::reduce::Interval;
-    use crate::table::selected::Selected;
 
     /// Sets at rising V0, and two amplitudes.
     pub(in crate::figure) fn rows(count: u32) -> Vec<SetRow> {

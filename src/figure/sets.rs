@@ -117,7 +117,7 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let is_shown = |symbol: &Symbol| {
         let value = first.get(*symbol);
         !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
-            && value != Value::Absent
+            && value != Value::Null
             && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
             && all.iter().all(|parameters| parameters.get(*symbol) == value)
     };

@@ -7,7 +7,7 @@ use super::sets::{ETA, FREQUENCY, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
-use crate::table::columns::{Cell, Column, Kind, Row, columns};
+use crate::table::columns::{Column, Kind, Row, Value, columns};
 
 /// Longest meaning that goes into the label of an axis.
 const LONGEST: usize = 40;
@@ -152,11 +152,11 @@ fn number_cells(row: &SetRow) -> Vec<Option<Given>> {
     let frequency = row.parameters.modulation_period.map(|period| 1.0 / period);
     (row, Derived { frequency }).cells(&mut |cell| {
         cells.push(match cell {
-            Cell::Null => None,
-            Cell::Real(real) => Some(Given::Number(real)),
-            Cell::Count(count) => Some(Given::Number(count as f64)),
-            Cell::Flag(flag) => Some(Given::Word(if flag { "yes" } else { "no" }.to_owned())),
-            Cell::Text(text) => Some(Given::Word(text.to_owned())),
+            Value::Null => None,
+            Value::Real(real) => Some(Given::Number(real)),
+            Value::Count(count) => Some(Given::Number(count as f64)),
+            Value::Flag(flag) => Some(Given::Word(if flag { "yes" } else { "no" }.to_owned())),
+            Value::Text(text) => Some(Given::Word(text.to_owned())),
         });
     });
     cells

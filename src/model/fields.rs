@@ -18,7 +18,7 @@
 //! | `Variant` | the field as a value of the enum behind `by` |
 //! | `"key"` | its name in files, flags and tables |
 //! | `"symbol"` | its symbol in the paper; may be left out |
-//! | `type` | one with a [`FieldType`](super::value::FieldType); an `Option` where the value may be missing |
+//! | `type` | a [`Field`](crate::table::value::Field); an `Option` where the value may be missing |
 //! | `"unit"` | in SI; empty for a pure number, a flag or a word |
 //! | `range` | a name of [`range!`]: the values that the field can take by itself |
 //! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
@@ -27,6 +27,7 @@
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
+use crate::table::value::Kind;
 use std::ops::Bound;
 
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +46,9 @@ pub struct Description {
     pub rule: &'static str,
     /// Ends of the range of a number.
     pub ends: (Bound<f64>, Bound<f64>),
+    pub kind: Kind,
+    /// Whether it may be missing.
+    pub nullable: bool,
 }
 
 impl Description {
@@ -168,6 +172,8 @@ macro_rules! fields {
                             use std::ops::Bound::{Excluded, Included, Unbounded};
                             $crate::model::fields::range!(ends $range)
                         },
+                        kind: <$type as $crate::table::value::Field>::KIND,
+                        nullable: <$type as $crate::table::value::Field>::NULLABLE,
                     },
                 )+}
             }
@@ -183,14 +189,30 @@ macro_rules! fields {
             }
 
             /// The canonical form of a value that the field can take by itself: equal values have equal bits.
-            pub fn checked(self, value: $crate::model::Value) -> Option<$crate::model::Value> {
-                use $crate::model::value::FieldType;
+            pub fn checked(self, value: $crate::table::value::Value<'_>) -> Option<$crate::model::Value> {
+                use $crate::table::value::{Field, Value};
                 use std::ops::RangeBounds;
                 let value = match self {$(
-                    Self::$variant => <$type as FieldType>::from_value(value)?.to_value(),
+                    Self::$variant => <$type as Field>::from_value(value)?.value(),
                 )+};
                 let ends = self.description().ends;
-                value.number().is_none_or(|number| ends.contains(&number)).then_some(value)
+                value.number().is_none_or(|number| ends.contains(&number)).then_some(match value {
+                    // Adding zero turns -0.0 into 0.0.
+                    Value::Real(real) => Value::Real(real + 0.0),
+                    other => other,
+                })
+            }
+        }
+
+        impl $crate::table::value::Field for $Key {
+            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
+
+            fn value(&self) -> $crate::model::Value {
+                $crate::table::value::Value::Text(self.key())
+            }
+
+            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
+                Self::ALL.into_iter().find(|field| field.value() == value)
             }
         }
 
@@ -198,15 +220,15 @@ macro_rules! fields {
             /// The value of a field.
             pub fn get(&self, field: $Key) -> $crate::model::Value {
                 match field {$(
-                    $Key::$variant => $crate::model::value::FieldType::to_value(&self.$field),
+                    $Key::$variant => $crate::table::value::Field::value(&self.$field),
                 )+}
             }
 
             /// Sets a field, in or out of its range; none if the kind of value does not fit.
             #[cfg_attr(not(feature = "sweeps"), allow(dead_code, reason = "some structs are read from files only"))]
-            pub(crate) fn put(&mut self, field: $Key, value: $crate::model::Value) -> Option<()> {
+            pub(crate) fn put(&mut self, field: $Key, value: $crate::table::value::Value<'_>) -> Option<()> {
                 match field {$(
-                    $Key::$variant => self.$field = $crate::model::value::FieldType::from_value(value)?,
+                    $Key::$variant => self.$field = $crate::table::value::Field::from_value(value)?,
                 )+}
                 Some(())
             }

@@ -8,14 +8,17 @@ use super::disorder::Contact;
 use super::lanes::{LANES, Row};
 use super::reattachments::{Due, Reattachments};
 use super::{BreakOn, Disorder, Parameters};
+use crate::table::value::words;
 use std::array;
 
-/// What happened to a contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
-    /// It attached, unstressed.
-    Attach,
-    Break,
+words! {
+    /// What happened to a contact.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Change {
+        /// It attached, unstressed.
+        Attach = "attach",
+        Break = "break",
+    }
 }
 
 /// One event of one contact, as observers see it.

@@ -8,18 +8,18 @@ mod interface;
 mod lanes;
 mod parameters;
 mod reattachments;
+pub mod selected;
 pub mod theory;
-pub(crate) mod value;
 
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactEvent, Interface};
 pub(crate) use lanes::{LANES, Row};
-pub use parameters::{ParameterError, Parameters, Symbol};
-#[cfg(feature = "sweeps")]
-pub(crate) use value::Shortest;
-pub use value::{BreakOn, Value};
+pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
+
+/// The value of a parameter, in a file, on an axis or in a table.
+pub type Value = crate::table::value::Value<'static>;
 
 /// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file that leaves
 /// them out, give other results.

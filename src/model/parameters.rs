@@ -5,8 +5,19 @@
 
 use super::fields::fields;
 use super::theory::{eta, typical_interval};
-use super::{BreakOn, Value};
+use crate::table::value::{Value, words};
 use std::f64::consts::TAU;
+
+words! {
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+    pub enum BreakOn {
+        /// When the magnitude of its force reaches the threshold, pulled forward or backward.
+        #[default]
+        Magnitude = "magnitude",
+        /// Only when a force against forward motion reaches the threshold.
+        Tension = "tension",
+    }
+}
 
 fields! {
     /// All that defines one realisation of the model. Quantities are SI.
@@ -68,7 +79,7 @@ pub struct ParameterError {
 
 impl Parameters {
     /// Sets one parameter. Whole reals are accepted for counts and whole numbers for reals.
-    pub fn set(&mut self, symbol: Symbol, value: Value) -> Result<(), ParameterError> {
+    pub fn set(&mut self, symbol: Symbol, value: Value<'_>) -> Result<(), ParameterError> {
         self.put(symbol, value).ok_or_else(|| ParameterError { symbol, value: value.to_string() })
     }
 

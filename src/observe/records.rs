@@ -2,7 +2,7 @@
 
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
-use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
+use crate::table::columns::{Table, columns};
 
 /// Several observers of one run; the first decides when it has seen enough.
 pub struct Observers<'a> {
@@ -218,17 +218,6 @@ columns! {
         threshold: f64 = "N", "threshold of this life";
         stiffness: f64 = "N/m", "stiffness of this life";
     }
-}
-
-fields! {
-    Change: Text, |change| match change {
-        Change::Attach => "attach",
-        Change::Break => "break",
-    }, |word| match word {
-        "attach" => Some(Change::Attach),
-        "break" => Some(Change::Break),
-        _ => None,
-    };
 }
 
 impl From<&ContactEvent> for ContactRow {

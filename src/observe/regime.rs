@@ -1,6 +1,6 @@
 //! Averages of a job over time, and the regime that they show.
 
-use crate::table::columns::{Cell, Field, Kind, fields};
+use crate::table::value::words;
 
 /// What a job measures as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,28 +13,21 @@ pub struct Averages {
     pub slip_share: f64,
 }
 
-/// How a slider moves, by the share of time within slips.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Regime {
-    /// It sticks for most of the time.
-    StickSlip,
-    /// It slips for most of the time.
-    Mixed,
-    Sliding,
+words! {
+    /// How a slider moves, by the share of time within slips.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Regime {
+        /// It sticks for most of the time.
+        StickSlip = "stick-slip",
+        /// It slips for most of the time.
+        Mixed = "mixed",
+        Sliding = "sliding",
+    }
 }
 
 impl Regime {
-    pub const ALL: [Self; 3] = [Self::StickSlip, Self::Mixed, Self::Sliding];
     /// Least share of time within slips of the mixed regime, and of sliding.
     pub const MIN_SHARES: [f64; 2] = [0.5, 0.95];
-
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::StickSlip => "stick-slip",
-            Self::Mixed => "mixed",
-            Self::Sliding => "sliding",
-        }
-    }
 
     /// The regime at a share of time within slips.
     pub fn at(slip_share: f64) -> Self {
@@ -47,8 +40,4 @@ impl Regime {
             Self::Sliding
         }
     }
-}
-
-fields! {
-    Regime: Text, |regime| regime.word(), |word| Regime::ALL.into_iter().find(|regime| regime.word() == word);
 }

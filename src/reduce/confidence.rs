@@ -2,7 +2,7 @@
 
 use super::moments::Moments;
 use super::sequence::Estimate;
-use crate::table::columns::{Cell, Column, Kind, Part};
+use crate::table::columns::{Column, Kind, Part, Value};
 use std::f64::consts::PI;
 
 /// Share of repetitions in which an interval contains the true value.
@@ -29,15 +29,15 @@ impl Part for Option<Interval> {
             .to_vec()
     }
 
-    fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
-        give(self.map_or(Cell::Null, |interval| Cell::Real(interval.low)));
-        give(self.map_or(Cell::Null, |interval| Cell::Real(interval.high)));
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.low)));
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.high)));
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         match (next(), next()) {
-            (Cell::Real(low), Cell::Real(high)) => Ok(Some(Interval { low, high })),
-            (Cell::Null, Cell::Null) => Ok(None),
+            (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
+            (Value::Null, Value::Null) => Ok(None),
             _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
         }
     }

@@ -11,6 +11,7 @@ use super::PhaseLimits;
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use super::slip_stats::SlipStats;
+use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
 use crate::results::layout::Layout;
@@ -19,7 +20,6 @@ use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::table::columns::columns;
 use crate::table::file::{Dataset, DatasetError};
-use crate::table::selected::Selected;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 

@@ -73,7 +73,7 @@ impl PhaseLimits {
 mod tests {
     use super::*;
     use crate::documented::assert_documented;
-    use crate::table::columns::{UNITS, markdown};
+    use crate::documented::{UNITS, markdown};
 
     #[test]
     fn documented_reduced_tables_are_those_written() {

@@ -141,13 +141,13 @@ mod tests {
     use super::super::read_reduced;
     use super::*;
     use crate::model::Parameters;
+    use crate::model::selected::Selected;
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
     use crate::solver::Summary;
     use crate::sweep::Sweep;
     use crate::table::file::Footer;
-    use crate::table::selected::Selected;
     use crate::table::storage::{Disk, Storage};
     use std::fs;
     use std::path::Path;

@@ -2,19 +2,22 @@
 
 use crate::model::Parameters;
 use crate::observe::Slip;
-use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
+use crate::table::columns::{Table, columns};
+use crate::table::value::words;
 
 /// Slips up to which all become points; of more, every k-th in table order remains.
 pub const MAX_POINTS: u64 = 20_000;
 
-/// A part of a run under a ramp of the modulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RampStage {
-    /// On the way to the turning point.
-    Up,
-    Down,
-    /// When the ramp is over.
-    After,
+words! {
+    /// A part of a run under a ramp of the modulation.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum RampStage {
+        /// On the way to the turning point.
+        Up = "up",
+        Down = "down",
+        /// When the ramp is over.
+        After = "after",
+    }
 }
 
 impl RampStage {
@@ -26,19 +29,6 @@ impl RampStage {
             _ => Self::After,
         }
     }
-}
-
-fields! {
-    RampStage: Text, |stage| match stage {
-        RampStage::Up => "up",
-        RampStage::Down => "down",
-        RampStage::After => "after",
-    }, |word| match word {
-        "up" => Some(RampStage::Up),
-        "down" => Some(RampStage::Down),
-        "after" => Some(RampStage::After),
-        _ => None,
-    };
 }
 
 columns! {

@@ -7,12 +7,12 @@ use super::gather::JobFacts;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
+use crate::model::selected::{Selected, Selection};
 use crate::model::theory::random_load_mean;
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
 use crate::table::columns::{Table, columns};
-use crate::table::selected::{Selected, Selection};
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.

@@ -2,7 +2,7 @@
 
 use super::set::SetRow;
 use crate::sweep::{Precision, Target};
-use crate::table::columns::{Cell, Row};
+use crate::table::columns::{Row, Value};
 
 /// What a column of a set holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,11 +28,11 @@ impl SetRow {
         self.cells(&mut |cell| {
             if Some(position) == wanted {
                 value = match cell {
-                    Cell::Null => StatisticValue::Nothing,
-                    Cell::Real(number) => StatisticValue::Number(number),
-                    Cell::Count(count) => StatisticValue::Number(count as f64),
-                    Cell::Flag(flag) => StatisticValue::Class(flag.to_string()),
-                    Cell::Text(text) => StatisticValue::Class(text.to_owned()),
+                    Value::Null => StatisticValue::Nothing,
+                    Value::Real(number) => StatisticValue::Number(number),
+                    Value::Count(count) => StatisticValue::Number(count as f64),
+                    Value::Flag(flag) => StatisticValue::Class(flag.to_string()),
+                    Value::Text(text) => StatisticValue::Class(text.to_owned()),
                 };
             }
             position += 1;

@@ -5,7 +5,7 @@ use crate::observe::Slip;
 use crate::results::Results;
 use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, SLIPS};
-use crate::table::columns::{Cell, Row, columns};
+use crate::table::columns::{Row, Value, columns};
 use crate::table::file::DatasetError;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -111,13 +111,13 @@ impl Slips {
 }
 
 /// A cell in single precision without its last bits; not a number if it is null.
-fn bits(cell: Cell<'_>) -> u32 {
+fn bits(cell: Value<'_>) -> u32 {
     #[expect(clippy::cast_possible_truncation, reason = "rounded on purpose")]
     let number = match cell {
-        Cell::Real(real) => real as f32,
-        Cell::Count(count) => count as f32,
-        Cell::Flag(flag) => f32::from(u8::from(flag)),
-        Cell::Null | Cell::Text(_) => f32::NAN,
+        Value::Real(real) => real as f32,
+        Value::Count(count) => count as f32,
+        Value::Flag(flag) => f32::from(u8::from(flag)),
+        Value::Null | Value::Text(_) => f32::NAN,
     };
     if number.is_nan() {
         return f32::NAN.to_bits();
@@ -134,11 +134,11 @@ mod tests {
     fn numbers_keep_five_digits_and_what_is_missing_is_not_a_number() {
         let back = |cell| f32::from_bits(bits(cell));
         for real in [0.137_123_456, -3.051_592_65, 1e-9, 5e7, 476.951_234] {
-            assert!((f64::from(back(Cell::Real(real))) / real - 1.0).abs() < 8e-6, "{real}");
+            assert!((f64::from(back(Value::Real(real))) / real - 1.0).abs() < 8e-6, "{real}");
         }
-        assert_eq!((back(Cell::Count(131_071)), back(Cell::Real(0.0))), (131_071.0, 0.0));
-        assert!(back(Cell::Null).is_nan() && back(Cell::Real(f64::NAN)).is_nan());
-        assert_eq!(back(Cell::Real(f64::INFINITY)), f32::INFINITY);
+        assert_eq!((back(Value::Count(131_071)), back(Value::Real(0.0))), (131_071.0, 0.0));
+        assert!(back(Value::Null).is_nan() && back(Value::Real(f64::NAN)).is_nan());
+        assert_eq!(back(Value::Real(f64::INFINITY)), f32::INFINITY);
     }
 
     #[test]

@@ -5,10 +5,10 @@ use crate::observe::Regime;
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced};
 use crate::results::layout::Layout;
 use crate::sweep::{Job, Sweep};
-use crate::table::columns::{Cell, Column, Row, Table, columns};
+use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::{Dataset, DatasetError};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value as Json, json};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
@@ -35,7 +35,7 @@ impl From<Column> for Described {
 #[derive(Debug, Serialize)]
 pub(super) struct Columns {
     columns: Vec<Described>,
-    values: Vec<Vec<Value>>,
+    values: Vec<Vec<Json>>,
 }
 
 impl Columns {
@@ -55,14 +55,11 @@ impl Columns {
     }
 }
 
-fn json(cell: Cell<'_>) -> Value {
+fn json(cell: Value<'_>) -> Json {
     match cell {
-        Cell::Null => Value::Null,
         // What is not finite becomes null.
-        Cell::Real(real) => rounded(real).into(),
-        Cell::Count(count) => count.into(),
-        Cell::Flag(flag) => flag.into(),
-        Cell::Text(text) => text.into(),
+        Value::Real(real) => rounded(real).into(),
+        other => json!(other),
     }
 }
 
@@ -199,10 +196,10 @@ mod tests {
 
     #[test]
     fn a_number_keeps_six_digits_and_a_value_that_is_none_is_null() {
-        assert_eq!(json(Cell::Real(0.000_123_456_789)), 0.000_123_457);
-        assert_eq!(json(Cell::Real(1e-300)), 1e-300);
-        assert_eq!(json(Cell::Real(f64::INFINITY)), Value::Null);
-        assert_eq!(json(Cell::Real(f64::NAN)), Value::Null);
+        assert_eq!(json(Value::Real(0.000_123_456_789)), 0.000_123_457);
+        assert_eq!(json(Value::Real(1e-300)), 1e-300);
+        assert_eq!(json(Value::Real(f64::INFINITY)), Json::Null);
+        assert_eq!(json(Value::Real(f64::NAN)), Json::Null);
     }
 
     #[test]

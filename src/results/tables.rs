@@ -2,21 +2,24 @@
 //!
 //! Quantities are SI. Nothing in a table says when, where or how fast it was computed.
 
+use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Precursor, Regime, Slip};
 use crate::sweep::Sweep;
-use crate::table::columns::{Cell, Field, Kind, Table, columns, fields};
-use crate::table::selected::{Selected, Selection};
+use crate::table::columns::{Table, columns};
+use crate::table::value::words;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JobOutcome {
-    /// It recorded all its slips.
-    Done,
-    TimeLimit,
-    /// It gave up, since no slip came within `give_up_after`.
-    NoSlips,
-    /// It could not be finished.
-    Failed,
+words! {
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum JobOutcome {
+        /// It recorded all its slips.
+        Done = "done",
+        TimeLimit = "time limit",
+        /// It gave up, since no slip came within `give_up_after`.
+        NoSlips = "no slips",
+        /// It could not be finished.
+        Failed = "failed",
+    }
 }
 
 impl JobOutcome {
@@ -28,25 +31,6 @@ impl JobOutcome {
             false => Self::TimeLimit,
         }
     }
-
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::TimeLimit => "time limit",
-            Self::NoSlips => "no slips",
-            Self::Failed => "failed",
-        }
-    }
-}
-
-fields! {
-    JobOutcome: Text, |outcome| outcome.word(), |word| match word {
-        "done" => Some(JobOutcome::Done),
-        "time limit" => Some(JobOutcome::TimeLimit),
-        "no slips" => Some(JobOutcome::NoSlips),
-        "failed" => Some(JobOutcome::Failed),
-        _ => None,
-    };
 }
 
 columns! {
@@ -182,8 +166,9 @@ columns! {
 pub(crate) mod tests {
     use super::*;
     use crate::documented::assert_documented;
+    use crate::documented::{UNITS, markdown};
     use crate::observe::{ContactRow, MapRow, ProfileRow, TraceRow};
-    use crate::table::columns::{Row, UNITS, markdown};
+    use crate::table::columns::Row;
     use std::collections::HashSet;
 
     pub(crate) fn slip(number: u64) -> Slip {

@@ -112,11 +112,11 @@ impl Table {
         let period = columns.iter().find(|column| column.quantity.is_period());
         let ranks = |row: u32| {
             let others = columns.iter().filter(|column| !column.quantity.is_period());
-            let others: Vec<u64> = others.map(|column| column.rank(row)).collect();
+            let others: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
             (others, period.map(|period| period.rank(row)), row)
         };
         let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
-        ranked.sort_unstable();
+        ranked.sort_unstable_by(|left, right| left.partial_cmp(right).unwrap_or(Ordering::Equal));
         let mut is_first = vec![false; ranked.len()];
         let mut repeated: Vec<(u32, u32)> = Vec::new();
         for group in ranked.chunk_by(|(left, ..), (right, ..)| left == right) {
@@ -143,16 +143,20 @@ impl Table {
 
 impl Column {
     /// Orders the rows as [`Column::compare`] does: a larger η or frequency is a shorter period.
-    fn rank(&self, row: u32) -> u64 {
-        let (_, bits) = self.values[row as usize].bits();
-        if self.is_inverse_period() { !bits } else { bits }
+    fn rank(&self, row: u32) -> Value {
+        match self.values[row as usize] {
+            Value::Real(real) if self.is_inverse_period() => Value::Real(-real),
+            value => value,
+        }
     }
 
     /// Compares what a row leads to with these parameters; without modulation every period will do.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let value = self.values[row as usize];
         match self.quantity {
-            Quantity::Parameter(symbol) if symbol != Symbol::T => value.bits().cmp(&wanted.get(symbol).bits()),
+            Quantity::Parameter(symbol) if symbol != Symbol::T => {
+                value.partial_cmp(&wanted.get(symbol)).unwrap_or(Ordering::Equal)
+            }
             quantity => match (value.number(), wanted.modulation_period) {
                 (Some(number), Some(period)) => quantity.period(number, wanted).total_cmp(&period),
                 _ => Ordering::Equal,

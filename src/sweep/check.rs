@@ -8,8 +8,9 @@ use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
 use super::source::{Refused, Section, Source};
-use crate::model::{Shortest, Symbol};
+use crate::model::Symbol;
 use crate::solver::{Resolve, Solver};
+use crate::table::value::Shortest;
 use std::ops::RangeInclusive;
 
 /// Where each quantity is set.

@@ -13,7 +13,7 @@ impl Sweep {
         let (defaults, mut words) = (Parameters::default(), vec!["stickslip simulate".to_owned()]);
         for symbol in Symbol::ALL {
             let value = job.parameters.get(symbol);
-            if value != defaults.get(symbol) && value != Value::Absent {
+            if value != defaults.get(symbol) && value != Value::Null {
                 words.push(format!("--set {}={value}", symbol.key()));
             }
         }

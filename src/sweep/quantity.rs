@@ -4,6 +4,7 @@
 //! have equal bits.
 
 use crate::model::{Parameters, Symbol, Value};
+use crate::table::value::Kind;
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
@@ -56,7 +57,7 @@ impl Quantity {
 
     /// Whether it takes whole numbers only.
     pub fn is_count(self) -> bool {
-        matches!(self, Self::Parameter(symbol) if matches!(Parameters::default().get(symbol), Value::Count(_)))
+        matches!(self, Self::Parameter(symbol) if symbol.description().kind == Kind::Count)
     }
 
     /// The allowed values, as an error message names them.

@@ -21,8 +21,9 @@ use super::rounds::{Contrast, MAX_SETS, Precision, RefinedAxis, Refinement, Targ
 use super::samples::Range;
 use super::source::{Entry, Refused, Section, all, hint};
 use super::statistic::{STATISTICS, Statistic, StatisticKind};
-use crate::model::{Shortest, Symbol, Value};
+use crate::model::{Symbol, Value};
 use crate::observe::Regime;
+use crate::table::value::Shortest;
 use std::cell::Cell;
 
 /// Keys with their meanings and allowed values, of messages and the documentation.

@@ -7,9 +7,9 @@
 //! derive: the keys come from tables ([`fields!`](crate::model::fields)) or are open, and its errors name neither the
 //! value as written nor the way out.
 
-use crate::model::Value;
-use crate::model::value::FieldType;
+use crate::model::{self, BreakOn};
 use crate::table::shown::{shown, shown_text};
+use crate::table::value::{Field, Value};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -240,7 +240,7 @@ impl<'a> Entry<'a> {
     }
 
     /// The value as written: a count where it is one.
-    pub fn value(&self) -> Option<Value> {
+    pub fn value(&self) -> Option<model::Value> {
         match self.node.get_ref() {
             DeValue::Integer(integer) => {
                 let count = u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(Value::Count);
@@ -249,7 +249,7 @@ impl<'a> Entry<'a> {
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
-            DeValue::String(word) => word.parse().map(Value::BreakOn).ok(),
+            DeValue::String(word) => BreakOn::from_value(Value::Text(word)).map(|rule| rule.value()),
             _ => None,
         }
     }

@@ -4,7 +4,7 @@
 //! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
 //! around in every reader.
 
-use super::columns::{Cell, Column, FromRow, Kind, Row};
+use super::columns::{Column, FromRow, Kind, Row, Value};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
@@ -52,14 +52,7 @@ pub fn schema<R: Row>() -> SchemaRef {
 pub fn json<R: Row>(row: &R) -> Json {
     let (columns, mut object) = (R::columns(), Map::new());
     row.cells(&mut |cell| {
-        let value = match cell {
-            Cell::Null => Json::Null,
-            Cell::Real(real) => real.into(),
-            Cell::Count(count) => count.into(),
-            Cell::Flag(flag) => flag.into(),
-            Cell::Text(text) => text.into(),
-        };
-        object.insert(columns[object.len()].name.to_string(), value);
+        object.insert(columns[object.len()].name.to_string(), json!(cell));
     });
     object.into()
 }
@@ -133,12 +126,12 @@ impl RowBuffer {
 }
 
 impl Cells {
-    fn push(&mut self, cell: Cell<'_>) {
+    fn push(&mut self, cell: Value<'_>) {
         match (self, cell) {
-            (Self::Real(cells), Cell::Real(real)) => cells.push(Some(real)),
-            (Self::Count(cells), Cell::Count(count)) => cells.push(Some(count.cast_signed())),
-            (Self::Flag(cells), Cell::Flag(flag)) => cells.push(Some(flag)),
-            (Self::Text(cells), Cell::Text(text)) => cells.push(Some(text.to_owned())),
+            (Self::Real(cells), Value::Real(real)) => cells.push(Some(real)),
+            (Self::Count(cells), Value::Count(count)) => cells.push(Some(count.cast_signed())),
+            (Self::Flag(cells), Value::Flag(flag)) => cells.push(Some(flag)),
+            (Self::Text(cells), Value::Text(text)) => cells.push(Some(text.to_owned())),
             // A missing value; a cell of another kind than its column does not exist.
             (Self::Real(cells), _) => cells.push(None),
             (Self::Count(cells), _) => cells.push(None),
@@ -174,13 +167,13 @@ fn column<'a>(batch: &'a RecordBatch, name: &str, expected: &DataType) -> Result
     if found == expected { Ok(array) } else { Err(format!("column {name} is {found}, not {expected}")) }
 }
 
-fn cell(array: &dyn Array, kind: Kind, row: usize) -> Cell<'_> {
+fn cell(array: &dyn Array, kind: Kind, row: usize) -> Value<'_> {
     match kind {
-        _ if array.is_null(row) => Cell::Null,
-        Kind::Real => Cell::Real(array.as_primitive::<Float64Type>().value(row)),
-        Kind::Count => Cell::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
-        Kind::Flag => Cell::Flag(array.as_boolean().value(row)),
-        Kind::Text => Cell::Text(array.as_string::<i32>().value(row)),
+        _ if array.is_null(row) => Value::Null,
+        Kind::Real => Value::Real(array.as_primitive::<Float64Type>().value(row)),
+        Kind::Count => Value::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
+        Kind::Flag => Value::Flag(array.as_boolean().value(row)),
+        Kind::Text => Value::Text(array.as_string::<i32>().value(row)),
     }
 }
 
@@ -194,7 +187,7 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let arrays = arrays.collect::<Result<Vec<(&dyn Array, Kind)>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter();
-        R::from_cells(&mut || columns.next().map_or(Cell::Null, |&(array, kind)| cell(array, kind, row)))
+        R::from_cells(&mut || columns.next().map_or(Value::Null, |&(array, kind)| cell(array, kind, row)))
     };
     (0..batch.num_rows()).map(row).collect()
 }

@@ -19,39 +19,8 @@
 //! knows Arrow, files or JSON. No derive that exists fits: serde_arrow 0.15 has no place for units and meanings beside a
 //! field, typed-arrow 0.8 ends at Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow schema.
 
-use crate::model::{BreakOn, Symbol};
+pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;
-
-/// What the cells of a column hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    Real,
-    Count,
-    Flag,
-    Text,
-}
-
-impl Kind {
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Real => "real",
-            Self::Count => "count",
-            Self::Flag => "flag",
-            Self::Text => "text",
-        }
-    }
-}
-
-/// The value of a column in a row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Cell<'a> {
-    /// A value that is missing.
-    Null,
-    Real(f64),
-    Count(u64),
-    Flag(bool),
-    Text(&'a str),
-}
 
 /// A column of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,32 +35,19 @@ pub struct Column {
     pub nullable: bool,
 }
 
-/// A type that a cell can hold.
-pub trait Field: Sized {
-    const KIND: Kind;
-    /// Whether it may be null.
-    const NULLABLE: bool = false;
-
-    /// The value as a cell.
-    fn cell(&self) -> Cell<'_>;
-
-    /// The value of a cell; `None` if the cell cannot be one.
-    fn from_cell(cell: Cell<'_>) -> Option<Self>;
-}
-
 /// A type whose values are rows, or parts of rows.
 pub trait Row {
     /// Its columns, in order.
     fn columns() -> Vec<Column>;
 
     /// Gives the cells of a row, in the order of the columns.
-    fn cells(&self, give: &mut dyn FnMut(Cell<'_>));
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>));
 }
 
 /// A row that can be read back.
 pub trait FromRow: Row + Sized {
     /// The row with these cells, in the order of the columns.
-    fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
+    fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
 }
 
 /// A table whose rows are of this type.
@@ -107,10 +63,10 @@ pub trait Part: Sized {
     /// The columns of a field with this name, unit and meaning.
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column>;
 
-    fn give(&self, give: &mut dyn FnMut(Cell<'_>));
+    fn give(&self, give: &mut dyn FnMut(Value<'_>));
 
     /// Reads the cells of a field with this name.
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String>;
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
 }
 
 impl<T: Field> Part for T {
@@ -118,13 +74,46 @@ impl<T: Field> Part for T {
         vec![Column { name: name.into(), unit, meaning, kind: T::KIND, nullable: T::NULLABLE }]
     }
 
-    fn give(&self, give: &mut dyn FnMut(Cell<'_>)) {
-        give(self.cell());
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.value());
     }
 
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
         let cell = next();
-        T::from_cell(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
+        T::from_value(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
+    }
+}
+
+/// A text of a row's own is no [`Field`]: its value does not outlive the row.
+impl Part for String {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: false }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(Value::Text(self));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        <Option<Self> as Part>::take(name, next)?.ok_or_else(|| format!("column {name} cannot hold {:?}", Value::Null))
+    }
+}
+
+impl Part for Option<String> {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: true }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.as_deref().map_or(Value::Null, Value::Text));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        match next() {
+            Value::Null => Ok(None),
+            Value::Text(text) => Ok(Some(text.to_owned())),
+            value => Err(format!("column {name} cannot hold {value:?}")),
+        }
     }
 }
 
@@ -136,13 +125,13 @@ macro_rules! part {
                 <Self as $crate::table::columns::Row>::columns()
             }
 
-            fn give(&self, give: &mut dyn FnMut($crate::table::columns::Cell<'_>)) {
+            fn give(&self, give: &mut dyn FnMut($crate::table::columns::Value<'_>)) {
                 $crate::table::columns::Row::cells(self, give);
             }
 
             fn take<'a>(
                 _: &str,
-                next: &mut dyn FnMut() -> $crate::table::columns::Cell<'a>,
+                next: &mut dyn FnMut() -> $crate::table::columns::Value<'a>,
             ) -> Result<Self, String> {
                 $crate::table::columns::FromRow::from_cells(next)
             }
@@ -150,44 +139,6 @@ macro_rules! part {
     };
 }
 pub(crate) use part;
-
-/// The section of a table in the documentation, in Markdown. Parameters of the model, described on a page of their own,
-/// share a line, and so do the ends of an interval; a unit with `?` is that of a column that may be null.
-pub fn markdown<T: Table>() -> String {
-    let is_parameter = |column: &Column| {
-        Symbol::from_key(&column.name).is_some_and(|symbol| symbol.description().meaning == column.meaning)
-    };
-    let share_a_line = |one: &Column, next: &Column| {
-        let is_pair = one.name.strip_suffix("_low").is_some_and(|name| next.name.strip_suffix("_high") == Some(name));
-        (is_parameter(one) && is_parameter(next)) || (is_pair && one.meaning.starts_with(LOWER_END))
-    };
-    let line = |columns: &[Column]| {
-        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", column.name)).collect();
-        let names = names.join(" ");
-        let Column { unit, meaning, kind, nullable, .. } = &columns[0];
-        if is_parameter(&columns[0]) {
-            return format!("| {names} | | [parameters](model.md#parameters) |\n");
-        }
-        let unit = match kind {
-            Kind::Real if unit.is_empty() => "1",
-            Kind::Real => unit,
-            kind => kind.word(),
-        };
-        let nullable = if *nullable { "?" } else { "" };
-        let meaning = meaning.replace(LOWER_END, "ends of").replace('|', "\\|").replace('<', "\\<");
-        format!("| {names} | {unit}{nullable} | {meaning} |\n")
-    };
-    let rows: String = T::columns().chunk_by(share_a_line).map(line).collect();
-    format!("## {}\n\n{}.\n\n| column | unit | meaning |\n|---|---|---|\n{rows}", T::NAME, T::MEANING)
-}
-
-/// How the meaning of the lower end of an interval begins.
-const LOWER_END: &str = "lower end of";
-
-/// How the pages of tables show units and kinds.
-#[cfg(all(test, feature = "sweeps"))]
-pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
-    A `?` marks columns that may be null.\n";
 
 /// Describes the columns of a row type: see the head of `table/columns.rs`.
 macro_rules! columns {
@@ -219,14 +170,14 @@ macro_rules! columns {
                 )),*].concat()
             }
 
-            fn cells(&self, give: &mut dyn FnMut($crate::table::columns::Cell<'_>)) {
+            fn cells(&self, give: &mut dyn FnMut($crate::table::columns::Value<'_>)) {
                 $($crate::table::columns::Part::give(&self.$field, give);)*
             }
         }
 
         impl $crate::table::columns::FromRow for $row {
             fn from_cells<'a>(
-                next: &mut dyn FnMut() -> $crate::table::columns::Cell<'a>,
+                next: &mut dyn FnMut() -> $crate::table::columns::Value<'a>,
             ) -> Result<Self, String> {
                 $(let $field = $crate::table::columns::Part::take(
                     $crate::table::columns::columns!(@name $field $($name)?),
@@ -241,53 +192,12 @@ macro_rules! columns {
 }
 pub(crate) use columns;
 
-/// Fields of one kind of cell.
-macro_rules! fields {
-    ($($type:ty: $kind:ident, |$value:ident| $cell:expr, |$read:ident| $back:expr;)*) => {
-        $(impl Field for $type {
-            const KIND: Kind = Kind::$kind;
-
-            fn cell(&self) -> Cell<'_> {
-                let $value = self;
-                Cell::$kind($cell)
-            }
-
-            fn from_cell(cell: Cell<'_>) -> Option<Self> {
-                if let Cell::$kind($read) = cell { $back } else { None }
-            }
-        })*
-    };
-}
-
-fields! {
-    f64: Real, |value| *value, |real| Some(real);
-    u64: Count, |value| *value, |count| Some(count);
-    bool: Flag, |value| *value, |flag| Some(flag);
-    String: Text, |value| value, |text| Some(text.to_owned());
-    Symbol: Text, |value| value.key(), |text| Symbol::from_key(text);
-    BreakOn: Text, |value| value.word(), |text| text.parse().ok();
-}
-pub(crate) use fields;
-
-impl<T: Field> Field for Option<T> {
-    const KIND: Kind = T::KIND;
-    const NULLABLE: bool = true;
-
-    fn cell(&self) -> Cell<'_> {
-        self.as_ref().map_or(Cell::Null, T::cell)
-    }
-
-    fn from_cell(cell: Cell<'_>) -> Option<Self> {
-        if cell == Cell::Null { Some(None) } else { T::from_cell(cell).map(Some) }
-    }
-}
-
 impl<T: Row> Row for &T {
     fn columns() -> Vec<Column> {
         T::columns()
     }
 
-    fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
         (*self).cells(give);
     }
 }
@@ -301,14 +211,14 @@ macro_rules! side_by_side {
             }
 
             #[allow(non_snake_case, reason = "a part is called as its type")]
-            fn cells(&self, give: &mut dyn FnMut(Cell<'_>)) {
+            fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
                 let ($($part,)*) = self;
                 $($part.cells(give);)*
             }
         }
 
         impl<$($part: FromRow),*> FromRow for ($($part,)*) {
-            fn from_cells<'a>(next: &mut dyn FnMut() -> Cell<'a>) -> Result<Self, String> {
+            fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
                 Ok(($($part::from_cells(next)?,)*))
             }
         }
@@ -322,7 +232,9 @@ side_by_side!(A, B, C, D);
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::table::selected::{Selected, Selection};
+    use crate::documented::markdown;
+    use crate::model::selected::{Selected, Selection};
+    use crate::model::{BreakOn, Symbol};
 
     columns! {
         /// One reading.
@@ -387,10 +299,10 @@ pub(crate) mod tests {
 
     #[test]
     fn a_cell_that_a_column_cannot_hold_is_named() {
-        let error = Reading::from_cells(&mut || Cell::Null).unwrap_err();
+        let error = Reading::from_cells(&mut || Value::Null).unwrap_err();
         assert!(error.contains("column force cannot hold Null"), "{error}");
         let period = |value: f64| {
-            let mut cells = [Cell::Real(1e-6), Cell::Real(value), Cell::Text("magnitude")].into_iter();
+            let mut cells = [Value::Real(1e-6), Value::Real(value), Value::Text("magnitude")].into_iter();
             Selected::<PeriodAndRule>::from_cells(&mut || cells.next().unwrap())
         };
         assert!(period(-1.0).unwrap_err().contains("T = -1"));

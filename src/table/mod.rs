@@ -1,8 +1,8 @@
 //! Tables: columns described once, and Parquet files that are whole or not there.
 //!
 //! ```text
-//! columns.rs     name, unit, meaning and value of each column -> row types, documentation
-//! selected.rs    parameters as columns
+//! value.rs       the value of a field outside its struct, and the types of fields
+//! columns.rs     name, unit, meaning and value of each column -> row types
 //! arrow.rs       rows as record batches and as JSON
 //! file.rs        one table as a file: the same rows, the same bytes
 //! read_file.rs   a file that is read from any place
@@ -23,8 +23,8 @@ pub mod error;
 pub mod file;
 #[cfg(feature = "sweeps")]
 mod read_file;
-pub mod selected;
 #[cfg(feature = "sweeps")]
 pub mod shown;
 #[cfg(feature = "sweeps")]
 pub mod storage;
+pub mod value;

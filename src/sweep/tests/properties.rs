@@ -2,7 +2,8 @@
 
 use super::super::{Extension, Identity, Job, PART_JOBS, Plan, Sweep};
 use super::{extensions, sweep};
-use crate::model::{Parameters, Shortest, Symbol, Value};
+use crate::model::{Parameters, Symbol, Value};
+use crate::table::value::Shortest;
 use proptest::collection::btree_set;
 use proptest::prelude::*;
 use std::collections::HashSet;

@@ -1,0 +1,207 @@
+//! The value of a field outside its struct: in a file, on an axis, in a cell of a table.
+
+use std::fmt;
+
+/// Largest integer that a double, and so every reader of a table, holds exactly.
+const MAX_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
+
+/// What a field holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Real,
+    Count,
+    Flag,
+    Text,
+}
+
+impl Kind {
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Count => "count",
+            Self::Flag => "flag",
+            Self::Text => "text",
+        }
+    }
+}
+
+/// The value of a field. Of one kind, values that are no NaN have an order.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub enum Value<'a> {
+    /// A value that is not there, such as a period while the modulation is off.
+    Null,
+    /// A quantity in SI units.
+    Real(f64),
+    /// A count or a seed.
+    Count(u64),
+    Flag(bool),
+    Text(&'a str),
+}
+
+impl Value<'_> {
+    /// A count or a quantity as a double.
+    pub const fn number(self) -> Option<f64> {
+        match self {
+            Self::Count(count) => Some(count as f64),
+            Self::Real(real) => Some(real),
+            Self::Flag(_) | Self::Text(_) | Self::Null => None,
+        }
+    }
+}
+
+impl fmt::Display for Value<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => write!(f, "none"),
+            Self::Real(real) => write!(f, "{}", Shortest(*real)),
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Text(text) => write!(f, "{text}"),
+        }
+    }
+}
+
+#[cfg(feature = "sweeps")]
+impl serde::Serialize for Value<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Null => serializer.serialize_none(),
+            Self::Real(real) => serializer.serialize_f64(*real),
+            Self::Count(count) => serializer.serialize_u64(*count),
+            Self::Flag(flag) => serializer.serialize_bool(*flag),
+            Self::Text(text) => serializer.serialize_str(text),
+        }
+    }
+}
+
+/// A double in the shortest decimal form that reads back to the same bits, with an exponent where that is shorter.
+pub(crate) struct Shortest(pub f64);
+
+impl fmt::Display for Shortest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let magnitude = self.0.abs();
+        if self.0 != 0.0 && (!(1e-3..1e6).contains(&magnitude)) && self.0.is_finite() {
+            write!(f, "{:e}", self.0)
+        } else {
+            write!(f, "{}", self.0)
+        }
+    }
+}
+
+/// A type that a field can have, of which a value can outlive its struct.
+pub trait Field: Sized {
+    const KIND: Kind;
+    /// Whether it may be null.
+    const NULLABLE: bool = false;
+
+    fn value(&self) -> Value<'static>;
+
+    /// The field from a value; none if the value does not fit. Whole reals fit counts, and counts fit reals.
+    fn from_value(value: Value<'_>) -> Option<Self>;
+}
+
+impl Field for f64 {
+    const KIND: Kind = Kind::Real;
+
+    fn value(&self) -> Value<'static> {
+        Value::Real(*self)
+    }
+
+    fn from_value(value: Value<'_>) -> Option<Self> {
+        value.number()
+    }
+}
+
+impl Field for u64 {
+    const KIND: Kind = Kind::Count;
+
+    fn value(&self) -> Value<'static> {
+        Value::Count(*self)
+    }
+
+    fn from_value(value: Value<'_>) -> Option<Self> {
+        match value {
+            Value::Count(count) => Some(count),
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked by the guard")]
+            Value::Real(real) if (0.0..=MAX_EXACT).contains(&real) && real.fract() == 0.0 => Some(real as Self),
+            _ => None,
+        }
+    }
+}
+
+impl Field for usize {
+    const KIND: Kind = Kind::Count;
+
+    fn value(&self) -> Value<'static> {
+        Value::Count(*self as u64)
+    }
+
+    fn from_value(value: Value<'_>) -> Option<Self> {
+        u64::from_value(value)?.try_into().ok()
+    }
+}
+
+impl Field for bool {
+    const KIND: Kind = Kind::Flag;
+
+    fn value(&self) -> Value<'static> {
+        Value::Flag(*self)
+    }
+
+    fn from_value(value: Value<'_>) -> Option<Self> {
+        if let Value::Flag(flag) = value { Some(flag) } else { None }
+    }
+}
+
+impl<T: Field> Field for Option<T> {
+    const KIND: Kind = T::KIND;
+    const NULLABLE: bool = true;
+
+    fn value(&self) -> Value<'static> {
+        self.as_ref().map_or(Value::Null, T::value)
+    }
+
+    fn from_value(value: Value<'_>) -> Option<Self> {
+        if value == Value::Null { Some(None) } else { T::from_value(value).map(Some) }
+    }
+}
+
+/// Defines an enum whose values are words in files and tables, each written once behind its variant.
+macro_rules! words {
+    (
+        $(#[$about:meta])*
+        $visibility:vis enum $Enum:ident {$(
+            $(#[$of_variant:meta])*
+            $variant:ident = $word:literal,
+        )+}
+    ) => {
+        $(#[$about])*
+        $visibility enum $Enum {$(
+            $(#[$of_variant])*
+            $variant,
+        )+}
+
+        impl $Enum {
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+        }
+
+        impl $crate::table::value::Field for $Enum {
+            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
+
+            fn value(&self) -> $crate::table::value::Value<'static> {
+                $crate::table::value::Value::Text(self.word())
+            }
+
+            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
+                Self::ALL.into_iter().find(|known| known.value() == value)
+            }
+        }
+    };
+}
+pub(crate) use words;
