@@ -9,7 +9,7 @@ use crate::results::layout::Layout;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::{Path, PathBuf};
 
 /// Draw the figures of a results directory from its reduced data, or one of your own
@@ -35,8 +35,8 @@ pub struct Arguments {
     #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
     panels: Option<String>,
     /// Logarithmic axes
-    #[arg(long, value_name = "AXES", requires = "x", help_heading = OWN)]
-    log: Option<Logarithmic>,
+    #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy"], help_heading = OWN)]
+    log: Option<String>,
     /// Ends of the x axis; either may be left out
     #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true, help_heading = OWN)]
     xlim: Option<Limits>,
@@ -54,13 +54,13 @@ pub struct Arguments {
     out: Option<PathBuf>,
     /// Formats, separated by commas [default: svg,png]
     #[arg(long, value_enum, value_delimiter = ',')]
-    format: Vec<FileFormat>,
+    format: Vec<Format>,
     /// Size in mm, cm, in, pt or px, such as 86mmx60mm [default: what the data need; in print one or two columns wide]
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<Size>,
-    /// Style: for a screen, or for print with 8 pt text, 86 or 178 mm wide, 600 dpi, without small print
-    #[arg(long, value_enum, default_value_t = Medium::Screen)]
-    style: Medium,
+    /// Style
+    #[arg(long, value_enum, default_value_t = Style::Screen)]
+    style: Style,
 }
 
 const OWN: &str = "A figure of your own";
@@ -73,26 +73,6 @@ Examples:
   stickslip plot results/fig3 --x eta --y phase_mean --colour V0 --panels Delta --log x -o phase.pdf
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Logarithmic {
-    X,
-    Y,
-    Xy,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FileFormat {
-    Svg,
-    Png,
-    Pdf,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Medium {
-    Screen,
-    Print,
-}
 
 /// The ends of an axis.
 #[derive(Clone, Copy, Debug, Default)]
@@ -112,14 +92,15 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
 
 impl Arguments {
     fn own(&self) -> Option<OwnFigure> {
+        let is_log = |axis| self.log.as_ref().is_some_and(|axes| axes.contains(axis));
         let [x_limits, y_limits] = [self.xlim, self.ylim].map(Option::unwrap_or_default);
         Some(OwnFigure {
             x: self.x.clone()?,
             y: self.y.clone()?,
             colour: self.colour.clone(),
             panels: self.panels.clone(),
-            is_log_x: matches!(self.log, Some(Logarithmic::X | Logarithmic::Xy)),
-            is_log_y: matches!(self.log, Some(Logarithmic::Y | Logarithmic::Xy)),
+            is_log_x: is_log('x'),
+            is_log_y: is_log('y'),
             x_limits: (x_limits.0, x_limits.1),
             y_limits: (y_limits.0, y_limits.1),
             x_label: self.xlabel.clone(),
@@ -128,20 +109,11 @@ impl Arguments {
     }
 
     fn look(&self, results: &Results<'_>) -> Look {
-        let style = match self.style {
-            Medium::Screen => Style::Screen,
-            Medium::Print => Style::Print,
-        };
-        Look { style, size: self.size, ..Look::of_sweep(results.sweep().name()) }
+        Look { style: self.style, size: self.size, ..Look::of_sweep(results.sweep().name()) }
     }
 
-    fn formats(&self) -> Vec<Format> {
-        let format = |format: &FileFormat| match format {
-            FileFormat::Svg => Format::Svg,
-            FileFormat::Png => Format::Png,
-            FileFormat::Pdf => Format::Pdf,
-        };
-        if self.format.is_empty() { Format::DEFAULT.to_vec() } else { self.format.iter().map(format).collect() }
+    fn formats(&self) -> &[Format] {
+        if self.format.is_empty() { &Format::DEFAULT } else { &self.format }
     }
 }
 
@@ -153,14 +125,14 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, directory))?;
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = match arguments.own() {
-        None => draw_all(layout, &look, &arguments.formats())?,
+        None => draw_all(layout, &look, arguments.formats())?,
         Some(figure) => {
             let picture = draw_own(layout, &figure, &look)?;
             if look.style == Style::Print {
                 output::report(&format!("for the caption: {}", picture.note()));
             }
             match &arguments.out {
-                None => write_own(layout, picture, &look, &arguments.formats())?,
+                None => write_own(layout, picture, &look, arguments.formats())?,
                 Some(file) => {
                     let format = format_of(file)?;
                     output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;

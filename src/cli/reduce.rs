@@ -23,11 +23,14 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Version of [`ReductionSummary`] as JSON.
+const FORMAT: u32 = 1;
+
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let summary = crate::reduce::reduce(&results)?;
     if arguments.json {
-        output::plain_json(&summary)?;
+        output::json(FORMAT, &summary)?;
     } else {
         output::pairs(&summary_lines(&summary, results.layout()))?;
     }

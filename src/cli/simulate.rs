@@ -5,12 +5,12 @@
 
 mod outputs;
 
-use self::outputs::{check_outputs, write_pictures, write_records, write_table};
+use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
 use super::output::{self, Waiting};
 use super::sweep::{self, PresetFlag, as_flags, number, real, written, written_settings};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Measurements, RecordingKey, Regime};
+use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
 use crate::results::tables;
 use crate::results::tables::{DriveAndSeed, JobOutcome, SlipRow};
 use crate::simulate::{self as single, Request, Written};
@@ -63,8 +63,8 @@ struct JobFlags {
     #[arg(long = "record", value_name = "KEY=VALUE", group = JOB)]
     records: Vec<String>,
     /// Method
-    #[arg(long, value_enum, default_value_t = Method::EventDriven, group = JOB)]
-    solver: Method,
+    #[arg(long, value_parser = ["event-driven", "fixed-step"], default_value = "event-driven", group = JOB)]
+    solver: String,
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
     #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
@@ -163,12 +163,6 @@ enum Panel {
     Both,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
-    EventDriven,
-    FixedStep,
-}
-
 /// Version of [`Report`] as JSON.
 const FORMAT: u32 = 1;
 
@@ -208,12 +202,14 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let wall = begin.elapsed().as_secs_f64();
 
     let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
-    write_records(arguments, &footer, &recorded)?;
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
-    if let Some(path) = &arguments.tables.slip_table {
-        let rows = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
-        write_table(path, &footer, rows)?;
-    }
+    let TableFlags { trace, map, profile, contacts, slip_table, .. } = &arguments.tables;
+    write_table(trace.as_deref(), &footer, recorded.trace.iter().copied())?;
+    write_table(map.as_deref(), &footer, recorded.map.iter().copied())?;
+    write_table(profile.as_deref(), &footer, recorded.profile.iter().copied())?;
+    write_table(contacts.as_deref(), &footer, recorded.contacts.iter().map(ContactRow::from))?;
+    let slips = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
+    write_table(slip_table.as_deref(), &footer, slips)?;
     write_pictures(arguments, parameters, &recorded, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)
@@ -222,29 +218,23 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 impl JobFlags {
     /// The text of a sweep with one point.
     fn as_sweep(&self) -> Result<String, UsageError> {
-        let solver = match (self.solver, &self.dt) {
-            (Method::EventDriven, None) => {
-                let resolve = self.resolve.as_ref().map(|word| format!("{word:?}"));
-                vec![
-                    ("method", Some("\"event-driven\"".to_owned())),
-                    ("tolerance", self.tolerance.clone()),
-                    ("resolve", resolve),
-                ]
+        let is_fixed = self.solver == "fixed-step";
+        for (flag, is_misplaced, place) in [
+            ("--dt", self.dt.is_some() && !is_fixed, "fixed-step"),
+            ("--tolerance", self.tolerance.is_some() && is_fixed, "event-driven; use --dt"),
+            ("--resolve", self.resolve.is_some() && is_fixed, "event-driven"),
+        ] {
+            if is_misplaced {
+                return Err(UsageError(format!("{flag}: goes with --solver {place}")));
             }
-            (Method::EventDriven, Some(_)) => {
-                return Err(UsageError("--dt: goes with --solver fixed-step".to_owned()));
-            }
-            (Method::FixedStep, _) if self.tolerance.is_some() => {
-                return Err(UsageError("--tolerance: goes with --solver event-driven; use --dt".to_owned()));
-            }
-            (Method::FixedStep, _) if self.resolve.is_some() => {
-                return Err(UsageError("--resolve: goes with --solver event-driven".to_owned()));
-            }
-            (Method::FixedStep, dt) => {
-                let step = dt.as_deref().unwrap_or("1e-6").to_owned();
-                vec![("method", Some("\"fixed-step\"".to_owned())), ("dt", Some(step))]
-            }
-        };
+        }
+        let word = |text: &String| format!("{text:?}");
+        let solver = [
+            ("method", Some(word(&self.solver))),
+            ("tolerance", self.tolerance.clone()),
+            ("resolve", self.resolve.as_ref().map(word)),
+            ("dt", self.dt.clone().or_else(|| is_fixed.then(|| "1e-6".to_owned()))),
+        ];
         let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
         Ok(single::sweep_text(&written_settings(&self.settings)?, &self.recorded()?, &solver))
     }

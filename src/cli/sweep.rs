@@ -15,45 +15,20 @@ pub struct Preset {
     pub text: &'static str,
 }
 
-const PRESETS: [Preset; 31] = [
-    Preset::new("choices", include_str!("../../sweeps/choices.toml")),
-    Preset::new("contacts", include_str!("../../sweeps/contacts.toml")),
-    Preset::new("disorder", include_str!("../../sweeps/disorder.toml")),
-    Preset::new("drag", include_str!("../../sweeps/drag.toml")),
-    Preset::new("drag-strong", include_str!("../../sweeps/drag-strong.toml")),
-    Preset::new("energies", include_str!("../../sweeps/energies.toml")),
-    Preset::new("eq1", include_str!("../../sweeps/eq1.toml")),
-    Preset::new("fig1d", include_str!("../../sweeps/fig1d.toml")),
-    Preset::new("fig2", include_str!("../../sweeps/fig2.toml")),
-    Preset::new("fig3", include_str!("../../sweeps/fig3.toml")),
-    Preset::new("fig3-full", include_str!("../../sweeps/fig3-full.toml")),
-    Preset::new("fig3-precise", include_str!("../../sweeps/fig3-precise.toml")),
-    Preset::new("fig4b", include_str!("../../sweeps/fig4b.toml")),
-    Preset::new("fig4d", include_str!("../../sweeps/fig4d.toml")),
-    Preset::new("friction", include_str!("../../sweeps/friction.toml")),
-    Preset::new("friction-drives", include_str!("../../sweeps/friction-drives.toml")),
-    Preset::new("friction-precise", include_str!("../../sweeps/friction-precise.toml")),
-    Preset::new("fronts", include_str!("../../sweeps/fronts.toml")),
-    Preset::new("locking-edge", include_str!("../../sweeps/locking-edge.toml")),
-    Preset::new("locking-map", include_str!("../../sweeps/locking-map.toml")),
-    Preset::new("regimes", include_str!("../../sweeps/regimes.toml")),
-    Preset::new("size", include_str!("../../sweeps/size.toml")),
-    Preset::new("sliding-edge", include_str!("../../sweeps/sliding-edge.toml")),
-    Preset::new("staircase", include_str!("../../sweeps/staircase.toml")),
-    Preset::new("startup", include_str!("../../sweeps/startup.toml")),
-    Preset::new("stiff-drive", include_str!("../../sweeps/stiff-drive.toml")),
-    Preset::new("stochasticity", include_str!("../../sweeps/stochasticity.toml")),
-    Preset::new("tongue-4", include_str!("../../sweeps/tongue-4.toml")),
-    Preset::new("tongues", include_str!("../../sweeps/tongues.toml")),
-    Preset::new("tongues-fine", include_str!("../../sweeps/tongues-fine.toml")),
-    Preset::new("velocity", include_str!("../../sweeps/velocity.toml")),
-];
+macro_rules! presets {
+    ($($name:literal)+) => {
+        [$(Preset { name: $name, text: include_str!(concat!("../../sweeps/", $name, ".toml")) }),+]
+    };
+}
+
+const PRESETS: [Preset; 31] = presets! {
+    "choices" "contacts" "disorder" "drag" "drag-strong" "energies" "eq1" "fig1d" "fig2" "fig3" "fig3-full"
+    "fig3-precise" "fig4b" "fig4d" "friction" "friction-drives" "friction-precise" "fronts" "locking-edge"
+    "locking-map" "regimes" "size" "sliding-edge" "staircase" "startup" "stiff-drive" "stochasticity" "tongue-4"
+    "tongues" "tongues-fine" "velocity"
+};
 
 impl Preset {
-    const fn new(name: &'static str, text: &'static str) -> Self {
-        Self { name, text }
-    }
-
     /// What the first line of the file says, without a sentence that goes on in the next line.
     fn about(self) -> &'static str {
         let line = self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']);

@@ -5,6 +5,7 @@ use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
 use crate::table::shown::shown_text;
 use anyhow::{Result, anyhow};
+use clap::ValueEnum;
 use kuva::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
@@ -25,7 +26,7 @@ pub struct Picture {
 }
 
 /// A format of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Vectors, for the browser and for changes by hand.
     Svg,

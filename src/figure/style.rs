@@ -3,11 +3,12 @@
 
 use super::axis::Axis;
 use super::picture::{Dot, Fill, Ink, Stroke};
+use clap::ValueEnum;
 use kuva::render::color::Color;
 use std::str::FromStr;
 
 /// What a figure is for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Style {
     /// Pages and slides: 192 pixels per inch, as large as the data need.
     #[default]

@@ -27,7 +27,7 @@ pub use histogram::{BINS_PER_MEAN, HistogramBin};
 pub use moments::{Moments, quantile};
 pub use reduced::{SetSummary, Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
-pub use reduction::{NoJobs, ReductionSummary, SUMMARY_FORMAT, reduce};
+pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::{RoundOfSet, SetInRounds};
 pub use sample::{MAX_POINTS, Point, RampStage};
 pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetRow};

@@ -21,8 +21,6 @@ use std::path::PathBuf;
 
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
-/// Version of [`ReductionSummary`] as JSON.
-pub const SUMMARY_FORMAT: u32 = 1;
 
 /// There is nothing to reduce.
 #[derive(Debug, thiserror::Error)]
@@ -35,7 +33,6 @@ pub struct NoJobs {
 /// What a reduction found, in brief.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReductionSummary {
-    pub format: u32,
     /// Jobs run to an end.
     pub jobs: u64,
     pub failed_jobs: u64,
@@ -80,7 +77,6 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     }
     let total = all_jobs.iter().map(|set| set.slips).fold(0, u64::saturating_add);
     let mut summary = ReductionSummary {
-        format: SUMMARY_FORMAT,
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
         sets: all_jobs.len() as u64,

@@ -181,6 +181,10 @@ impl Found {
         }
         let (is_fresh, found) = seen;
         let Some((manifest, extensions)) = found else {
+            if layout.root().is_symlink() && !layout.root().exists() {
+                let problem = "is a link that leads nowhere; remove it, or choose another with --out";
+                return Err(ResultsError::refused(layout.root(), problem));
+            }
             if is_fresh {
                 return Ok(Self { manifest: None, extensions: Vec::new(), done: DoneParts::default() });
             }

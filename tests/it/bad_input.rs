@@ -264,4 +264,11 @@ fn what_is_no_file_is_not_replaced_by_one() {
     let folder = Folder::new();
     let _socket = std::os::unix::net::UnixListener::bind(folder.path("socket")).unwrap();
     assert_refused(&folder, "simulate --trace socket", &["--trace socket", "it must be a file"]);
+    folder.write("good.toml", GOOD);
+    std::os::unix::fs::symlink("nowhere", folder.path("link")).unwrap();
+    assert_refused(
+        &folder,
+        "run good.toml -o link",
+        &["link: is a link that leads nowhere", "choose another with --out"],
+    );
 }

@@ -83,6 +83,7 @@ fn each_option_of_a_figure_changes_what_it_says() {
         ("--xlim 1e-5:1e-4", "not shown: 10 of 16 sets"),
         ("--xlabel speed", ">speed (10⁻³)<"),
         ("--ylabel τ", ">τ<"),
+        ("--ylabel \u{7}", r">\u{7}<"),
         ("--style print", r#"width="86.00mm""#),
         ("--size 100mmx90mm --style print", r#"width="100.00mm" height="90.00mm""#),
     ] {
@@ -143,6 +144,8 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
         ("--x V0 --y tau_mean --size 5mmx5mm", &["--size: figure tau_mean-V0 needs at least "]),
         ("--x V0 --y tau_mean --size 5", &["must be WIDTHxHEIGHT", "86mmx60mm"]),
         ("--size 5mmx5mm", &["--size: figure phi-eta needs at least "]),
+        ("--size 2mx2m", &["must be WIDTHxHEIGHT"]),
+        ("--size 2000mmx2000mm --style print", &["a PNG of 2232 million pixels", "the most is 100 million"]),
         ("--format eps", &["svg, png, pdf"]),
         ("--style poster", &["screen, print"]),
         ("--x V0 --y tau_mean -o own.eps", &["own.eps: must end in .svg, .png or .pdf"]),

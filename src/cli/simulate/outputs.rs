@@ -6,7 +6,7 @@ use super::super::plot::format_of;
 use super::{Arguments, Panel};
 use crate::figure::{self, Look, Picture, Simulation};
 use crate::model::Parameters;
-use crate::observe::{ContactRow, Slip};
+use crate::observe::Slip;
 use crate::simulate::Records;
 use crate::sweep::Sweep;
 use crate::table::columns::Table;
@@ -62,24 +62,9 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
     Ok(())
 }
 
-pub(super) fn write_records(arguments: &Arguments, footer: &Footer, recorded: &Records) -> Result<()> {
-    if let Some(path) = &arguments.tables.trace {
-        write_table(path, footer, recorded.trace.iter().copied())?;
-    }
-    if let Some(path) = &arguments.tables.map {
-        write_table(path, footer, recorded.map.iter().copied())?;
-    }
-    if let Some(path) = &arguments.tables.profile {
-        write_table(path, footer, recorded.profile.iter().copied())?;
-    }
-    if let Some(path) = &arguments.tables.contacts {
-        write_table(path, footer, recorded.contacts.iter().map(ContactRow::from))?;
-    }
-    Ok(())
-}
-
-/// Writes a table beside its place and moves it there, so that no half of a file looks whole.
-pub(super) fn write_table<R: Table>(path: &Path, footer: &Footer, rows: impl Iterator<Item = R>) -> Result<()> {
+/// Writes a table, if it was asked for.
+pub(super) fn write_table<R: Table>(path: Option<&Path>, footer: &Footer, rows: impl Iterator<Item = R>) -> Result<()> {
+    let Some(path) = path else { return Ok(()) };
     replace(path, |draft| {
         let mut writer = TableWriter::new(Disk.create(draft)?, footer)?;
         for row in rows {
