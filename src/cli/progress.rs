@@ -25,6 +25,7 @@ pub struct Progress {
     others_jobs: u64,
     others_predicted: f64,
     threads: Threads,
+    has_results: bool,
 }
 
 impl Progress {
@@ -42,10 +43,17 @@ impl Progress {
             others_jobs: 0,
             others_predicted: 0.0,
             threads,
+            has_results: false,
         }
     }
 
+    /// Whether something was committed, in this run or before.
+    pub const fn has_results(&self) -> bool {
+        self.has_results
+    }
+
     pub fn show(&mut self, event: &RunEvent) {
+        self.has_results |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
         match event {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.begin = Instant::now();

@@ -11,12 +11,14 @@ use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::run::{Options, RunEvent, RunReport, Shard};
+use crate::run::{Joined, Options, RunReport, Shard};
+use crate::sweep::{Job, Sweep};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// Run or resume a sweep; then reduce and plot
@@ -27,7 +29,7 @@ Examples:
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
   stickslip run --preset fig3                    a sweep of the paper, without a file
   stickslip run results/fig3                     resume, without the sweep file
-  stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; `merge` puts the parts together
+  stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; see docs/clusters.md
   stickslip run sweeps/fig3.toml --report        with results/fig3/report.html, to watch it in a browser
   stickslip run sweeps/fig3.toml --walltime 55m  in a batch queue that ends it after an hour
 
@@ -79,14 +81,7 @@ const FORMAT: u32 = 2;
 
 pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
-    let (sweep, default_root) = if let Some(directory) = arguments.sweep.as_deref().filter(|path| path.is_dir()) {
-        (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
-    } else {
-        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
-        let root = Layout::default_root(&sweep);
-        (sweep, root)
-    };
-    let root = arguments.out.clone().unwrap_or(default_root);
+    let (sweep, root) = arguments.sweep_and_root()?;
     output::warn(&sweep.warnings());
     let threads = arguments.threads.choose()?;
     let options = Options {
@@ -96,54 +91,78 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
-    let (recording, solver) = (*sweep.recording(), sweep.solver());
-    let layout = Layout::new(&Disk, &root);
-    let mut progress = Progress::new(threads);
-    let mut reporter = arguments.report.then(|| Reporter::new(&layout));
-    let mut has_results = false;
-    let report = crate::run::join(&layout, &sweep, options, |joined| -> Result<RunReport> {
-        let report =
-            joined.run(&|job, interrupt| measure(&job.parameters, &recording, solver, interrupt), &mut |event| {
-                progress.show(event);
-                has_results |=
-                    matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
-                if let Some(reporter) = &mut reporter {
-                    reporter.follow(event);
-                }
-            })?;
-        if arguments.json {
-            output::json(FORMAT, &report)?;
-        } else {
-            output::pairs(&summary_lines(&report))?;
-        }
-        let is_complete = report.jobs_left == 0 && !report.stopped;
-        if is_complete && !arguments.no_reduce {
-            let reduce = || reduce_and_draw(&layout, arguments);
-            if arguments.shard.is_some() {
-                reduce()?;
-            } else if joined.reduce(reduce)?.is_none() {
-                output::report("all jobs are done; another worker reduces them");
-            }
-        }
-        let written = reporter.as_ref().map(|reporter| reporter.finish(&report)).transpose()?.flatten();
-        if let Some(path) = written.filter(|_| !arguments.json) {
-            output::print(&format!("report  {}\n", shown(&path)))?;
-        }
-        Ok(report)
-    });
+    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads));
+    let report =
+        crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
     let report = report.map_err(|error| match Exit::of(&error) {
-        Exit::Stopped if has_results => error.context("the run stopped; what was committed is kept"),
+        Exit::Stopped if progress.has_results() => error.context("the run stopped; what was committed is kept"),
         _ => error,
     })?;
+    Ok(ending(&report, &root, arguments))
+}
+
+impl Arguments {
+    fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
+        let (sweep, default_root) = if let Some(directory) = self.sweep.as_deref().filter(|path| path.is_dir()) {
+            (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
+        } else {
+            let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset)?;
+            let root = Layout::default_root(&sweep);
+            (sweep, root)
+        };
+        Ok((sweep, self.out.clone().unwrap_or(default_root)))
+    }
+}
+
+/// Runs what is left, reduces, draws and reports.
+fn work(
+    joined: &Joined<'_>,
+    sweep: &Sweep,
+    layout: &Layout<'_>,
+    arguments: &Arguments,
+    progress: &mut Progress,
+) -> Result<RunReport> {
+    let mut reporter = arguments.report.then(|| Reporter::new(layout));
+    let (recording, solver) = (*sweep.recording(), sweep.solver());
+    let kernel = |job: &Job, interrupt: &AtomicBool| measure(&job.parameters, &recording, solver, interrupt);
+    let report = joined.run(&kernel, &mut |event| {
+        progress.show(event);
+        if let Some(reporter) = &mut reporter {
+            reporter.follow(event);
+        }
+    })?;
+    if arguments.json {
+        output::json(FORMAT, &report)?;
+    } else {
+        output::pairs(&summary_lines(&report))?;
+    }
+    let is_complete = report.jobs_left == 0 && !report.stopped;
+    if is_complete && !arguments.no_reduce {
+        let reduce = || reduce_and_draw(layout, arguments);
+        if arguments.shard.is_some() {
+            reduce()?;
+        } else if joined.reduce(reduce)?.is_none() {
+            output::report("all jobs are done; another worker reduces them");
+        }
+    }
+    let written = reporter.as_ref().map(|reporter| reporter.finish(&report)).transpose()?.flatten();
+    if let Some(path) = written.filter(|_| !arguments.json) {
+        output::print(&format!("report  {}\n", shown(&path)))?;
+    }
+    Ok(report)
+}
+
+/// Says what is left and what to do, and how the command ends.
+fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     if report.stopped {
-        output::report(&resume_hint(&report, arguments.walltime.is_some()));
+        output::report(&resume_hint(report, arguments.walltime.is_some()));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
-        return Ok(if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped });
+        return if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped };
     }
     if report.jobs_left > 0 {
         let (left, hosts) = (output::count(report.jobs_left, "job"), report.hosts.join(", "));
-        let out = output::quoted_path(&root);
+        let out = output::quoted_path(root);
         output::report(&format!(
             "nothing is left to take: others run the last {left} ({hosts}); see stickslip status {out}"
         ));
@@ -151,9 +170,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     if report.jobs_failed > 0 {
         let failed = output::count(report.jobs_failed, "job");
         output::report(&format!("{failed} failed; tables/jobs has the reasons. --retry-failed runs them again."));
-        return Ok(Exit::Failed);
+        return Exit::Failed;
     }
-    Ok(Exit::Done)
+    Exit::Done
 }
 
 /// Reduces and draws what is there: other shards may be at work still.

@@ -256,6 +256,11 @@ def test_ctrl_c_ends_a_simulation():
     assert "KeyboardInterrupt" in errors and child.returncode == -signal.SIGINT
 
 
+def test_too_many_threads_are_refused(tmp_path):
+    with pytest.raises(module.ResultsError, match="1 to 1024"):
+        module.run({"name": "a"}, out=tmp_path / "a", threads=2**62)
+
+
 def test_other_threads_run_meanwhile():
     ticks, over = 0, threading.Event()
 
