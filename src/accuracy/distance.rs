@@ -5,7 +5,7 @@
 //! have a sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is
 //! keyed: the same samples give the same intervals.
 
-use crate::table::columns::{Column, Kind, Part, Value, columns};
+use crate::table::columns::columns;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -18,68 +18,26 @@ const TAIL: f64 = 0.025;
 /// Quantile of the distances under the null hypothesis that makes the floor.
 const FLOOR: f64 = 0.95;
 
-/// A value with further values about it: columns of their own, called after it.
-macro_rules! with_columns_about_it {
-    ($(#[$attribute:meta])* $name:ident { $($field:ident, $suffix:literal, $meaning:literal;)* }) => {
-        $(#[$attribute])*
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct $name {
-            /// Of the sample against the reference.
-            pub value: f64,
-            $(
-                #[doc = concat!($meaning, ".")]
-                pub $field: f64,
-            )*
-        }
-
-        impl Part for $name {
-            fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-                let column = |(suffix, meaning)| {
-                    Column { name: format!("{name}{suffix}").into(), unit, meaning, kind: Kind::Real, nullable: false }
-                };
-                [("", meaning), $(($suffix, $meaning)),*].map(column).to_vec()
-            }
-
-            fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
-                for value in [self.value, $(self.$field),*] {
-                    give(Value::Real(value));
-                }
-            }
-
-            fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-                let mut read = || Part::take(name, next);
-                Ok(Self { value: read()?, $($field: read()?),* })
-            }
-        }
-    };
-}
-
-with_columns_about_it! {
-    /// A distance with its 95 % interval, and the one that samples of these sizes from the same distribution stay under in
-    /// 95 % of cases.
-    Distance {
-        low, "_low", "lower end of its 95 % interval";
-        high, "_high", "upper end";
-        floor, "_floor", "95 % quantile of the distance by chance alone";
-    }
-}
-
-with_columns_about_it! {
-    /// A difference with its 95 % interval. Zero outside of the interval: a bias that the samples show.
-    Bias {
-        low, "_low", "lower end of its 95 % interval";
-        high, "_high", "upper end";
-    }
-}
-
 columns! {
-    /// What sets a sample apart from a reference.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    /// What sets a sample apart from a reference. Bounds are the ends of 95 % intervals. A bias whose interval leaves out
+    /// zero is one that the samples show. Samples of these sizes from the same distribution stay under a floor in 95 % of
+    /// cases.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Distances {
-        mean as "mean_bias": Bias = "", "mean less that of the reference";
-        deviation as "deviation_bias": Bias = "", "standard deviation less that of the reference";
-        wasserstein as "w1": Distance = "", "Wasserstein-1 distance";
-        kolmogorov as "ks": Distance = "", "Kolmogorov-Smirnov distance";
+        mean_bias: f64 = "", "mean less that of the reference";
+        mean_bias_low: f64 = "", "lower end of its 95 % interval";
+        mean_bias_high: f64 = "", "upper end";
+        deviation_bias: f64 = "", "standard deviation less that of the reference";
+        deviation_bias_low: f64 = "", "lower end of its 95 % interval";
+        deviation_bias_high: f64 = "", "upper end";
+        w1: f64 = "", "Wasserstein-1 distance";
+        w1_low: f64 = "", "lower end of its 95 % interval";
+        w1_high: f64 = "", "upper end";
+        w1_floor: f64 = "", "95 % quantile of the distance by chance alone";
+        ks: f64 = "", "Kolmogorov-Smirnov distance";
+        ks_low: f64 = "", "lower end of its 95 % interval";
+        ks_high: f64 = "", "upper end";
+        ks_floor: f64 = "", "95 % quantile of the distance by chance alone";
     }
 }
 
@@ -97,14 +55,25 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
         by_chance.push(differences(&resample(reference, sample.len(), &mut generator), &other));
     }
     let found = differences(&sorted(sample), &sorted(reference));
-    let bias = |which: usize| shifted(found[which], resampled.iter().map(|other| other[which]).collect());
-    let distance = |which: usize| {
-        let Bias { value, low, high } = bias(which);
-        let floor = quantile(&mut by_chance.iter().map(|other| other[which]).collect::<Vec<_>>(), FLOOR);
-        Distance { value, low: low.max(0.0), high, floor }
-    };
-    let ([wasserstein, kolmogorov], [mean, deviation]) = ([0, 1].map(distance), [2, 3].map(bias));
-    Some(Distances { mean, deviation, wasserstein, kolmogorov })
+    let interval = |which: usize| shifted(found[which], resampled.iter().map(|other| other[which]).collect());
+    let floor = |which: usize| quantile(&mut by_chance.iter().map(|other| other[which]).collect::<Vec<_>>(), FLOOR);
+    let [(w1_low, w1_high), (ks_low, ks_high), mean, deviation] = [0, 1, 2, 3].map(interval);
+    Some(Distances {
+        mean_bias: found[2],
+        mean_bias_low: mean.0,
+        mean_bias_high: mean.1,
+        deviation_bias: found[3],
+        deviation_bias_low: deviation.0,
+        deviation_bias_high: deviation.1,
+        w1: found[0],
+        w1_low: w1_low.max(0.0),
+        w1_high,
+        w1_floor: floor(0),
+        ks: found[1],
+        ks_low: ks_low.max(0.0),
+        ks_high,
+        ks_floor: floor(1),
+    })
 }
 
 /// Differences of two sorted samples: Wasserstein-1, Kolmogorov-Smirnov, of the means, of the standard deviations.
@@ -124,11 +93,11 @@ pub(super) fn deviation(sample: &[f64]) -> f64 {
     (squares / (sample.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
-/// A value with the interval of its resampled ones, shifted so that their median lies on the value: resampling adds
-/// noise, and noise makes distances longer.
-fn shifted(value: f64, mut resampled: Vec<f64>) -> Bias {
+/// The interval of the resampled values, shifted so that their median lies on the value: resampling adds noise, and noise
+/// makes distances longer.
+fn shifted(value: f64, mut resampled: Vec<f64>) -> (f64, f64) {
     let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|probability| quantile(&mut resampled, probability));
-    Bias { value, low: value + (low - median), high: value + (high - median) }
+    (value + (low - median), value + (high - median))
 }
 
 fn sorted(sample: &[f64]) -> Vec<f64> {
@@ -210,13 +179,13 @@ mod tests {
     fn a_shift_is_distinguished_from_chance_and_chance_from_a_shift() {
         let reference = uniform(1000, 0.0, 1);
         let same = distances(&uniform(500, 0.0, 2), &reference, 3).unwrap();
-        assert!(same.wasserstein.value <= 1.5 * same.wasserstein.floor, "{same:?}");
+        assert!(same.w1 <= 1.5 * same.w1_floor, "{same:?}");
         let moved = distances(&uniform(500, 0.1, 2), &reference, 3).unwrap();
-        assert!(moved.wasserstein.value > 2.0 * moved.wasserstein.floor, "{moved:?}");
-        assert!(moved.wasserstein.low < 0.1 && 0.1 < moved.wasserstein.high, "{moved:?}");
-        assert!(moved.kolmogorov.value > moved.kolmogorov.floor, "{moved:?}");
-        assert!(moved.mean.low > 0.0 && moved.mean.low < 0.1 && 0.1 < moved.mean.high, "{moved:?}");
-        assert!(moved.deviation.low < 0.0 && 0.0 < moved.deviation.high, "{moved:?}");
+        assert!(moved.w1 > 2.0 * moved.w1_floor, "{moved:?}");
+        assert!(moved.w1_low < 0.1 && 0.1 < moved.w1_high, "{moved:?}");
+        assert!(moved.ks > moved.ks_floor, "{moved:?}");
+        assert!(moved.mean_bias_low > 0.0 && moved.mean_bias_low < 0.1 && 0.1 < moved.mean_bias_high, "{moved:?}");
+        assert!(moved.deviation_bias_low < 0.0 && 0.0 < moved.deviation_bias_high, "{moved:?}");
     }
 
     #[test]
@@ -224,22 +193,23 @@ mod tests {
         let reference = uniform(1000, 0.0, 1);
         let wide: Vec<f64> = uniform(500, -0.5, 2).into_iter().map(|value| 1.2 * value + 0.5).collect();
         for sample in [uniform(500, 0.0, 2), uniform(1000, 0.0, 1), wide.clone()] {
-            let Distances { wasserstein: w, kolmogorov: k, mean, deviation } =
-                distances(&sample, &reference, 3).unwrap();
-            for (value, low, high) in [(w.value, w.low, w.high), (k.value, k.low, k.high)] {
-                assert!(0.0 <= low && low <= value && value <= high, "{low} {value} {high}");
-            }
-            for bias in [mean, deviation] {
-                assert!(bias.low <= bias.value && bias.value <= bias.high, "{bias:?}");
+            let found = distances(&sample, &reference, 3).unwrap();
+            for (least, low, value, high) in [
+                (0.0, found.w1_low, found.w1, found.w1_high),
+                (0.0, found.ks_low, found.ks, found.ks_high),
+                (f64::NEG_INFINITY, found.mean_bias_low, found.mean_bias, found.mean_bias_high),
+                (f64::NEG_INFINITY, found.deviation_bias_low, found.deviation_bias, found.deviation_bias_high),
+            ] {
+                assert!(least <= low && low <= value && value <= high, "{low} {value} {high}");
             }
         }
         let wider = distances(&wide, &reference, 3).unwrap();
         // 0.2 times the deviation of a uniform distribution, 1/sqrt(12).
         assert!(
-            0.0 < wider.deviation.low && wider.deviation.low < 0.0577 && 0.0577 < wider.deviation.high,
+            0.0 < wider.deviation_bias_low && wider.deviation_bias_low < 0.0577 && 0.0577 < wider.deviation_bias_high,
             "{wider:?}"
         );
-        assert!(wider.mean.low < 0.0 && 0.0 < wider.mean.high, "{wider:?}");
+        assert!(wider.mean_bias_low < 0.0 && 0.0 < wider.mean_bias_high, "{wider:?}");
     }
 
     #[test]

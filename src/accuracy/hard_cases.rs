@@ -5,14 +5,13 @@
 //! balances, bad values are refused by name, or it stops and gives the cause. A run as a job must break about as many
 //! contacts as the audited one; where single runs say nothing, the means over many seeds must agree.
 
-use crate::model::equation::{StiffnessMatrix, stability_limit};
+use super::Method;
 use crate::model::{ParameterError, Parameters, Symbol, Value};
 use crate::observe::{Recording, SlipObserver};
 use crate::reduce::Moments;
 use crate::run::cpu;
 use crate::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
 use crate::table::columns::{Table, columns};
-use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -36,7 +35,7 @@ const SEEDS: u64 = 24;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expected {
     Ends,
-    /// Parameters or solver are refused, in a message that contains this.
+    /// Parameters or solver are refused, in a message that contains this, with - for a blank.
     Refused(&'static str),
     /// It cannot continue, and its message contains this.
     Stops(&'static str),
@@ -53,7 +52,7 @@ pub struct HardCase {
     end_time: f64,
     slips: u64,
     /// Whether counts of breaks differ so far from seed to seed that only means compare.
-    is_chaotic: bool,
+    pub is_chaotic: bool,
     expected: Expected,
 }
 
@@ -110,30 +109,45 @@ impl From<SimulationError> for Failure {
 }
 
 impl HardCase {
-    fn new(threat: &'static str, settings: &[(Symbol, Value)], end_time: f64) -> Self {
-        let settings = settings.to_vec();
-        let (solver, expected) = (Solver::default(), Expected::Ends);
-        Self { threat, settings, solver, end_time, slips: 3, is_chaotic: false, expected }
+    /// A case from its line in the table; `None` if that says something else.
+    fn parsed(threat: &'static str, line: &'static str) -> Option<Self> {
+        let mut words = line.split_whitespace();
+        let mut case = Self {
+            threat,
+            settings: Vec::new(),
+            solver: Solver::default(),
+            end_time: words.next()?.parse().ok()?,
+            slips: 3,
+            is_chaotic: false,
+            expected: Expected::Ends,
+        };
+        for word in words {
+            let (key, value) = word.split_once('=').unwrap_or((word, ""));
+            match key {
+                "slips" if value == "all" => case.slips = u64::MAX,
+                "slips" => case.slips = value.parse().ok()?,
+                "chaotic" => case.is_chaotic = true,
+                "dt" => case.solver = Solver::FixedStep { time_step: value.parse().ok()? },
+                "tolerance" => case.solver = Solver::event_driven(value.parse().ok()?),
+                "refused" => case.expected = Expected::Refused(value),
+                "stops" => case.expected = Expected::Stops(value),
+                _ => {
+                    let symbol = Symbol::from_key(key)?;
+                    let value = match Parameters::default().get(symbol) {
+                        Value::Count(_) => Value::Count(value.parse().ok()?),
+                        _ => Value::Real(value.parse().ok()?),
+                    };
+                    case.settings.push((symbol, value));
+                }
+            }
+        }
+        Some(case)
     }
 
-    fn slips(self, slips: u64) -> Self {
-        Self { slips, ..self }
-    }
-
-    fn chaotic(self) -> Self {
-        Self { is_chaotic: true, ..self }
-    }
-
-    fn solver(self, solver: Solver) -> Self {
-        Self { solver, ..self }
-    }
-
-    fn refused(self, words: &'static str) -> Self {
-        Self { expected: Expected::Refused(words), ..self }
-    }
-
-    fn stops(self, words: &'static str) -> Self {
-        Self { expected: Expected::Stops(words), ..self }
+    /// Parameters and end, in s, of a case that the event-driven solver must bring to its end.
+    pub fn to_the_end(&self) -> Option<(Parameters, f64)> {
+        let ends = self.expected == Expected::Ends && matches!(self.solver, Solver::EventDriven { .. });
+        self.parameters().ok().filter(|_| ends).map(|parameters| (parameters, self.end_time))
     }
 
     /// What differs from the defaults, in words.
@@ -160,7 +174,7 @@ impl HardCase {
         let row = Stability {
             threat: self.threat.to_owned(),
             case: self.name(),
-            solver: super::solver_in_words(solver),
+            solver: Method::from(solver).to_string(),
             cpu_seconds,
             ..Stability::default()
         };
@@ -191,7 +205,9 @@ impl HardCase {
             Err(failure) => {
                 let passed = match (self.expected, &failure) {
                     (Expected::Stops(words), Failure::Stopped(message))
-                    | (Expected::Refused(words), Failure::Refused(message)) => message.contains(words),
+                    | (Expected::Refused(words), Failure::Refused(message)) => {
+                        message.contains(&words.replace('-', " "))
+                    }
                     _ => false,
                 };
                 Stability { passed, outcome: failure.to_string(), ..row }
@@ -286,118 +302,19 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
     })
 }
 
+/// The table of cases.
+const TABLE: &str = include_str!("hard_cases.txt");
+
 /// Every case, group by group.
+#[expect(clippy::missing_panics_doc, reason = "the table is a part of the program")]
 pub fn hard_cases() -> Vec<HardCase> {
-    use crate::table::value::Value::{Count, Real};
-    use Symbol::{Delta, Dfs, FN, Fs, Gamma, K, Kd, Ki, L, M, N, Ns, Seed, T, TauR, V0};
-    let case = HardCase::new;
-    let mut cases = Vec::new();
-
-    let long = "long runs, far from the origin";
-    cases.push(case(long, &[(V0, Real(1e-4))], 12.0).slips(u64::MAX));
-    cases.push(case(long, &[(N, Count(2)), (Ns, Count(2)), (V0, Real(1e-3))], 100.0).slips(u64::MAX));
-
-    let ties = "ties: all contacts of a block break at once";
-    cases.push(case(ties, &[(Dfs, Real(0.0))], 1.0));
-    cases.push(case(ties, &[(Dfs, Real(0.0)), (N, Count(1))], 1.0).slips(50));
-    cases.push(case(ties, &[(Dfs, Real(0.0)), (N, Count(8)), (Delta, Real(1e-6)), (T, Real(0.02))], 1.0).slips(20));
-
-    let reattachment = "very short and very long reattachment";
-    cases.push(case(reattachment, &[(TauR, Real(1e-6))], 0.12));
-    cases.push(case(reattachment, &[(TauR, Real(1e-6)), (Dfs, Real(0.0))], 0.12));
-    cases.push(case(reattachment, &[(TauR, Real(10.0))], 30.0));
-    cases.push(case(reattachment, &[(TauR, Real(10.0)), (V0, Real(1e-6))], 60.0).chaotic());
-
-    let wide = "thresholds that could be drawn negative";
-    cases.extend([0.411, 1.37].map(|spread| case(wide, &[(Dfs, Real(spread))], 0.5)));
-
-    let damping = "no damping, overdamping";
-    cases.push(case(damping, &[(Gamma, Real(0.0))], 0.3).chaotic());
-    cases.push(case(damping, &[(Gamma, Real(0.0)), (N, Count(1))], 0.3));
-    cases.push(case(damping, &[(Gamma, Real(1.0))], 0.3).chaotic());
-    cases.push(case(damping, &[(Gamma, Real(1e7))], 0.3));
-    cases.push(case(damping, &[(Gamma, Real(1e7)), (V0, Real(1e-6))], 10.0));
-
-    let drive = "slow and fast drive, weak and strong modulation, resonance";
-    let modulated = |amplitude: f64, period: f64| [(Delta, Real(amplitude)), (T, Real(period))];
-    cases.push(case(drive, &[(V0, Real(1e-8))], 1e4));
-    cases.push(case(drive, &[(V0, Real(1e-2))], 0.05));
-    cases.push(case(drive, &[(V0, Real(1e-8)), (Delta, Real(1e-6)), (T, Real(100.0))], 1e4));
-    cases.push(case(drive, &modulated(1e-9, 0.02), 0.5));
-    cases.push(case(drive, &modulated(1e-4, 0.02), 0.2));
-    cases.push(case(drive, &modulated(1e-4, 1.0), 1.0));
-    cases.push(case(drive, &modulated(1e-6, 1e-5), 0.2));
-    cases.push(case(drive, &modulated(1e-9, 1e-5), 0.5));
-    cases.push(case(drive, &modulated(1e-6, 100.0), 0.5));
-    for blocks in [1, 2, 8] {
-        let [amplitude, period] = modulated(1e-6, 2e-4);
-        cases.push(case(drive, &[amplitude, period, (V0, Real(2e-6)), (N, Count(blocks))], 0.7).slips(u64::MAX));
-    }
-    for (index, gamma) in [(0, 10.0), (0, 0.0), (69, 10.0)] {
-        let [amplitude, period] = modulated(1e-8, resonant_period(index));
-        cases.push(case(drive, &[amplitude, period, (Gamma, Real(gamma))], 0.2));
-    }
-
-    let sizes = "sizes: lanes, stiffness, growth of cost";
-    cases.extend([1, 2, 7, 8, 9, 64].map(|blocks| case(sizes, &[(N, Count(blocks))], 0.5)));
-    cases.push(case(sizes, &[(N, Count(1000))], 0.3).slips(1));
-    cases.push(case(sizes, &[(Ns, Count(1))], 0.1));
-    cases.push(case(sizes, &[(Ns, Count(1000))], 1.0));
-    cases.push(case(sizes, &[(K, Real(1e10))], 2.0));
-    cases.push(case(sizes, &[(K, Real(1e6))], 0.3).chaotic());
-
-    let stability = "the limit of stability";
-    let limit = stability_limit(&Parameters::default());
-    let step = |time_step: f64| case(stability, &[], 0.15).solver(Solver::FixedStep { time_step });
-    cases.push(step(0.99 * limit));
-    for setting in [(Dfs, Real(0.0)), (TauR, Real(1e-6)), (Gamma, Real(1e7))] {
-        cases.push(case(stability, &[setting], 0.15).solver(Solver::FixedStep { time_step: 1e-6 }));
-    }
-    for time_step in [1.01 * limit, 0.0, -1e-6, f64::NAN, f64::INFINITY] {
-        cases.push(step(time_step).refused("dt"));
-    }
-    for tolerance in [0.0, -1e-6, f64::NAN, 1.0] {
-        cases.push(case(stability, &[], 0.15).solver(Solver::event_driven(tolerance)).refused("tolerance"));
-    }
-
-    let extreme = "values beyond what doubles resolve";
-    for (symbol, value) in [(K, 1e30), (Kd, 1e30), (Ki, 1e30), (Gamma, 1e30), (M, 1e-30)] {
-        cases.push(case(extreme, &[(symbol, Real(value))], 1.0).stops("too short"));
-    }
-    cases.push(case(extreme, &modulated(1e300, 1.0), 1.0).stops("not finite"));
-    cases.push(case(extreme, &modulated(1e-6, 1e-300), 1.0).stops("not finite"));
-    // Over before the solver first looks at the state.
-    cases.push(
-        case(extreme, &modulated(1e308, 1e-3), 0.01).solver(Solver::FixedStep { time_step: 4e-6 }).stops("not finite"),
-    );
-    cases.push(case(extreme, &[(M, Real(1e10))], 1.0));
-    cases.push(case(extreme, &[(V0, Real(1e-300))], 1.0));
-    cases.push(case(extreme, &[(TauR, Real(1e-300))], 0.2));
-    cases.push(case(extreme, &[(Fs, Real(1e300))], 1.0));
-    cases.push(case(extreme, &[(Fs, Real(1e308)), (Dfs, Real(1e308))], 1.0).stops("not finite"));
-    cases.push(case(extreme, &[(M, Real(1e308)), (K, Real(1e308))], 1.0).stops("too short"));
-
-    let bad = "values that make no sense";
-    let mut refuse = |symbol: Symbol, value: Value| {
-        cases.push(case(bad, &[(symbol, value)], 0.1).refused(symbol.key()));
-    };
-    for symbol in [M, K, Kd, Ki, Fs, Dfs, TauR, Gamma, V0, Delta, T, FN, L] {
-        for value in [f64::NAN, f64::INFINITY, -1.0] {
-            refuse(symbol, Real(value));
+    let (mut cases, mut threat) = (Vec::new(), "");
+    for line in TABLE.lines().filter(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#')) {
+        if line.starts_with(' ') {
+            cases.push(HardCase::parsed(threat, line).expect(line));
+        } else {
+            threat = line;
         }
     }
-    for symbol in [M, K, Kd, Ki, Fs, TauR, V0, T, FN, L] {
-        refuse(symbol, Real(0.0));
-    }
-    for (symbol, count) in [(N, 0), (N, u64::MAX), (Ns, 0), (Ns, u64::MAX), (Seed, u64::MAX)] {
-        refuse(symbol, Count(count));
-    }
     cases
-}
-
-/// Period of the mode with this index of the intact slider, in s.
-fn resonant_period(index: usize) -> f64 {
-    let parameters = Parameters::default();
-    let squared = StiffnessMatrix::intact(&parameters).eigenvalue(index) / parameters.block_mass();
-    TAU / squared.sqrt()
 }

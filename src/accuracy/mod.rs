@@ -4,9 +4,9 @@
 //! breaks.rs     before chaos: break times, contact by contact
 //! distance.rs   after chaos: distances of distributions and biases, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
-//! hard_cases.rs parameters that break a naive code, each audited
+//! hard_cases.*  parameters that break a naive code, each audited
 //! cost.rs       what a computation costs
-//! tables.rs -> report.rs: tables as Parquet and JSON, figures
+//! report.rs     tables as Parquet and JSON, figures
 //! ```
 
 pub mod breaks;
@@ -15,37 +15,59 @@ pub mod distance;
 mod hard_cases;
 mod report;
 mod study;
-mod tables;
 
 pub use cost::Cost;
-pub use distance::{Bias, Distance, Distances};
+pub use distance::Distances;
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use report::{Report, stability_report, study_report};
-pub use study::{DistanceRow, Findings, MethodRow, Quantity, Study};
+pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Measurements, Recording, measure};
 use crate::run::cpu;
 use crate::solver::{Ledger, Limits, Observer, Resolve, Solver, simulate, simulate_audited};
+use crate::table::columns::columns;
 use anyhow::{Context, Result};
+use std::fmt;
 use std::sync::atomic::AtomicBool;
 
-/// The method of a solver in words; the event-driven one by how it resolves motion, where that is set.
-pub const fn method_in_words(solver: Solver) -> &'static str {
-    match solver {
-        Solver::EventDriven { resolve: Resolve::Auto, .. } => "event-driven",
-        Solver::EventDriven { resolve: Resolve::Grid, .. } => "grid",
-        Solver::EventDriven { resolve: Resolve::Taylor, .. } => "Taylor steps",
-        Solver::FixedStep { .. } => "fixed step",
+const FIXED_STEP: &str = "fixed-step";
+
+columns! {
+    /// A solver, with its one setting.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Method {
+        method: String = "", "event-driven, or how it resolves motion: grid or taylor; or fixed-step";
+        setting: f64 = "", "tolerance, or dt in s";
     }
 }
 
-/// A solver and its setting in words.
-pub fn solver_in_words(solver: Solver) -> String {
-    let method = method_in_words(solver);
-    match solver {
-        Solver::EventDriven { tolerance, .. } => format!("{method}, tolerance {tolerance:e}"),
-        Solver::FixedStep { time_step } => format!("{method}, dt {time_step:e} s"),
+impl From<Solver> for Method {
+    fn from(solver: Solver) -> Self {
+        let (method, setting) = match solver {
+            Solver::EventDriven { resolve: Resolve::Auto, tolerance } => ("event-driven", tolerance),
+            Solver::EventDriven { resolve, tolerance } => (resolve.word(), tolerance),
+            Solver::FixedStep { time_step } => (FIXED_STEP, time_step),
+        };
+        Self { method: method.to_owned(), setting }
+    }
+}
+
+impl Method {
+    /// The method without its setting, in words.
+    pub fn name(&self) -> &str {
+        match self.method.as_str() {
+            "taylor" => "Taylor steps",
+            FIXED_STEP => "fixed step",
+            name => name,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (setting, unit) = if self.method == FIXED_STEP { ("dt", " s") } else { ("tolerance", "") };
+        write!(f, "{}, {setting} {:e}{unit}", self.name(), self.setting)
     }
 }
 
@@ -102,6 +124,6 @@ impl Realisation<'_> {
 
     fn name(&self) -> String {
         let Self { parameters, solver } = *self;
-        format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, solver_in_words(solver))
+        format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, Method::from(solver))
     }
 }

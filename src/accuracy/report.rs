@@ -1,8 +1,8 @@
 //! What a command of accuracy leaves behind: tables as Parquet, everything as JSON, and figures, put in place together.
 
-use super::distance::Distance;
-use super::study::{Findings, MethodRow, Quantity, Study};
-use super::{Stability, cost, method_in_words, other_settings};
+use super::distance::Distances;
+use super::study::{Findings, MethodRow, Study};
+use super::{Stability, cost, other_settings};
 use crate::figure::{ErrorPanel, Look, MethodLine, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::commit::Commit;
@@ -124,11 +124,11 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
     });
     let label = "Error of break times (s)".to_owned();
     let mut panels = vec![ErrorPanel { label, by_chance: None, lines: breaks }];
-    for (quantity, name) in [(Quantity::Interval, "τ"), (Quantity::FrontSpeed, "front speed")] {
+    for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
         let lines = lines(&findings.methods, set, |row| {
-            let Distance { value, low, high, floor } = findings.distances_of(row, quantity)?.wasserstein;
-            let uncertainty = Some((low / floor, high / floor));
-            Some(WorkPrecision { error: value / floor, uncertainty, work: row.cost.per_slip })
+            let Distances { w1, w1_low, w1_high, w1_floor, .. } = findings.distances_of(row, quantity)?.distances;
+            let uncertainty = Some((w1_low / w1_floor, w1_high / w1_floor));
+            Some(WorkPrecision { error: w1 / w1_floor, uncertainty, work: row.cost.per_slip })
         });
         panels.push(ErrorPanel { label: format!("W₁ of {name} / chance level"), by_chance: Some(1.0), lines });
     }
@@ -162,7 +162,7 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
             Some(period) => format!("Δ = {:e} m, {:.4} Hz", row.parameters.modulation_amplitude, 1.0 / period),
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
-        let method = format!("{}{mark}", method_in_words(row.solver));
+        let method = format!("{}{mark}", row.solver.name());
         match lines.iter_mut().find(|line| line.method == method && line.drive == drive) {
             Some(line) => line.points.push(point),
             None => lines.push(MethodLine { method, drive, points: vec![point] }),
@@ -173,16 +173,18 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
 
 #[cfg(test)]
 mod tests {
+    use super::super::Method;
     use super::super::breaks::BreakErrors;
     use super::super::distance::distances as measured;
     use super::super::study::DistanceRow;
     use super::*;
     use crate::model::selected::Selected;
     use crate::solver::Solver;
+    use crate::table::columns::{Column, Row};
     use crate::table::file::Dataset;
 
     fn findings() -> Findings {
-        let (parameters, solver) = (Parameters::default(), Solver::FixedStep { time_step: 1e-6 });
+        let (parameters, solver) = (Parameters::default(), Method::from(Solver::FixedStep { time_step: 1e-6 }));
         let break_times = BreakErrors {
             breaks: Some(100),
             missing: Some(0),
@@ -202,7 +204,7 @@ mod tests {
         let method = MethodRow {
             parameters: Selected::new(parameters.clone()),
             case: "defaults".to_owned(),
-            solver,
+            solver: solver.clone(),
             cost,
             timings: 2,
             median_per_slip: 0.02,
@@ -215,7 +217,7 @@ mod tests {
             parameters: Selected::new(parameters),
             case: "defaults".to_owned(),
             solver,
-            quantity: Quantity::Interval,
+            quantity: "interval".to_owned(),
             slips: 3,
             reference_slips: 3,
             mean: 0.11,
@@ -267,5 +269,20 @@ mod tests {
                 assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
             }
         }
+    }
+
+    #[test]
+    fn every_column_is_documented() {
+        let page = include_str!("../../docs/commands.md");
+        let described = |name: &str, columns: Vec<Column>| {
+            let row = page.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
+            // The ends of all intervals are described together.
+            for column in columns.iter().map(|column| column.name.trim_end_matches("_low").trim_end_matches("_high")) {
+                assert!(row.contains(&format!("`{column}`")), "{name}.{column}");
+            }
+        };
+        described(MethodRow::NAME, MethodRow::columns());
+        described(DistanceRow::NAME, DistanceRow::columns());
+        described(Stability::NAME, Stability::columns());
     }
 }

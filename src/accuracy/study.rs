@@ -10,13 +10,12 @@
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
-use super::{Realisation, set_in_words};
+use super::{Method, Realisation, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Recording, Slip, SlipObserver};
 use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
 use crate::table::columns::{Table, columns};
-use crate::table::value::words;
 use anyhow::{Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -141,7 +140,7 @@ columns! {
     pub struct MethodRow {
         parameters: Selected<DriveAlone>;
         case: String = "", "the drive, and what else differs from the defaults";
-        solver: Solver;
+        solver: Method;
         cost: Cost;
         timings: u64 = "", "timings, one of each realisation; the costs are by the cheapest per step";
         median_per_slip as "median_cpu_per_slip": f64 = "s", "CPU time per slip by the median timing";
@@ -156,40 +155,18 @@ impl Table for MethodRow {
     const MEANING: &'static str = "One row per set of parameters and solver setting";
 }
 
-words! {
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Quantity {
-        /// Interval τ, in s.
-        Interval = "interval",
-        /// Phase φ, in rad.
-        Phase = "phase",
-        /// Stress drop, in N.
-        Drop = "drop",
-        /// Shear force at the onset, in N.
-        PeakForce = "peak_force",
-        /// Time from the first to the last break, in s.
-        Duration = "duration",
-        /// Speed of the rupture front, in m/s.
-        FrontSpeed = "front_speed",
-    }
-}
+/// A quantity of slips whose distributions are compared.
+type Quantity = (&'static str, fn(&Slip) -> Option<f64>);
 
-impl Quantity {
-    fn sample(self, slips: &[Slip]) -> Vec<f64> {
-        slips.iter().filter_map(self.column()).collect()
-    }
-
-    const fn column(self) -> fn(&Slip) -> Option<f64> {
-        match self {
-            Self::Interval => |slip| slip.interval,
-            Self::Phase => |slip| slip.phase,
-            Self::Drop => |slip| Some(slip.drop),
-            Self::PeakForce => |slip| Some(slip.peak_force),
-            Self::Duration => |slip| Some(slip.duration),
-            Self::FrontSpeed => |slip| slip.front_speed,
-        }
-    }
-}
+/// By their columns in the table of slips.
+pub const QUANTITIES: [Quantity; 6] = [
+    ("interval", |slip| slip.interval),
+    ("phase", |slip| slip.phase),
+    ("drop", |slip| Some(slip.drop)),
+    ("peak_force", |slip| Some(slip.peak_force)),
+    ("duration", |slip| Some(slip.duration)),
+    ("front_speed", |slip| slip.front_speed),
+];
 
 columns! {
     /// A distribution of one solver at one set of parameters against that of the reference ensemble.
@@ -197,8 +174,8 @@ columns! {
     pub struct DistanceRow {
         parameters: Selected<DriveAlone>;
         case: String = "", "the drive, and what else differs from the defaults";
-        solver: Solver;
-        quantity: Quantity = "", "interval, phase, drop, peak_force, duration or front_speed";
+        solver: Method;
+        quantity: String = "", "interval, phase, drop, peak_force, duration or front_speed";
         slips: u64 = "", "size of the sample";
         reference_slips: u64 = "", "size of the reference sample";
         mean: f64 = "", "mean";
@@ -225,11 +202,10 @@ pub struct Findings {
 
 impl Findings {
     /// How far a distribution is from the reference, for the solver and set of a row.
-    pub fn distances_of(&self, row: &MethodRow, quantity: Quantity) -> Option<&Distances> {
-        let same = |other: &&DistanceRow| {
+    pub fn distances_of(&self, row: &MethodRow, quantity: &str) -> Option<&DistanceRow> {
+        self.distances.iter().find(|other| {
             other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
-        };
-        self.distances.iter().find(same).map(|row| &row.distances)
+        })
     }
 }
 
@@ -300,7 +276,7 @@ impl Study {
                     "{case}: no slips; the study compares slips, so choose parameters at which the slider does not just slide"
                 );
             }
-            let mean_interval = mean(&Quantity::Interval.sample(&reference));
+            let mean_interval = mean(&reference.iter().filter_map(|slip| slip.interval).collect::<Vec<_>>());
             let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
                 let (case, parameters) = (set_in_words(parameters), parameters.clone());
@@ -308,7 +284,7 @@ impl Study {
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters),
                     case,
-                    solver,
+                    solver: solver.into(),
                     cost,
                     timings: self.seeds,
                     median_per_slip: median.per_slip,
@@ -397,14 +373,14 @@ fn distance_rows(
     reference: &[Slip],
     key: u64,
 ) -> Vec<DistanceRow> {
-    let row = |(place, quantity): (u64, Quantity)| {
-        let (sample, reference) = (quantity.sample(slips), quantity.sample(reference));
-        let key = key * Quantity::ALL.len() as u64 + place;
+    let row = |(place, (quantity, value)): (u64, Quantity)| {
+        let [sample, reference] = [slips, reference].map(|slips| slips.iter().filter_map(value).collect::<Vec<_>>());
+        let key = key * QUANTITIES.len() as u64 + place;
         Some(DistanceRow {
             parameters: Selected::new(parameters.clone()),
             case: set_in_words(parameters),
-            solver,
-            quantity,
+            solver: solver.into(),
+            quantity: quantity.to_owned(),
             slips: sample.len() as u64,
             reference_slips: reference.len() as u64,
             mean: mean(&sample),
@@ -414,7 +390,7 @@ fn distance_rows(
             distances: distances(&sample, &reference, key)?,
         })
     };
-    (0..).zip(Quantity::ALL).filter_map(row).collect()
+    (0..).zip(QUANTITIES).filter_map(row).collect()
 }
 
 #[cfg(test)]

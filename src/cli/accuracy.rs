@@ -5,8 +5,8 @@ use super::output;
 use super::sweep::settings_as_sweep;
 use super::threads::ThreadsFlag;
 use crate::accuracy::{
-    self, DistanceRow, Distances, Findings, MethodRow, Quantity, Report, Stability, Study, hard_cases, set_in_words,
-    solver_in_words, stability_report, study_report,
+    self, DistanceRow, Distances, Findings, MethodRow, QUANTITIES, Report, Stability, Study, hard_cases, set_in_words,
+    stability_report, study_report,
 };
 use crate::model::Parameters;
 use crate::sweep::Sweep;
@@ -169,8 +169,8 @@ fn study_text(study: &Study, findings: &Findings) -> String {
          is larger than in 95 % of comparisons of equal distributions",
         findings.distances.len(),
         exceed(is_biased),
-        exceed(|found| found.wasserstein.value > found.wasserstein.floor),
-        exceed(|found| found.kolmogorov.value > found.kolmogorov.floor)
+        exceed(|found| found.w1 > found.w1_floor),
+        exceed(|found| found.ks > found.ks_floor)
     ));
     lines.push(String::new());
     lines.join("\n")
@@ -196,7 +196,7 @@ const fn is_together_throughout(row: &MethodRow) -> bool {
 }
 
 fn is_biased(found: &Distances) -> bool {
-    found.mean.low > 0.0 || found.mean.high < 0.0
+    found.mean_bias_low > 0.0 || found.mean_bias_high < 0.0
 }
 
 /// Costs and errors of the solvers at a set.
@@ -218,7 +218,7 @@ fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         lines.push(format!(
             "{:30}{:>9} {:>7.2} {:>7.2} {:>8.0} {:>18} {:>24} {:>9}",
-            solver_in_words(row.solver),
+            row.solver.to_string(),
             format!("{:.3}{mark}", 1e3 * row.cost.per_slip),
             row.median_per_slip / row.cost.per_slip,
             row.largest_per_slip / row.cost.per_slip,
@@ -231,19 +231,20 @@ fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
     lines
 }
 
+/// Of the interval of a bias.
+fn half_width(row: &DistanceRow) -> f64 {
+    0.5 * (row.distances.mean_bias_high - row.distances.mean_bias_low)
+}
+
 /// Biases of the means of slips at a set.
 fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
-    let of = |row: &MethodRow, quantity: Quantity| {
-        findings.distances.iter().find(|other| {
-            other.quantity == quantity && other.parameters == row.parameters && other.solver == row.solver
-        })
-    };
-    let found = |quantity: &Quantity| rows.iter().find_map(|row| of(row, *quantity));
-    let quantities: Vec<Quantity> = Quantity::ALL.into_iter().filter(|quantity| found(quantity).is_some()).collect();
-    let Some(slips) = quantities.first().and_then(found) else { return Vec::new() };
+    let found = |quantity: &str| rows.iter().find_map(|row| findings.distances_of(row, quantity));
+    let quantities = QUANTITIES.map(|(quantity, _)| quantity);
+    let quantities: Vec<&str> = quantities.into_iter().filter(|quantity| found(quantity).is_some()).collect();
+    let Some(slips) = quantities.first().and_then(|quantity| found(quantity)) else { return Vec::new() };
     let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<Vec<_>>().concat();
-    let unit = |quantity: Quantity| if quantity == Quantity::Phase { "rad" } else { "%" };
-    let heading = quantities.iter().map(|&quantity| format!("{} ({})", quantity.word(), unit(quantity))).collect();
+    let unit = |quantity: &str| if quantity == "phase" { "rad" } else { "%" };
+    let heading = quantities.iter().map(|quantity| format!("{quantity} ({})", unit(quantity))).collect();
     let mut lines = vec![
         format!(
             "bias of the mean ± 95 % interval: {} slips compared with {} of one reference, so that marks in a column come together",
@@ -252,24 +253,23 @@ fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
         format!("{:30}{}", "", cells(heading)),
     ];
     for row in rows {
-        let bias = |&quantity: &Quantity| {
-            of(row, quantity).map_or_else(
+        let bias = |quantity: &&str| {
+            findings.distances_of(row, quantity).map_or_else(
                 || "-".to_owned(),
                 |row| {
                     let scale = if unit(quantity) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
-                    let (bias, mark) = (row.distances.mean, if is_biased(&row.distances) { "!" } else { " " });
-                    let half = 0.5 * scale * (bias.high - bias.low);
-                    format!("{:+.3} ± {half:.3}{mark}", scale * bias.value)
+                    let mark = if is_biased(&row.distances) { "!" } else { " " };
+                    format!("{:+.3} ± {:.3}{mark}", scale * row.distances.mean_bias, scale * half_width(row))
                 },
             )
         };
         let biases: Vec<String> = quantities.iter().map(bias).collect();
         if biases.iter().any(|bias| bias != "-") {
-            lines.push(format!("{:30}{}", solver_in_words(row.solver), cells(biases)));
+            lines.push(format!("{:30}{}", row.solver.to_string(), cells(biases)));
         }
     }
-    let half = |row: &DistanceRow| 50.0 * (row.distances.mean.high - row.distances.mean.low) / row.reference_mean;
-    let halves = rows.iter().filter_map(|row| of(row, Quantity::Interval)).map(half);
+    let intervals = rows.iter().filter_map(|row| findings.distances_of(row, "interval"));
+    let halves = intervals.map(|row| 100.0 * half_width(row) / row.reference_mean);
     if let Some(hidden) = halves.max_by(f64::total_cmp) {
         lines.push(format!(
             "these slips may hide a bias of the interval below {hidden:.1} %; more --seeds show smaller ones"
@@ -314,7 +314,7 @@ mod tests {
         let row = MethodRow {
             parameters: Selected::new(parameters.clone()),
             case: String::new(),
-            solver: Solver::default(),
+            solver: Solver::default().into(),
             cost: Cost { per_slip: 1e-3, timed_slips, ..Cost::default() },
             timings: 1,
             median_per_slip: 1e-3,
