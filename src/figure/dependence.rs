@@ -5,7 +5,7 @@ use super::axis::{Axis, bounds, logarithmic_bounds};
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
 use super::picture::{Picture, Sheet};
-use super::sets::{Grid, distinct, modulation, swept};
+use super::sets::{Grid, distinct, modulation, parameter, swept};
 use super::style::{INKS, Look, RADIUS, curve, dot};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetSummary, Statistic};
@@ -132,23 +132,9 @@ pub(super) fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
     }
 }
 
+/// Its label.
 pub(super) fn label(symbol: Symbol) -> String {
-    let unit = if symbol == Symbol::Dfs { "" } else { symbol.description().unit };
-    let name = match symbol {
-        Symbol::N => "Blocks N",
-        Symbol::Ns => "Contacts per block Nₛ",
-        Symbol::M => "Slider mass M",
-        Symbol::K => "Slider stiffness K",
-        Symbol::Kd => "Drive stiffness Kd",
-        Symbol::Ki => "Contact stiffness k",
-        Symbol::Fs => "Contact threshold fₛ",
-        Symbol::Dfs => "Spread of thresholds Δfₛ / fₛ",
-        Symbol::TauR => "Reattachment delay τᵣ",
-        Symbol::Gamma => "Damping rate γ",
-        Symbol::V0 => "Drive velocity V₀",
-        other => other.key(),
-    };
-    if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
+    if symbol == Symbol::Dfs { "Spread of thresholds Δfₛ / fₛ".to_owned() } else { parameter(symbol) }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Sets compared: in what they differ, what each is called, and the grid on which they lie.
 
 use super::axis::{Axis, logarithmic_bounds};
-use crate::model::{Parameters, Symbol, Value};
+use crate::model::{Description, Parameters, Symbol, Value};
 use crate::reduce::SetSummary;
 
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
@@ -100,6 +100,19 @@ pub(super) fn symbol_of(symbol: Symbol) -> String {
     }
 }
 
+/// The label of an axis of a parameter: what it is, its symbol and its unit.
+pub(super) fn parameter(symbol: Symbol) -> String {
+    let Description { meaning, unit, .. } = symbol.description();
+    let what = meaning.split([',', ';']).next().unwrap_or_default();
+    let label = format!("{} {}", capitalised(what), symbol_of(symbol));
+    if unit.is_empty() { label } else { format!("{label} ({unit})") }
+}
+
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 pub(super) fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -113,12 +126,12 @@ pub(super) fn three_digits(value: f64) -> String {
 pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     let all: Vec<&Parameters> = all.collect();
     let Some(first) = all.first() else { return String::new() };
-    // What is off, or enters nothing that figures show, is left out.
+    // What is off, or enters nothing that figures show, is left out, and the default of what the paper has no symbol for.
     let is_shown = |symbol: &Symbol| {
         let value = first.get(*symbol);
         !matches!(symbol, Symbol::Seed | Symbol::FN | Symbol::L)
             && value != Value::Null
-            && (value != Parameters::default().get(*symbol) || !matches!(symbol, Symbol::RampTime | Symbol::BreakOn))
+            && (value != Parameters::default().get(*symbol) || !symbol.description().symbol.is_empty())
             && all.iter().all(|parameters| parameters.get(*symbol) == value)
     };
     let settings = Symbol::ALL.into_iter().filter(is_shown).map(|symbol| setting(first, symbol));

@@ -3,7 +3,7 @@
 
 use super::BadOption;
 use super::axis::Axis;
-use super::sets::{ETA, FREQUENCY, symbol_of, three_digits};
+use super::sets::{ETA, FREQUENCY, capitalised, parameter, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
@@ -81,15 +81,10 @@ impl Values {
             "eta" => return ETA.to_owned(),
             _ => (),
         }
-        let label = match Symbol::from_key(name) {
-            Some(symbol) => {
-                let what = meaning.split([',', ';']).next().unwrap_or_default();
-                format!("{} {}", capitalised(what), symbol_of(symbol))
-            }
-            None if meaning.len() <= LONGEST => capitalised(meaning),
-            None => name.to_string(),
-        };
-        self.with_unit(label)
+        if let Some(symbol) = Symbol::from_key(name) {
+            return parameter(symbol);
+        }
+        self.with_unit(if meaning.len() <= LONGEST { capitalised(meaning) } else { name.to_string() })
     }
 
     /// The same with the symbol or the name alone.
@@ -169,11 +164,6 @@ fn unknown(option: &'static str, name: &str, columns: &[Column]) -> BadOption {
         None => format!("no such column; there are {}", names.join(", ")),
     };
     BadOption::new(option, name, &problem)
-}
-
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

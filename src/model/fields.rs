@@ -17,7 +17,7 @@
 //! |---|---|
 //! | `Variant` | the field as a value of the enum behind `by` |
 //! | `"key"` | its name in files, flags and tables |
-//! | `"symbol"` | its symbol in the paper; may be left out |
+//! | `"symbol"` | its symbol in the paper; may be left out, and figures name it in small print only away from its default |
 //! | `type` | a [`Field`](crate::table::value::Field); an `Option` where the value may be missing |
 //! | `"unit"` | in SI; empty for a pure number, a flag or a word |
 //! | `range` | a name of [`range!`]: the values that the field can take by itself |

@@ -50,7 +50,7 @@ fields! {
         DeltaTo("Delta_to", "Δ_to") turning_amplitude: Option<f64> = None, "m",
             not_negative and "given only with Delta > 0 and ramp_time > 0",
             "amplitude at the turning point of the ramp; null: not ramped";
-        RampTime("ramp_time", "t_ramp") ramp_time: f64 = 0.0, "s",
+        RampTime("ramp_time") ramp_time: f64 = 0.0, "s",
             not_negative and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
         FN("FN", "F_N") normal_force: f64 = 4000.0, "N", positive, "normal force, enters reported ratios only";
