@@ -17,9 +17,10 @@ mod set;
 mod slip_stats;
 mod statistic;
 
+pub use crate::sweep::{Interval, SetRow};
 pub use backbone::{BINS_PER_DECADE, BackboneBin};
 pub use cells::{CellOfGrid, CellRow, Cells, Division, divide};
-pub use confidence::{CONFIDENCE, Interval};
+pub use confidence::CONFIDENCE;
 pub use gather::reduce_jobs;
 #[cfg(test)]
 pub(crate) use gather::row_of;
@@ -30,7 +31,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::{RoundOfSet, SetInRounds};
 pub use sample::{MAX_POINTS, Point, RampStage};
-pub use set::{AllButSeed, LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES, SetRow};
+pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
 pub use statistic::StatisticValue;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

@@ -2,17 +2,16 @@
 
 use super::PhaseLimits;
 use super::circular::unit;
-use super::confidence::Interval;
 use super::gather::JobFacts;
 use super::moments::{Moments, quantile};
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
-use crate::model::selected::{Selected, Selection};
+use crate::model::Parameters;
+use crate::model::selected::Selected;
 use crate::model::theory::random_load_mean;
-use crate::model::{Parameters, Symbol};
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
-use crate::table::columns::{Table, columns};
+pub use crate::sweep::SetRow;
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
@@ -90,80 +89,6 @@ impl SetJobs {
             (regime, other) => other.or(regime),
         };
     }
-}
-
-/// All parameters but the seed, which a set has not.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AllButSeed;
-
-impl Selection for AllButSeed {
-    const SYMBOLS: &'static [Symbol] = Symbol::ALL.split_last().expect("there are parameters").1;
-}
-
-columns! {
-    /// A row of the reduced sets. Quantities are SI; `None` where there is nothing to average.
-    #[derive(Clone, Debug, Default, PartialEq)]
-    pub struct SetRow {
-        set_id: String = "", "hash of all that defines a job but the seed";
-        parameters: Selected<AllButSeed>;
-        eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
-        finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
-        failed_jobs: u64 = "", "jobs that failed";
-        jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
-        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
-        slip_share: Option<f64> = "", "share of time within slips, mean over jobs";
-        attached_fraction: Option<f64> = "", "time-averaged fraction of contacts that are attached, mean over jobs";
-        slips: u64 = "", "slips of all seeds";
-        intervals: u64 = "", "intervals between slips";
-        effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
-        effective_intervals: Option<f64> = "", "the same of intervals";
-        tau_mean: Option<f64> = "s", "mean interval";
-        tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
-        tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
-        tau_05: Option<f64> = "s", "5 % quantile of the intervals";
-        tau_25: Option<f64> = "s", "25 % quantile of the intervals";
-        tau_50: Option<f64> = "s", "median of the intervals";
-        tau_75: Option<f64> = "s", "75 % quantile of the intervals";
-        tau_95: Option<f64> = "s", "95 % quantile";
-        periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
-        periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
-        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
-        locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        expected_locking_index: Option<f64> = "",
-            "the same of slips at random loads that exceed all before, which is no locking: expected_resultant squared; null without modulation";
-        phase_mean: Option<f64> = "rad", "circular mean of the phase";
-        phase_interval as "phase_mean": Option<Interval> = "rad",
-            "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
-        resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
-        length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        expected_resultant: Option<f64> = "",
-            "the same of slips at random loads that exceed all before; null without modulation";
-        rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
-        load_rayleigh_p: Option<f64> = "",
-            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
-        share_below: Option<f64> = "", "share of slips with a phase under phi_min(eta) - 0.15 rad; null for eta < 1";
-        is_locked as "locked": bool = "", "rayleigh_p < 0.001 and resultant_length > 0.5";
-        drop_mean: Option<f64> = "N", "mean stress drop";
-        drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
-        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
-        peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
-        mean_friction: Option<f64> = "N", "time-averaged shear force, mean over jobs";
-        mean_friction_interval as "mean_friction": Option<Interval> = "N",
-            "lower end of its 95 % confidence interval, of jobs as units";
-        duration_mean: Option<f64> = "s", "mean duration of slips";
-        distance_mean as "slip_distance_mean": Option<f64> = "m", "mean distance that the blocks move in a slip";
-        edge_distance_mean: Option<f64> = "m", "mean distance that the driven edge moves in a slip";
-        least_attached_mean: Option<f64> = "", "mean of the least fraction of contacts attached during a slip";
-        onset_cut_share: Option<f64> = "", "share of slips that reached the leading edge while the shear force still rose";
-        precursors_mean: Option<f64> = "", "mean precursors per slip";
-        front_speed_mean: Option<f64> = "m/s", "mean front speed of slips";
-        slow_front_speed_mean: Option<f64> = "m/s", "mean speed of slow fronts, where there were any";
-    }
-}
-
-impl Table for SetRow {
-    const NAME: &'static str = "sets";
-    const MEANING: &'static str = "One row per parameter set, all seeds together";
 }
 
 /// Gathers the slips of a set, job after job.

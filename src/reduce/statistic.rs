@@ -1,7 +1,6 @@
 //! What a sweep file asks of a set: a statistic by its name, and how far its interval is from the target.
 
-use super::set::SetRow;
-use crate::sweep::{Precision, Target};
+use crate::sweep::{Precision, SetRow, Target};
 use crate::table::columns::{Row, Value};
 
 /// What a column of a set holds.
@@ -58,38 +57,5 @@ impl SetRow {
             Some(if half == 0.0 { 0.0 } else { half / target })
         });
         errors.reduce(f64::max)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::Symbol;
-    use crate::sweep::{STATISTICS, StatisticKind};
-    use crate::table::columns::Kind;
-
-    #[test]
-    fn the_statistics_that_a_sweep_file_may_name_are_the_columns_of_a_set() {
-        let columns = SetRow::columns();
-        let is_end = |name: &str| name.ends_with("_low") || name.ends_with("_high");
-        for column in &columns {
-            let has_interval = columns.iter().any(|other| other.name == format!("{}_low", column.name));
-            let known = STATISTICS.iter().find(|statistic| statistic.key == column.name);
-            // Parameters, and what is expected whatever happens, tell nothing of a set.
-            let is_given = column.name.starts_with("expected_") || column.name == "eta";
-            let is_parameter = Symbol::from_key(&column.name).is_some();
-            let is_statistic = match column.kind {
-                Kind::Real => !is_end(&column.name) && !is_given && !is_parameter,
-                Kind::Flag => true,
-                Kind::Text => column.name == "regime",
-                Kind::Count => column.name == "periods",
-            };
-            assert_eq!(known.is_some(), is_statistic, "{}", column.name);
-            let Some(known) = known else { continue };
-            assert_eq!(known.has_interval(), has_interval, "{}", column.name);
-            assert_eq!(known.unit, column.unit, "{}", column.name);
-            assert_eq!(known.kind == StatisticKind::Class, column.kind != Kind::Real, "{}", column.name);
-        }
-        assert!(STATISTICS.iter().all(|known| columns.iter().any(|column| column.name == known.key)));
     }
 }

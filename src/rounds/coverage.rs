@@ -5,7 +5,7 @@ use crate::model::Parameters;
 use crate::observe::{Measurements, Recording, measure};
 use crate::reduce::{Moments, SetRow, row_of};
 use crate::solver::Solver;
-use crate::sweep::{Precision, STATISTICS, Target};
+use crate::sweep::{Precision, Statistic, Target};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ fn ended(repetitions: u64, least: u64, precision: &Precision, truth: f64, row: i
 }
 
 fn precision(key: &str, target: Target) -> Precision {
-    let statistics = STATISTICS.into_iter().filter(|statistic| statistic.key == key).collect();
+    let statistics = Statistic::from_key(key).into_iter().collect();
     Precision { statistics, target, seeds: FROM..=MOST }
 }
 

@@ -62,11 +62,11 @@ pub(super) fn seeds_for(seeds: u64, error: f64, least: u64, most: u64) -> Option
 mod tests {
     use super::*;
     use crate::reduce::Interval;
-    use crate::sweep::{STATISTICS, Statistic, Target};
+    use crate::sweep::{Statistic, Target};
     use proptest::prelude::*;
 
     fn statistic(key: &str) -> Statistic {
-        STATISTICS.into_iter().find(|statistic| statistic.key == key).unwrap()
+        Statistic::from_key(key).unwrap()
     }
 
     fn precision(keys: &[&str], target: Target) -> Precision {

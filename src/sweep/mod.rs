@@ -24,8 +24,8 @@ mod read_axes;
 mod read_rounds;
 mod rounds;
 mod samples;
+mod set;
 mod source;
-mod statistic;
 #[cfg(test)]
 mod tests;
 
@@ -34,8 +34,8 @@ pub use grid::{Difference, Sweep};
 pub use job::{Identity, Job, JobId, SetId};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
+pub use set::{Interval, STATISTICS, SetRow, Statistic, StatisticKind};
 pub use source::{Mistake, SweepError, nearest};
-pub use statistic::{STATISTICS, Statistic, StatisticKind};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
 /// is left to [`Sweep::parse`].

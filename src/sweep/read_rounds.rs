@@ -19,8 +19,8 @@ use super::check::Places;
 use super::quantity::Quantity;
 use super::rounds::{Contrast, MAX_SETS, Precision, RefinedAxis, Refinement, Target};
 use super::samples::Range;
+use super::set::{STATISTICS, Statistic, StatisticKind};
 use super::source::{Entry, Refused, Section, all, hint};
-use super::statistic::{STATISTICS, Statistic, StatisticKind};
 use crate::model::{Symbol, Value};
 use crate::observe::Regime;
 use crate::table::value::Shortest;
@@ -33,13 +33,9 @@ pub(super) const PRECISION: &Keys = &[
     (
         "of",
         "Statistic of a set with a confidence interval, or a list of them",
-        "`tau_mean`, `mean_friction`, `locking_index`, `resultant_length`, `drop_mean`, `phase_mean`",
+        "columns of the reduced [`sets`](reduced-tables.md#sets) that have `_low` and `_high`",
     ),
-    (
-        "relative",
-        "Largest half-width of the 95 % interval, as a share of the statistic; not for `phase_mean`",
-        "> 0, < 1",
-    ),
+    ("relative", "Largest half-width of the 95 % interval, as a share of the statistic; not for an angle", "> 0, < 1"),
     ("absolute", "The same in the unit of the statistic, in place of `relative`", "> 0"),
     (
         "seeds",

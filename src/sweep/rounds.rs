@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
-use super::statistic::Statistic;
+use super::set::Statistic;
 use crate::model::{Parameters, Symbol};
 use crate::table::value::Shortest;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

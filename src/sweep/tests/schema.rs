@@ -165,7 +165,7 @@ fn the_schema_names_what_rounds_can_be_told_as_the_documentation_does() {
     let refine = &schema["properties"]["refine"]["properties"];
     assert_eq!(schema["definitions"]["estimate"]["enum"], json!(estimates));
     assert_eq!(schema["definitions"]["refinable"]["enum"], json!(refinable));
-    assert_eq!(refine["by"]["enum"], json!(STATISTICS.map(|known| known.key).to_vec()));
+    assert_eq!(refine["by"]["enum"], json!(STATISTICS.iter().map(|known| known.key).collect::<Vec<_>>()));
     assert_eq!(refine["value"]["anyOf"][0]["enum"], json!(Regime::ALL.map(Regime::word)));
     assert_eq!(refine["sets"]["maximum"], json!(MAX_SETS));
 }

@@ -1,0 +1,192 @@
+//! What is known of a set: the columns of the reduced table of sets. Reduction fills them in; a sweep file may name those that
+//! are statistics.
+
+use crate::model::Symbol;
+use crate::model::selected::{Selected, Selection};
+use crate::observe::Regime;
+use crate::table::columns::{Column, Kind, Part, Row, Table, Value, columns};
+use std::borrow::Cow;
+use std::sync::LazyLock;
+
+/// The ends of a 95 % confidence interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
+impl Part for Option<Interval> {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        [("_low", meaning), ("_high", "upper end")]
+            .map(|(end, meaning)| Column {
+                name: format!("{name}{end}").into(),
+                unit,
+                meaning,
+                kind: Kind::Real,
+                nullable: true,
+            })
+            .to_vec()
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.low)));
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.high)));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        match (next(), next()) {
+            (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
+            (Value::Null, Value::Null) => Ok(None),
+            _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
+        }
+    }
+}
+
+/// All parameters but the seed, which a set has not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AllButSeed;
+
+impl Selection for AllButSeed {
+    const SYMBOLS: &'static [Symbol] = Symbol::ALL.split_last().expect("there are parameters").1;
+}
+
+columns! {
+    /// A row of the reduced sets. Quantities are SI; `None` where there is nothing to average.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct SetRow {
+        set_id: String = "", "hash of all that defines a job but the seed";
+        parameters: Selected<AllButSeed>;
+        eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
+        finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
+        failed_jobs: u64 = "", "jobs that failed";
+        jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
+        regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
+        slip_share: Option<f64> = "", "share of time within slips, mean over jobs";
+        attached_fraction: Option<f64> = "", "time-averaged fraction of contacts that are attached, mean over jobs";
+        slips: u64 = "", "slips of all seeds";
+        intervals: u64 = "", "intervals between slips";
+        effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
+        effective_intervals: Option<f64> = "", "the same of intervals";
+        tau_mean: Option<f64> = "s", "mean interval";
+        tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
+        tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
+        tau_05: Option<f64> = "s", "5 % quantile of the intervals";
+        tau_25: Option<f64> = "s", "25 % quantile of the intervals";
+        tau_50: Option<f64> = "s", "median of the intervals";
+        tau_75: Option<f64> = "s", "75 % quantile of the intervals";
+        tau_95: Option<f64> = "s", "95 % quantile";
+        periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
+        periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
+        locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
+        locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        expected_locking_index: Option<f64> = "",
+            "the same of slips at random loads that exceed all before, which is no locking: expected_resultant squared; null without modulation";
+        phase_mean: Option<f64> = "rad", "circular mean of the phase";
+        phase_interval as "phase_mean": Option<Interval> = "rad",
+            "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
+        resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
+        length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        expected_resultant: Option<f64> = "",
+            "the same of slips at random loads that exceed all before; null without modulation";
+        rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
+        load_rayleigh_p: Option<f64> = "",
+            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
+        share_below: Option<f64> = "", "share of slips with a phase under phi_min(eta) - 0.15 rad; null for eta < 1";
+        is_locked as "locked": bool = "", "rayleigh_p < 0.001 and resultant_length > 0.5";
+        drop_mean: Option<f64> = "N", "mean stress drop";
+        drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
+        drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
+        peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
+        mean_friction: Option<f64> = "N", "time-averaged shear force, mean over jobs";
+        mean_friction_interval as "mean_friction": Option<Interval> = "N",
+            "lower end of its 95 % confidence interval, of jobs as units";
+        duration_mean: Option<f64> = "s", "mean duration of slips";
+        distance_mean as "slip_distance_mean": Option<f64> = "m", "mean distance that the blocks move in a slip";
+        edge_distance_mean: Option<f64> = "m", "mean distance that the driven edge moves in a slip";
+        least_attached_mean: Option<f64> = "", "mean of the least fraction of contacts attached during a slip";
+        onset_cut_share: Option<f64> = "", "share of slips that reached the leading edge while the shear force still rose";
+        precursors_mean: Option<f64> = "", "mean precursors per slip";
+        front_speed_mean: Option<f64> = "m/s", "mean front speed of slips";
+        slow_front_speed_mean: Option<f64> = "m/s", "mean speed of slow fronts, where there were any";
+    }
+}
+
+impl Table for SetRow {
+    const NAME: &'static str = "sets";
+    const MEANING: &'static str = "One row per parameter set, all seeds together";
+}
+
+/// A column of a set that a sweep file may name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Statistic {
+    pub key: &'static str,
+    /// Its SI unit; empty for a pure number or a word.
+    pub unit: &'static str,
+    /// What can be asked of it.
+    pub kind: StatisticKind,
+}
+
+/// What can be asked of a statistic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StatisticKind {
+    /// A number with a confidence interval.
+    Estimate,
+    /// An angle with a confidence interval: a relative error means nothing.
+    Angle,
+    Number,
+    /// A flag, a word, or a count that tells kinds of sets apart.
+    Class,
+}
+
+/// All that a sweep file may name, in the order of the table.
+pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
+    let columns = SetRow::columns();
+    let has_interval = |key: &str| columns.iter().any(|column| column.name.strip_suffix("_low") == Some(key));
+    let statistic = |column: &Column| {
+        // The ends of an interval have names of their own. What is never missing counts jobs or slips, but for flags;
+        // parameters, and what is expected whatever happens, tell nothing of a set.
+        let Cow::Borrowed(key) = column.name else { return None };
+        let is_measured = column.nullable || column.kind == Kind::Flag;
+        let is_given = Symbol::from_key(key).is_some() || key.starts_with("expected_");
+        let kind = match column.kind {
+            Kind::Flag | Kind::Text | Kind::Count => StatisticKind::Class,
+            Kind::Real if !has_interval(key) => StatisticKind::Number,
+            Kind::Real if column.unit == "rad" => StatisticKind::Angle,
+            Kind::Real => StatisticKind::Estimate,
+        };
+        (is_measured && !is_given).then_some(Statistic { key, unit: column.unit, kind })
+    };
+    columns.iter().filter_map(statistic).collect()
+});
+
+impl Statistic {
+    /// Whether it has a confidence interval.
+    pub const fn has_interval(self) -> bool {
+        matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
+    }
+
+    pub fn from_key(key: &str) -> Option<Self> {
+        STATISTICS.iter().copied().find(|statistic| statistic.key == key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statistics_are_what_jobs_and_slips_tell_of_a_set() {
+        let of = |key: &str| Statistic::from_key(key).map(|statistic| (statistic.unit, statistic.kind));
+        assert_eq!(of("tau_mean"), Some(("s", StatisticKind::Estimate)));
+        assert_eq!(of("phase_mean"), Some(("rad", StatisticKind::Angle)));
+        assert_eq!(of("slip_share"), Some(("", StatisticKind::Number)));
+        for class in ["locked", "regime", "periods"] {
+            assert_eq!(of(class), Some(("", StatisticKind::Class)), "{class}");
+        }
+        for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {
+            assert_eq!(of(other), None, "{other}");
+        }
+        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 6);
+    }
+}
