@@ -43,7 +43,7 @@ const FORMAT: u32 = 1;
 /// a contact of its job, and for a slip of a part that is not whole yet. As measured, rounded up.
 const MEMORY: f64 = 80e6;
 const MEMORY_OF_A_CONTACT: f64 = 350.0;
-const MEMORY_OF_A_SLIP: f64 = 400.0;
+const MEMORY_OF_A_SLIP: f64 = 600.0;
 
 #[derive(Serialize)]
 struct Report {

@@ -42,6 +42,8 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     folder.write("tiny.toml", TINY);
     let plan = json(&folder.ends(0, "plan tiny.toml --json").stdout);
     assert_eq!((plan["jobs"].as_u64(), plan["format"].as_u64()), (Some(TINY_JOBS), Some(1)));
+    // Of a job's contacts, and of the slips of a part, which here is a job.
+    assert_eq!(plan["thread_memory_bytes"].as_f64(), Some(350.0 * (9.0 * 20.0) + 600.0 * 4.0));
     assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
 
     let first = folder.ends(0, "run tiny.toml");
