@@ -2,7 +2,7 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::settings_as_sweep;
+use super::sweep::{self, PresetFlag, settings_as_sweep};
 use super::threads::ThreadsFlag;
 use crate::accuracy::{
     self, DistanceRow, Distances, Findings, MethodRow, QUANTITIES, Report, Stability, Study, hard_cases, set_in_words,
@@ -44,11 +44,13 @@ pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
     #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "hard_cases"])]
     sweep: Option<PathBuf>,
+    #[command(flatten)]
+    preset: PresetFlag,
     /// Set a parameter of the model, and study this one set; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "hard_cases")]
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["preset", "hard_cases"])]
     settings: Vec<String>,
     /// Folder for tables, JSON and figures
-    #[arg(long, value_name = "DIR", default_value = "results/accuracy")]
+    #[arg(short, long, value_name = "DIR", default_value = "results/accuracy")]
     out: PathBuf,
     /// Take fewer slips
     #[arg(long)]
@@ -63,7 +65,7 @@ pub struct Arguments {
     #[command(flatten)]
     threads: ThreadsFlag,
     /// Run the hard cases instead
-    #[arg(long, conflicts_with_all = ["quick", "seeds", "slips", "threads"])]
+    #[arg(long, conflicts_with_all = ["preset", "quick", "seeds", "slips", "threads"])]
     hard_cases: bool,
     /// Print JSON
     #[arg(long)]
@@ -71,14 +73,18 @@ pub struct Arguments {
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
+    let out = &arguments.out;
+    if !out.is_dir() && out.symlink_metadata().is_ok() {
+        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(out))).into());
+    }
     if arguments.hard_cases {
         return run_hard_cases(arguments);
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
-    let sweep = match &arguments.sweep {
-        Some(path) => Some(Sweep::from_file(path)?),
-        None if arguments.settings.is_empty() => None,
-        None => Some(settings_as_sweep(&arguments.settings)?),
+    let sweep = match (arguments.sweep.as_deref(), arguments.preset.preset) {
+        (None, None) if arguments.settings.is_empty() => None,
+        (None, None) => Some(settings_as_sweep(&arguments.settings)?),
+        (file, preset) => Some(sweep::read(file, preset)?),
     };
     if let Some(sweep) = sweep {
         output::warn(&sweep.warnings());
