@@ -10,7 +10,7 @@ use crate::table::columns::columns;
 use std::collections::HashMap;
 
 /// Trajectories are apart when a break differs by more than this part of the wave crossing time.
-pub const APART: f64 = 0.1;
+const APART: f64 = 0.1;
 
 /// One attachment of a contact: block, contact, generation.
 type Key = (usize, usize, u32);

@@ -80,6 +80,10 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     if arguments.hard_cases {
         return run_hard_cases(arguments);
     }
+    if let Some(setting) = arguments.settings.iter().find(|setting| setting.split('=').next() == Some("seed")) {
+        let problem = format!("--set {setting}: a study has seeds of its own; --seeds says how many");
+        return Err(UsageError(problem).into());
+    }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
     let sweep = match (arguments.sweep.as_deref(), arguments.preset.preset) {
         (None, None) if arguments.settings.is_empty() => None,

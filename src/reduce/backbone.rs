@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Bins per decade. Their edges are 10^(k/4), so that one lies on η = 1, where locking begins.
-pub const BINS_PER_DECADE: i32 = 4;
+const BINS_PER_DECADE: i32 = 4;
 
 columns! {
     /// A bin of η that holds at least one slip. `None` where there is nothing to average.

@@ -6,7 +6,7 @@ use crate::sweep::Interval;
 use std::f64::consts::PI;
 
 /// Share of repetitions in which an interval contains the true value.
-pub const CONFIDENCE: f64 = 0.95;
+const CONFIDENCE: f64 = 0.95;
 
 impl Interval {
     /// A mean with its standard error, by Student's t.

@@ -4,7 +4,7 @@ use super::SetRow;
 use crate::table::columns::{Table, columns};
 
 /// Bins per mean interval: 1.9 ms at the paper's standard case, where the peaks are 5 ms wide and 50 ms apart.
-pub const BINS_PER_MEAN: f64 = 60.0;
+const BINS_PER_MEAN: f64 = 60.0;
 
 columns! {
     /// A bin of a histogram that holds at least one interval.

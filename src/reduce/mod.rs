@@ -3,7 +3,7 @@
 
 mod backbone;
 mod cells;
-pub mod circular;
+mod circular;
 mod confidence;
 mod gather;
 mod histogram;
@@ -18,28 +18,27 @@ mod slip_stats;
 mod statistic;
 
 pub use crate::sweep::{Interval, SetRow};
-pub use backbone::{BINS_PER_DECADE, BackboneBin};
-pub use cells::{CellOfGrid, CellRow, Cells, Division, divide};
-pub use confidence::CONFIDENCE;
+pub use backbone::BackboneBin;
+#[cfg(test)]
+pub(crate) use cells::{CellOfGrid, Cells};
+pub use cells::{CellRow, divide};
 pub use gather::reduce_jobs;
 #[cfg(test)]
 pub(crate) use gather::row_of;
-pub use histogram::{BINS_PER_MEAN, HistogramBin};
+pub use histogram::HistogramBin;
 pub use moments::{Moments, quantile};
 pub use reduced::{SetSummary, Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
-pub use rounds::{RoundOfSet, SetInRounds};
-pub use sample::{MAX_POINTS, Point, RampStage};
-pub use set::{LOCKED_LENGTH, LOCKED_PROBABILITY, QUANTILES};
-pub use statistic::StatisticValue;
+pub use rounds::SetInRounds;
+pub use sample::{Point, RampStage};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
 /// How far under φ_min a phase must lie to count as under the back-bone, in rad. Inertia and the finite duration of the
 /// rupture shift onsets by some hundredths of a radian; this is well past them and well inside the empty region.
-pub const BELOW_MARGIN: f64 = 0.15;
+const BELOW_MARGIN: f64 = 0.15;
 
 /// Where phases can lie at some η.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +71,7 @@ impl PhaseLimits {
 
 #[cfg(test)]
 mod tests {
+    use super::rounds::RoundOfSet;
     use super::*;
     use crate::documented::assert_documented;
     use crate::documented::{UNITS, markdown};

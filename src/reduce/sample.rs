@@ -6,7 +6,7 @@ use crate::table::columns::{Table, columns};
 use crate::table::value::words;
 
 /// Slips up to which all become points; of more, every k-th in table order remains.
-pub const MAX_POINTS: u64 = 20_000;
+const MAX_POINTS: u64 = 20_000;
 
 words! {
     /// A part of a run under a ramp of the modulation.

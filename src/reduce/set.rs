@@ -15,13 +15,13 @@ pub use crate::sweep::SetRow;
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
-pub const LOCKED_PROBABILITY: f64 = 1e-3;
+const LOCKED_PROBABILITY: f64 = 1e-3;
 /// Least resultant length of a locked set. With many slips the faintest preference becomes significant; at 1/2 the phases
 /// keep within about a sixth of a turn (s.d. 1.2 rad).
-pub const LOCKED_LENGTH: f64 = 0.5;
+const LOCKED_LENGTH: f64 = 0.5;
 
 /// Quantiles of τ that are reported.
-pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// What the jobs table says about a set.
 #[derive(Clone, Debug, PartialEq)]
