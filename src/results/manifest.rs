@@ -41,8 +41,7 @@ pub(super) struct Manifest {
     model_version: u32,
     rng_scheme: String,
     plan_version: u32,
-    /// The id of a job with the model's defaults under this solver and recording: another once a default has changed
-    /// that a sweep file may leave out.
+    /// The id of a job with the model's defaults under this solver and recording: another once other things enter an id.
     identity: String,
     /// Names of the columns of each table that is recorded.
     tables: BTreeMap<String, Vec<String>>,
@@ -109,10 +108,7 @@ impl Manifest {
             .collect();
         // Versions enter it.
         if differences.is_empty() && self.identity != ours.identity {
-            differences.push(format!(
-                "defaults: those of {} -> others of this program; what its sweep file leaves out would mean something else",
-                shown_text(&self.program)
-            ));
+            differences.push(format!("ids of jobs: those of {} -> others of this program", shown_text(&self.program)));
         }
         for (name, after) in &ours.tables {
             let Some(before) = self.tables.get(name) else { continue };

@@ -1,25 +1,29 @@
 //! Sweeps: a file that says what to run, and the jobs and parts that follow from it.
 //!
 //! ```text
-//! sweep file -> axes, filter -> points -> jobs -> parts
-//!   file.rs     axes.rs filter.rs  grid.rs  job.rs   plan.rs
-//!               rounds.rs: of a sweep that decides for itself
+//! sweep file ->  axes, filter -> points -> jobs -> parts
+//! source.rs      read_axes.rs   grid.rs   job.rs   plan.rs
+//! read.rs        axes.rs                  cost.rs
+//! checks.rs      filter.rs
+//! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
+//! set.rs: what is known of a set
 //! ```
 //!
 //! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
 //! the same order, the same ids, the same parts on every machine. Points are never held: a sweep walks through them, and looks one up
 //! without walking.
 
+mod adaptive;
 mod axes;
-mod check;
+mod checks;
 mod command;
 mod cost;
-mod file;
 mod filter;
 mod grid;
 mod job;
 mod plan;
 mod quantity;
+mod read;
 mod read_axes;
 mod read_rounds;
 mod rounds;

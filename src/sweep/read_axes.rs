@@ -12,7 +12,7 @@
 //! whole-number quantity to whole numbers. An axis reports its first mistake, a zip or a sample that of each column.
 
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
-use super::check::Places;
+use super::checks::Places;
 use super::quantity::Quantity;
 use super::read_rounds::{Wanted, WantedAxis};
 use super::samples::{Range, Sample};

@@ -15,7 +15,7 @@
 //! `[refine]` is read before the axes, which become as fine as it wants, and held against them afterwards.
 
 use super::axes::{Axis, MAX_ROWS};
-use super::check::Places;
+use super::checks::Places;
 use super::quantity::Quantity;
 use super::rounds::{Contrast, MAX_SETS, Precision, RefinedAxis, Refinement, Target};
 use super::samples::Range;

@@ -134,7 +134,7 @@ fn another_model_recording_or_version_is_refused_with_the_difference_and_nothing
     let mut other: Manifest = checksum::from_json(&text).unwrap();
     other.identity = "0".repeat(32);
     fs::write(&path, checksum::to_json(&other).unwrap()).unwrap();
-    refused("[model]\nK = 1e8\n[record]\nslips = 3", &["defaults: those of stickslip"]);
+    refused("[model]\nK = 1e8\n[record]\nslips = 3", &["ids of jobs: those of stickslip"]);
     fs::write(&path, text.replace("\"format\": 6", "\"format\": 7, \"new\": 0")).unwrap();
     let error = Results::read(&Layout::new(&Disk, root.path())).unwrap_err().to_string();
     assert!(error.contains("has format 7"), "{error}");

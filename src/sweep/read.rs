@@ -2,10 +2,10 @@
 //!
 //! Whatever is unknown, impossible, contradictory or without effect is refused with file, line, key, value and the way
 //! out. Sections and entries are all read, whatever was refused before; the sweep as a whole is checked if nothing was.
-//! Contract: every job of a sweep that was read has valid parameters (see `check.rs`), and there is at least one.
+//! Contract: every job of a sweep that was read has valid parameters (see `checks.rs`), and there is at least one.
 
 use super::axes::{Axis, Column};
-use super::check::{self, Places};
+use super::checks::{self, Places};
 use super::filter::Condition;
 use super::grid::Sweep;
 use super::job::Identity;
@@ -67,7 +67,7 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
     let sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds };
-    check::whole(&sweep, &file, &places)?;
+    checks::whole(&sweep, &file, &places)?;
     if has_rounds {
         let sets = sweep.first_sets().len() as u64;
         if let Some(wanted) = &wanted {
