@@ -5,7 +5,7 @@ use crate::results::rounds::RoundsSoFar;
 use crate::sweep::Standing;
 use crate::table::shown::{is_plain, shown};
 use anyhow::{Context, Result};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 use std::fs::{self, OpenOptions};
 use std::io::{self, ErrorKind, Write};
@@ -123,24 +123,12 @@ fn new_draft(place: &Path) -> io::Result<PathBuf> {
 }
 
 /// A line on a terminal, with the time so far, until it is dropped.
-pub struct Waiting(ProgressBar);
-
-impl Waiting {
-    pub fn for_what(what: String) -> Self {
-        let line = ProgressBar::new_spinner();
-        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg}") {
-            line.set_style(style);
-        }
-        line.set_message(what);
-        line.enable_steady_tick(Duration::from_secs(1));
-        Self(line)
-    }
-}
-
-impl Drop for Waiting {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
-    }
+pub fn waiting(what: String) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template("{elapsed_precise} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let line = ProgressBar::new_spinner().with_style(style).with_message(what).with_finish(ProgressFinish::AndClear);
+    line.enable_steady_tick(Duration::from_secs(1));
+    line
 }
 
 /// A text as a shell reads it.

@@ -7,7 +7,7 @@ mod outputs;
 
 use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
-use super::output::{self, Waiting};
+use super::output;
 use super::sweep::{self, PresetFlag, as_flags, number, real, written, written_settings};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
@@ -196,7 +196,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
-    let waiting = Waiting::for_what(format!("simulating; about {} predicted", output::duration(job.cost)));
+    let waiting = output::waiting(format!("simulating; about {} predicted", output::duration(job.cost)));
     let (result, recorded) = single::simulate(&sweep, parameters, arguments.request(), &never)?;
     drop(waiting);
     let wall = begin.elapsed().as_secs_f64();
