@@ -13,18 +13,13 @@ use stickslip::observe::measure;
 use stickslip::results::Results;
 use stickslip::results::layout::Layout;
 use stickslip::run::threads::Threads;
-use stickslip::run::{Options, RunEvent, RunReport, Shard};
+use stickslip::run::{Options, RunEvent, RunReport, Shard, Tally};
 use stickslip::table::storage::Disk;
 
 /// What a run has come to, as a callback is shown it.
 #[derive(Default)]
 struct Progress {
-    jobs: u64,
-    jobs_done: u64,
-    predicted: f64,
-    predicted_done: f64,
-    others_jobs: u64,
-    others_predicted: f64,
+    tally: Tally,
     messages: Vec<String>,
     has_news: bool,
 }
@@ -32,33 +27,23 @@ struct Progress {
 impl Progress {
     fn note(&mut self, event: RunEvent) {
         self.has_news = true;
+        self.tally.note(&event);
         match event {
             RunEvent::Started { jobs, predicted_cost, jobs_there, threads, .. } => {
-                (self.jobs, self.predicted) = (jobs, predicted_cost);
                 self.messages.push(format!(
                     "{jobs} jobs to run, {jobs_there} there already; about {:.1} s on {threads} threads",
                     predicted_cost / threads as f64
                 ));
             }
-            RunEvent::JobDone { predicted_cost, .. } => self.advance(predicted_cost),
-            RunEvent::JobFailed { job_id, reason, command, predicted_cost } => {
+            RunEvent::JobFailed { job_id, reason, command, .. } => {
                 self.messages.push(format!("job {job_id} failed: {reason}\n  alone: {command}"));
-                self.advance(predicted_cost);
             }
             RunEvent::JobTakesLong { command, predicted_cost, wall } => self.messages.push(format!(
                 "1 job has run {wall:.1} s, {:.0} times its prediction: {command}",
                 wall / predicted_cost
             )),
-            RunEvent::OthersDone { jobs, predicted_cost } => {
-                (self.others_jobs, self.others_predicted) = (jobs, predicted_cost);
-            }
             _ => {}
         }
-    }
-
-    fn advance(&mut self, predicted_cost: f64) {
-        self.jobs_done += 1;
-        self.predicted_done += predicted_cost;
     }
 
     /// Calls back with jobs done, all jobs, the share of the work that is done, and messages; if there is anything new.
@@ -66,10 +51,8 @@ impl Progress {
         if !std::mem::take(&mut self.has_news) || callback.is_none(py) {
             return Ok(());
         }
-        let done = self.predicted_done + self.others_predicted;
-        let share = if self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 };
-        let messages = std::mem::take(&mut self.messages);
-        callback.call1(py, (self.jobs_done + self.others_jobs, self.jobs, share, messages)).map(drop)
+        let (Tally { jobs, jobs_done, .. }, share) = (self.tally, self.tally.share());
+        callback.call1(py, (jobs_done, jobs, share, std::mem::take(&mut self.messages))).map(drop)
     }
 }
 

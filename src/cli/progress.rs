@@ -1,8 +1,8 @@
 //! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
 
 use super::output;
-use crate::run::RunEvent;
 use crate::run::threads::Threads;
+use crate::run::{RunEvent, Tally};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -18,12 +18,7 @@ pub struct Progress {
     is_terminal: bool,
     begin: Instant,
     last_line: Instant,
-    jobs: u64,
-    jobs_done: u64,
-    predicted: f64,
-    predicted_done: f64,
-    others_jobs: u64,
-    others_predicted: f64,
+    tally: Tally,
     threads: Threads,
     has_results: bool,
 }
@@ -36,12 +31,7 @@ impl Progress {
             is_terminal: std::io::stderr().is_terminal(),
             begin: now,
             last_line: now,
-            jobs: 0,
-            jobs_done: 0,
-            predicted: 0.0,
-            predicted_done: 0.0,
-            others_jobs: 0,
-            others_predicted: 0.0,
+            tally: Tally::default(),
             threads,
             has_results: false,
         }
@@ -53,12 +43,11 @@ impl Progress {
     }
 
     pub fn show(&mut self, event: &RunEvent) {
+        self.tally.note(event);
         self.has_results |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
         match event {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.begin = Instant::now();
-                self.jobs = jobs;
-                self.predicted = predicted_cost;
                 let variable = self.threads.variable.map_or_else(String::new, |variable| format!(" ({variable})"));
                 let beside = match others {
                     0 => String::new(),
@@ -77,24 +66,18 @@ impl Progress {
                     self.bar.set_style(style.progress_chars("=> "));
                 }
             }
-            RunEvent::RoundBegun { jobs, predicted_cost, rounds } => {
-                self.jobs += jobs;
-                self.predicted += predicted_cost;
+            RunEvent::RoundBegun { jobs, rounds, .. } => {
                 self.say(&format!("{} more; round {}", output::count(*jobs, "job"), output::rounds(rounds)));
             }
-            RunEvent::JobDone { predicted_cost, .. } => self.advance(*predicted_cost),
-            RunEvent::Tick => self.draw(),
-            &RunEvent::OthersDone { jobs, predicted_cost } => {
-                (self.others_jobs, self.others_predicted) = (jobs, predicted_cost);
-            }
+            RunEvent::JobDone { .. } | RunEvent::Tick => self.draw(),
             RunEvent::JobTakesLong { command, predicted_cost, wall } => self.say(&format!(
                 "1 job has run {}, {:.0} times its prediction: {command}",
                 output::duration(*wall),
                 wall / predicted_cost
             )),
-            RunEvent::JobFailed { job_id, reason, command, predicted_cost, .. } => {
+            RunEvent::JobFailed { job_id, reason, command, .. } => {
                 self.say(&format!("job {job_id} failed: {reason}\n  alone: {command}"));
-                self.advance(*predicted_cost);
+                self.draw();
             }
             RunEvent::Stopping => self.say("stopping: jobs in flight end, finished jobs are kept"),
             RunEvent::OutOfTime => self.say("not enough time left to start another part"),
@@ -111,27 +94,20 @@ impl Progress {
         }
     }
 
-    fn advance(&mut self, predicted_cost: f64) {
-        self.jobs_done += 1;
-        self.predicted_done += predicted_cost;
-        self.draw();
-    }
-
     /// Draws the bar, which counts the jobs of all workers since this one began, or says a line if the last is long ago.
     fn draw(&mut self) {
-        let done = self.predicted_done + self.others_predicted;
-        let share = if self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 };
+        let (Tally { jobs, jobs_done, jobs_of_others, .. }, share) = (self.tally, self.tally.share());
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = if share > 0.0 {
             output::duration(elapsed * (1.0 - share) / share) + " left"
         } else {
             "time left unknown".to_owned()
         };
-        let others = match self.others_jobs {
+        let others = match jobs_of_others {
             0 => String::new(),
             others => format!(" ({others} by others)"),
         };
-        let text = format!("{} of {} jobs{others}, {left}", self.jobs_done + self.others_jobs, self.jobs);
+        let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
         self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
         self.bar.set_message(text.clone());

@@ -18,6 +18,7 @@ pub mod cpu;
 mod shard;
 mod share;
 mod status;
+mod tally;
 #[cfg(test)]
 mod tests;
 pub mod threads;
@@ -26,6 +27,7 @@ mod walltime;
 pub use crate::results::events::{RunEvent, RunReport};
 pub use shard::{Shard, ShardError};
 pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
+pub use tally::Tally;
 
 use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
