@@ -252,10 +252,10 @@ impl Study {
             report(&format!("{}: first breaks and energy ledgers", set_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = taylor(*TOLERANCES.start());
-            realisation(parameters, tightest).simulate(&mut first_breaks)?;
+            Realisation { parameters, solver: tightest }.simulate(&mut first_breaks)?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
-                let realisation = realisation(parameters, solver);
+                let realisation = Realisation { parameters, solver };
                 checks.push((self.break_times(&realisation, &first_breaks)?, self.ledger_residual(&realisation)?));
             }
             report("timed ensembles");
@@ -310,7 +310,7 @@ impl Study {
     fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
             let parameters = Parameters { seed, ..parameters.clone() };
-            Ok(realisation(&parameters, solver).measure(&self.recording())?.1.slips)
+            Ok(Realisation { parameters: &parameters, solver }.measure(&self.recording())?.1.slips)
         };
         Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>>>()?.concat())
     }
@@ -351,7 +351,7 @@ impl Study {
                 if is_stretch && let Solver::FixedStep { time_step } = solver {
                     recording.max_time = Some(time_step * self.timed_steps as f64);
                 }
-                let (cpu_seconds, measured) = realisation(&parameters, solver).measure(&recording)?;
+                let (cpu_seconds, measured) = Realisation { parameters: &parameters, solver }.measure(&recording)?;
                 // The few slips of a stretch are no sample.
                 let slips = if is_stretch { Vec::new() } else { measured.slips };
                 ensemble.add(cpu_seconds, &measured.summary, slips);
@@ -359,10 +359,6 @@ impl Study {
         }
         Ok(ensembles)
     }
-}
-
-fn realisation(parameters: &Parameters, solver: Solver) -> Realisation<'_> {
-    Realisation { parameters, solver }
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.

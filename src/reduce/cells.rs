@@ -171,6 +171,16 @@ pub struct Cells<'a> {
     pub known: &'a BTreeMap<u64, SetRow>,
 }
 
+/// Points with each of the rows of an axis in place of the one that they have.
+fn at_rows(points: &[Vec<u64>], axis: usize, rows: impl Fn(u64) -> Vec<u64>) -> Vec<Vec<u64>> {
+    let with = |point: &Vec<u64>, row: u64| {
+        let mut point = point.clone();
+        point[axis] = row;
+        point
+    };
+    points.iter().flat_map(|point| rows(point[axis]).into_iter().map(move |row| with(point, row))).collect()
+}
+
 /// Points of the grid by their rows, each with its set if it is a job.
 type Nodes = BTreeMap<Vec<u64>, Option<u64>>;
 
@@ -230,12 +240,7 @@ impl Cells<'_> {
                 None if self.sweep.seed_axis() == Some(axis) => vec![0],
                 None => (0..count).collect(),
             };
-            let with = |origin: &Vec<u64>, row: u64| {
-                let mut origin = origin.clone();
-                origin[axis] = row;
-                origin
-            };
-            origins = origins.iter().flat_map(|origin| rows.iter().map(move |&row| with(origin, row))).collect();
+            origins = at_rows(&origins, axis, |_| rows.clone());
         }
         origins.into_iter().map(|origin| CellOfGrid { level: 0, origin }).collect()
     }
@@ -254,14 +259,8 @@ impl Cells<'_> {
         let mut nodes = vec![cell.origin.clone()];
         for axis in &self.refinement.axes {
             let step = Self::length(axis, cell.level + u32::from(halved));
-            let steps = 1..=Self::length(axis, cell.level) / step;
-            for at in 0..nodes.len() {
-                for number in steps.clone() {
-                    let mut node = nodes[at].clone();
-                    node[axis.axis] += number * step;
-                    nodes.push(node);
-                }
-            }
+            let steps = Self::length(axis, cell.level) / step;
+            nodes = at_rows(&nodes, axis.axis, |row| (0..=steps).map(|number| row + number * step).collect());
         }
         nodes
     }
@@ -279,11 +278,7 @@ impl Cells<'_> {
         for axis in &self.refinement.axes {
             let step = Self::length(axis, level);
             if step < Self::length(axis, cell.level) {
-                for at in 0..origins.len() {
-                    let mut origin = origins[at].clone();
-                    origin[axis.axis] += step;
-                    origins.push(origin);
-                }
+                origins = at_rows(&origins, axis.axis, |row| vec![row, row + step]);
             }
         }
         origins.into_iter().map(|origin| CellOfGrid { level, origin }).collect()
@@ -302,12 +297,7 @@ impl Cells<'_> {
                 let inside = (lower < last).then_some(lower);
                 let before = (row == lower).then(|| lower.checked_sub(length)).flatten();
                 let begins: Vec<u64> = inside.into_iter().chain(before).collect();
-                let with = |origin: &Vec<u64>, row: u64| {
-                    let mut origin = origin.clone();
-                    origin[at] = row;
-                    origin
-                };
-                origins = origins.iter().flat_map(|origin| begins.iter().map(move |&row| with(origin, row))).collect();
+                origins = at_rows(&origins, at, |_| begins.clone());
             }
             origins.into_iter().map(move |origin| CellOfGrid { level, origin })
         };
