@@ -84,5 +84,6 @@ pub(crate) fn markdown<T: Table>() -> String {
 const LOWER_END: &str = "lower end of";
 
 /// How the pages of tables show units and kinds.
+#[cfg(feature = "sweeps")]
 pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
     A `?` marks columns that may be null.\n";

@@ -4,14 +4,14 @@
 //! fields! {
 //!     /// What the struct is.
 //!     pub struct Parameters by Symbol {
-//!         Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", not_negative and "dfs <= fs",
+//!         Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", NOT_NEGATIVE and "dfs <= fs",
 //!             "standard deviation of the contact thresholds";
-//!         Seed("seed") seed: u64 = 0, "", count_or_zero, "realisation of the disorder";
+//!         Seed("seed") seed: u64 = 0, "", COUNT_OR_ZERO, "realisation of the disorder";
 //!     }
 //! }
 //! ```
 //!
-//! `Variant("key", "symbol") field: type = default, "unit", range and "rule", "meaning";`
+//! `Variant("key", "symbol") field: type = default, "unit", RANGE and "rule", "meaning";`
 //!
 //! | part | meaning |
 //! |---|---|
@@ -20,7 +20,7 @@
 //! | `"symbol"` | its symbol in the paper; may be left out, and figures name it in small print only away from its default |
 //! | `type` | a [`Field`](crate::table::value::Field); an `Option` where the value may be missing |
 //! | `"unit"` | in SI; empty for a pure number, a flag or a word |
-//! | `range` | a name of [`range!`]: the values that the field can take by itself |
+//! | `RANGE` | one of [`Range`]: the values that the field can take by itself |
 //! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
 //! | `"meaning"` | one line, without a full stop; it also heads columns of tables |
 //!
@@ -28,7 +28,7 @@
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
 use crate::table::value::Kind;
-use std::ops::Bound;
+use std::ops::Bound::{self, Excluded, Included, Unbounded};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
@@ -40,85 +40,59 @@ pub struct Description {
     pub unit: &'static str,
     /// One line, without a full stop.
     pub meaning: &'static str,
-    /// The values that the field can take by itself, as an error message names them.
-    pub allowed: &'static str,
+    /// The values that the field can take by itself.
+    pub range: Range,
     /// What else must hold, beside other fields; empty for nothing.
     pub rule: &'static str,
-    /// Ends of the range of a number.
-    pub ends: (Bound<f64>, Bound<f64>),
     pub kind: Kind,
     /// Whether it may be missing.
     pub nullable: bool,
 }
 
 impl Description {
+    /// The values that the field can take by itself, with their unit.
+    pub fn allowed(&self) -> String {
+        if self.unit.is_empty() {
+            self.range.words.to_owned()
+        } else {
+            format!("{}, in {}", self.range.words, self.unit)
+        }
+    }
+
     /// The allowed values with the rule beside other fields.
     pub fn requirement(&self) -> String {
-        if self.rule.is_empty() { self.allowed.to_owned() } else { format!("{}, {}", self.allowed, self.rule) }
+        if self.rule.is_empty() { self.allowed() } else { format!("{}, {}", self.allowed(), self.rule) }
     }
 }
 
-/// The ranges of values, each with the words for it and its ends.
-macro_rules! range {
-    (words size) => {
-        "a whole number from 1 to 100000"
-    };
-    (ends size) => {
-        (Included(1.0), Included(1e5))
-    };
-    (words held) => {
-        "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each"
-    };
-    (ends held) => {
-        (Included(1.0), Included(1e7))
-    };
-    (words count) => {
-        "a whole number from 1 to 2^53 - 1"
-    };
-    (ends count) => {
-        (Included(1.0), Excluded(9_007_199_254_740_992.0))
-    };
-    (words count_or_zero) => {
-        "a whole number from 0 to 2^53 - 1"
-    };
-    (ends count_or_zero) => {
-        (Included(0.0), Excluded(9_007_199_254_740_992.0))
-    };
-    (words positive) => {
-        "a finite number > 0"
-    };
-    (ends positive) => {
-        (Excluded(0.0), Excluded(f64::INFINITY))
-    };
-    (words not_negative) => {
-        "a finite number >= 0"
-    };
-    (ends not_negative) => {
-        (Included(0.0), Excluded(f64::INFINITY))
-    };
-    (words flag) => {
-        "true or false"
-    };
-    (ends flag) => {
-        (Unbounded, Unbounded)
-    };
-    (words break_on) => {
-        "\"magnitude\" (either sign) or \"tension\""
-    };
-    (ends break_on) => {
-        (Unbounded, Unbounded)
-    };
+/// The values that a field can take by itself: the words for them, and the ends of numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct Range {
+    pub words: &'static str,
+    pub ends: (Bound<f64>, Bound<f64>),
 }
 
-/// A unit behind the words for a range.
-macro_rules! in_unit {
-    ("") => {
-        ""
-    };
-    ($unit:literal) => {
-        concat!(", in ", $unit)
-    };
+impl Range {
+    pub const SIZE: Self = Self::new("a whole number from 1 to 100000", Included(1.0), Included(1e5));
+    pub const HELD: Self = Self::new(
+        "a whole number from 1 to 10000000: a job holds them in memory, 320 bytes each",
+        Included(1.0),
+        Included(1e7),
+    );
+    pub const COUNT: Self = Self::new("a whole number from 1 to 2^53 - 1", Included(1.0), Excluded(TOO_LARGE));
+    pub const COUNT_OR_ZERO: Self = Self::new("a whole number from 0 to 2^53 - 1", Included(0.0), Excluded(TOO_LARGE));
+    pub const POSITIVE: Self = Self::new("a finite number > 0", Excluded(0.0), Excluded(f64::INFINITY));
+    pub const NOT_NEGATIVE: Self = Self::new("a finite number >= 0", Included(0.0), Excluded(f64::INFINITY));
+    pub const FLAG: Self = Self::new("true or false", Unbounded, Unbounded);
+    pub const BREAK_ON: Self = Self::new("\"magnitude\" (either sign) or \"tension\"", Unbounded, Unbounded);
+
+    const fn new(words: &'static str, low: Bound<f64>, high: Bound<f64>) -> Self {
+        Self { words, ends: (low, high) }
+    }
 }
+
+/// Least integer of which a double does not tell its neighbour.
+const TOO_LARGE: f64 = 9_007_199_254_740_992.0;
 
 /// Defines a struct and the enum of its fields, see the top of this file.
 macro_rules! fields {
@@ -131,10 +105,7 @@ macro_rules! fields {
     ) => {
         $(#[$about])*
         pub struct $Struct {$(
-            #[doc = concat!("`", $key, "`: ", $meaning, ". Must be ")]
-            #[doc = concat!(
-                $crate::model::fields::range!(words $range), $crate::model::fields::in_unit!($unit) $(, ", ", $rule)?, "."
-            )]
+            #[doc = concat!("`", $key, "`: ", $meaning, "; unit: \"", $unit, "\"." $(, " Rule: ", $rule, ".")?)]
             pub $field: $type,
         )+}
 
@@ -144,17 +115,16 @@ macro_rules! fields {
             }
         }
 
-        #[doc = concat!("A field of [`", stringify!($Struct), "`].")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        pub enum $Key {$(
-            #[doc = concat!("`", $key, "`: ", $meaning, ".")]
-            $variant,
-        )+}
+        $crate::table::value::words! {
+            #[doc = concat!("A field of [`", stringify!($Struct), "`].")]
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+            pub enum $Key {$(
+                #[doc = concat!("`", $key, "`: ", $meaning, ".")]
+                $variant = $key,
+            )+}
+        }
 
         impl $Key {
-            /// Every field, in the order of tables and documentation.
-            pub const ALL: [Self; [$($key),+].len()] = [$(Self::$variant),+];
-
             /// Key, unit, meaning and range.
             pub const fn description(self) -> $crate::model::Description {
                 match self {$(
@@ -163,15 +133,8 @@ macro_rules! fields {
                         symbol: concat!($($symbol)?),
                         unit: $unit,
                         meaning: $meaning,
-                        allowed: concat!(
-                            $crate::model::fields::range!(words $range), $crate::model::fields::in_unit!($unit)
-                        ),
+                        range: $crate::model::fields::Range::$range,
                         rule: concat!($($rule)?),
-                        ends: {
-                            #[allow(unused_imports, reason = "no range needs all of them")]
-                            use std::ops::Bound::{Excluded, Included, Unbounded};
-                            $crate::model::fields::range!(ends $range)
-                        },
                         kind: <$type as $crate::table::value::Field>::KIND,
                         nullable: <$type as $crate::table::value::Field>::NULLABLE,
                     },
@@ -180,12 +143,12 @@ macro_rules! fields {
 
             /// Key in files, flags and tables.
             pub const fn key(self) -> &'static str {
-                self.description().key
+                self.word()
             }
 
             /// The field with this key.
             pub fn from_key(key: &str) -> Option<Self> {
-                Self::ALL.into_iter().find(|field| field.key() == key)
+                $crate::table::value::Field::from_value($crate::table::value::Value::Text(key))
             }
 
             /// The canonical form of a value that the field can take by itself: equal values have equal bits.
@@ -195,24 +158,12 @@ macro_rules! fields {
                 let value = match self {$(
                     Self::$variant => <$type as Field>::from_value(value)?.value(),
                 )+};
-                let ends = self.description().ends;
+                let ends = self.description().range.ends;
                 value.number().is_none_or(|number| ends.contains(&number)).then_some(match value {
                     // Adding zero turns -0.0 into 0.0.
                     Value::Real(real) => Value::Real(real + 0.0),
                     other => other,
                 })
-            }
-        }
-
-        impl $crate::table::value::Field for $Key {
-            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
-
-            fn value(&self) -> $crate::model::Value {
-                $crate::table::value::Value::Text(self.key())
-            }
-
-            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
-                Self::ALL.into_iter().find(|field| field.value() == value)
             }
         }
 
@@ -236,4 +187,4 @@ macro_rules! fields {
     };
 }
 
-pub(crate) use {fields, in_unit, range};
+pub(crate) use fields;

@@ -26,38 +26,38 @@ fields! {
     /// [`Parameters::validated`]; everything downstream expects validated, canonical values.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Parameters by Symbol {
-        N("N", "N") blocks: usize = 70, "", size, "number of blocks";
-        Ns("Ns", "N_s") contacts_per_block: usize = 20, "", size and "N * Ns <= 1e7", "contacts per block";
-        M("M", "M") slider_mass: f64 = 11.5, "kg", positive, "slider mass";
-        K("K", "K") slider_stiffness: f64 = 1e8, "N/m", positive,
+        N("N", "N") blocks: usize = 70, "", SIZE, "number of blocks";
+        Ns("Ns", "N_s") contacts_per_block: usize = 20, "", SIZE and "N * Ns <= 1e7", "contacts per block";
+        M("M", "M") slider_mass: f64 = 11.5, "kg", POSITIVE, "slider mass";
+        K("K", "K") slider_stiffness: f64 = 1e8, "N/m", POSITIVE,
             "slider stiffness; neighbours are joined by (N-1) K";
-        Kd("Kd", "K_d") drive_stiffness: f64 = 4e7, "N/m", positive, "stiffness of the driving spring";
-        Ki("ki", "k") contact_stiffness: f64 = 5e6, "N/m", positive, "mean contact stiffness, <k_i>";
-        Fs("fs", "f_s") mean_threshold: f64 = 1.37, "N", positive, "mean contact threshold";
-        Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", not_negative and "dfs <= fs",
+        Kd("Kd", "K_d") drive_stiffness: f64 = 4e7, "N/m", POSITIVE, "stiffness of the driving spring";
+        Ki("ki", "k") contact_stiffness: f64 = 5e6, "N/m", POSITIVE, "mean contact stiffness, <k_i>";
+        Fs("fs", "f_s") mean_threshold: f64 = 1.37, "N", POSITIVE, "mean contact threshold";
+        Dfs("dfs", "Δf_s") threshold_deviation: f64 = 6.9e-3, "N", NOT_NEGATIVE and "dfs <= fs",
             "standard deviation of the contact thresholds";
-        TauR("tau_r", "τ_r") reattachment_time: f64 = 0.005, "s", positive, "mean reattachment delay";
-        Gamma("gamma", "γ") damping_rate: f64 = 6462.0, "1/s", not_negative, "damping rate";
-        V0("V0", "V0") drive_velocity: f64 = 1e-4, "m/s", positive and "not so low that slips are over 1e100 s apart",
+        TauR("tau_r", "τ_r") reattachment_time: f64 = 0.005, "s", POSITIVE, "mean reattachment delay";
+        Gamma("gamma", "γ") damping_rate: f64 = 6462.0, "1/s", NOT_NEGATIVE, "damping rate";
+        V0("V0", "V0") drive_velocity: f64 = 1e-4, "m/s", POSITIVE and "not so low that slips are over 1e100 s apart",
             "drive velocity";
-        Delta("Delta", "Δ") modulation_amplitude: f64 = 0.0, "m", not_negative,
+        Delta("Delta", "Δ") modulation_amplitude: f64 = 0.0, "m", NOT_NEGATIVE,
             "amplitude of the modulation, 0 is off";
-        T("T", "T") modulation_period: Option<f64> = None, "s", positive and "given when Delta > 0",
+        T("T", "T") modulation_period: Option<f64> = None, "s", POSITIVE and "given when Delta > 0",
             "period of the modulation";
         TTo("T_to", "T_to") turning_period: Option<f64> = None, "s",
-            positive and "given only with Delta > 0 and ramp_time > 0",
+            POSITIVE and "given only with Delta > 0 and ramp_time > 0",
             "period at the turning point of the ramp; null: not ramped";
         DeltaTo("Delta_to", "Δ_to") turning_amplitude: Option<f64> = None, "m",
-            not_negative and "given only with Delta > 0 and ramp_time > 0",
+            NOT_NEGATIVE and "given only with Delta > 0 and ramp_time > 0",
             "amplitude at the turning point of the ramp; null: not ramped";
         RampTime("ramp_time") ramp_time: f64 = 0.0, "s",
-            not_negative and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
+            NOT_NEGATIVE and "at most 1e9 T and 1e9 T_to, above 0 only with T_to or Delta_to",
             "duration of the ramp to T_to and Delta_to, and of that back; 0 is off";
-        FN("FN", "F_N") normal_force: f64 = 4000.0, "N", positive, "normal force, enters reported ratios only";
-        L("L", "L") slider_length: f64 = 0.15, "m", positive,
+        FN("FN", "F_N") normal_force: f64 = 4000.0, "N", POSITIVE, "normal force, enters reported ratios only";
+        L("L", "L") slider_length: f64 = 0.15, "m", POSITIVE,
             "slider length, enters positions and front speeds only";
-        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", break_on, "when a contact breaks";
-        Seed("seed") seed: u64 = 0, "", count_or_zero, "realisation of the disorder";
+        BreakOn("break_on") break_on: BreakOn = BreakOn::Magnitude, "", BREAK_ON, "when a contact breaks";
+        Seed("seed") seed: u64 = 0, "", COUNT_OR_ZERO, "realisation of the disorder";
     }
 }
 

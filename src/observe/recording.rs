@@ -8,21 +8,21 @@ fields! {
     /// What a job records: how many slips, from where, and which tables.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Recording by RecordingKey {
-        Slips("slips") slips: u64 = 40, "", held, "Slips to record after start-up; then the job ends";
-        Discard("discard") discard: u64 = 5, "", count_or_zero, "Slips of start-up, not recorded";
-        MaxTime("max_time") max_time: Option<f64> = None, "s", positive,
+        Slips("slips") slips: u64 = 40, "", HELD, "Slips to record after start-up; then the job ends";
+        Discard("discard") discard: u64 = 5, "", COUNT_OR_ZERO, "Slips of start-up, not recorded";
+        MaxTime("max_time") max_time: Option<f64> = None, "s", POSITIVE,
             "Model time at which a job ends even without its slips; its outcome is then `time limit`, and a longer one in the same directory runs it again";
-        MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", count,
+        MaxEvents("max_events") max_events: u64 = 1_000_000_000, "", COUNT,
             "Contact events after which a job counts as failed; may be raised for `--retry-failed` in the same directory";
-        PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", count,
+        PrecursorSize("precursor_size") precursor_size: Option<u64> = None, "", COUNT,
             "Minimum number of breaks of a precursor; none: `Ns` of the job";
-        Precursors("precursors") precursors: bool = false, "", flag,
+        Precursors("precursors") precursors: bool = false, "", FLAG,
             "Whether each precursor becomes a row of its own; their number before each slip is always recorded";
-        DropSize("drop_size") drop_size: Option<f64> = None, "N", positive,
+        DropSize("drop_size") drop_size: Option<f64> = None, "N", POSITIVE,
             "Minimum drop of the shear force to look for; none: drops are not looked for";
-        Energies("energies") energies: bool = false, "", flag,
+        Energies("energies") energies: bool = false, "", FLAG,
             "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at some ten times the cost";
-        GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", positive,
+        GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", POSITIVE,
             "Distance `V0 t` of the drive without a slip after which a job ends, with the outcome `no slips`; none: 20 typical intervals between slips and two periods";
     }
 }
@@ -54,7 +54,11 @@ mod tests {
         assert_eq!(size_of::<Slip>(), 320);
         assert_eq!(size_of::<Precursor>(), 136);
         assert!(
-            RecordingKey::Slips.description().allowed.contains("10000000: a job holds them in memory, 320 bytes each")
+            RecordingKey::Slips
+                .description()
+                .range
+                .words
+                .contains("10000000: a job holds them in memory, 320 bytes each")
         );
     }
 

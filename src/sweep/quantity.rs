@@ -61,10 +61,10 @@ impl Quantity {
     }
 
     /// The allowed values, as an error message names them.
-    pub const fn allowed(self) -> &'static str {
+    pub fn allowed(self) -> String {
         match self {
-            Self::Parameter(symbol) => symbol.description().allowed,
-            Self::Eta | Self::Frequency => "a number > 0, from 1e-100 to 1e100",
+            Self::Parameter(symbol) => symbol.description().allowed(),
+            Self::Eta | Self::Frequency => "a number > 0, from 1e-100 to 1e100".to_owned(),
         }
     }
 

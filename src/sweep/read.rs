@@ -124,7 +124,7 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameter
         let value = read_axes::read_value(entry, quantity)?;
         match quantity {
             Quantity::Parameter(symbol) => {
-                parameters.put(symbol, value).ok_or_else(|| entry.must_be(symbol.description().allowed))?;
+                parameters.put(symbol, value).ok_or_else(|| entry.must_be(&symbol.description().allowed()))?;
             }
             Quantity::Eta | Quantity::Frequency => {
                 period = Axis::table(vec![Column { quantity, values: vec![value] }]).ok();
@@ -150,7 +150,7 @@ fn read_recording(record: &Section<'_>) -> Result<Recording, Refused> {
     all(record.entries().iter().map(|entry| {
         let key = RecordingKey::from_key(entry.key).ok_or_else(|| entry.unknown(record.title, &keys))?;
         let value = entry.value().and_then(|value| key.checked(value));
-        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(key.description().allowed))
+        value.and_then(|value| recording.put(key, value)).ok_or_else(|| entry.must_be(&key.description().allowed()))
     }))?;
     Ok(recording)
 }

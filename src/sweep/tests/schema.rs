@@ -75,7 +75,7 @@ fn value(field: &Description) -> Json {
         Kind::Real => json!({ "type": "number" }),
     };
     for (end, included, excluded) in
-        [(field.ends.0, "minimum", "exclusiveMinimum"), (field.ends.1, "maximum", "exclusiveMaximum")]
+        [(field.range.ends.0, "minimum", "exclusiveMinimum"), (field.range.ends.1, "maximum", "exclusiveMaximum")]
     {
         match end {
             Bound::Included(end) if end.is_finite() => number[included] = json!(end),
