@@ -44,7 +44,7 @@ impl Exit {
             return match error.kind {
                 ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
                 ErrorKind::Damaged => Some(Self::Damaged),
-                ErrorKind::Disk => None,
+                ErrorKind::Disk | ErrorKind::Stopped => None,
             };
         }
         match cause.downcast_ref::<DatasetError>() {

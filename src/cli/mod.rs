@@ -2,11 +2,10 @@
 
 mod accuracy;
 mod batch;
-mod compact;
 mod exit;
+mod export;
 mod generate;
 mod init;
-mod merge;
 mod output;
 mod plan;
 mod plot;
@@ -56,8 +55,7 @@ enum Command {
     Plot(Box<plot::Arguments>),
     Report(report::Arguments),
     Verify(verify::Arguments),
-    Compact(compact::Arguments),
-    Merge(merge::Arguments),
+    Export(export::Arguments),
     Simulate(Box<simulate::Arguments>),
     Accuracy(accuracy::Arguments),
     #[command(hide = true)]
@@ -77,8 +75,7 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Plot(arguments) => plot::plot(&arguments),
         Command::Report(arguments) => report::report(&arguments),
         Command::Verify(arguments) => verify::verify(&arguments),
-        Command::Compact(arguments) => compact::compact(&arguments),
-        Command::Merge(arguments) => merge::merge(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Generate(arguments) => generate::generate(&arguments),

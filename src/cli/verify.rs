@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::results::verify::{Problem, Verification};
+use crate::results::verify::{Problem, Remedy, Verification};
 use crate::table::shown::{shown, shown_text};
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -19,7 +19,7 @@ Examples:
   stickslip verify results/fig3
   stickslip verify results/fig3 --repair     then `run` computes what was moved away
 
-Nothing is changed without --repair. Exit code 4: something is damaged.")]
+Nothing is changed without --repair. Exit codes: 3 parts are missing, 4 something is damaged.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]
@@ -32,8 +32,8 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Ids of jobs that are shown for each problem; `--json` has all.
-const SHOWN_JOBS: usize = 3;
+/// Names of parts, and ids of jobs of each problem, that are shown; `--json` has all.
+const SHOWN: usize = 3;
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -55,7 +55,11 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     } else {
         print_summary(&verification, &commands, repaired)?;
     }
-    Ok(if verification.whole || arguments.repair { Exit::Done } else { Exit::Damaged })
+    Ok(match (verification.whole || arguments.repair, verification.missing.is_empty()) {
+        (false, _) => Exit::Damaged,
+        (true, false) => Exit::Stopped,
+        (true, true) => Exit::Done,
+    })
 }
 
 fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool) -> Vec<String> {
@@ -63,13 +67,9 @@ fn commands(layout: &Layout<'_>, verification: &Verification, with_repair: bool)
     if with_repair && verification.wants_repair() {
         commands.push(format!("stickslip verify {root} --repair"));
     }
-    if verification.wants_run {
+    if verification.wants_run() {
         commands.push(format!("stickslip run {root}"));
-    }
-    if verification.wants_compaction() {
-        commands.push(format!("stickslip compact {root}"));
-    }
-    if verification.wants_reduction() {
+    } else if verification.wants(&[Remedy::Reduce]) {
         commands.push(format!("stickslip reduce {root}"));
     }
     commands
@@ -80,9 +80,14 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
         output::print(&format!("{}: {}{}\n", shown(&problem.path), shown_text(&problem.problem), jobs_of(problem)))?;
     }
     let megabytes = verification.bytes as f64 / 1e6;
-    let missing = match (verification.parts_missing, verification.jobs_missing) {
-        (0, _) => "nothing".to_owned(),
-        (parts, jobs) => format!("{}, {}", output::count(parts, "part"), output::count(jobs, "job")),
+    let missing = match verification.missing.len() as u64 {
+        0 => "nothing".to_owned(),
+        parts => {
+            let more = if parts > SHOWN as u64 { ", ..." } else { "" };
+            let names = verification.missing[..verification.missing.len().min(SHOWN)].join(", ");
+            let jobs = output::count(verification.jobs_missing, "job");
+            format!("{}, {jobs}: {names}{more}", output::count(parts, "part"))
+        }
     };
     let damaged = match verification.problems.len() as u64 {
         0 => "nothing".to_owned(),
@@ -94,11 +99,11 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
             format!("{} with {}", output::count(verification.parts, "part"), output::count(verification.jobs, "job")),
         ),
         ("files", format!("{}, {megabytes:.1} MB", verification.files)),
-        ("not yet done", missing),
+        ("not there", missing),
         ("damaged", damaged),
     ])?;
     if !commands.is_empty() {
-        output::print("to repair:\n")?;
+        output::print("to go on:\n")?;
         commands.iter().try_for_each(|command| output::print(&format!("  {command}\n")))?;
     }
     Ok(())
@@ -108,7 +113,7 @@ fn jobs_of(problem: &Problem) -> String {
     if problem.jobs.is_empty() {
         return String::new();
     }
-    let more = if problem.jobs.len() > SHOWN_JOBS { ", ..." } else { "" };
-    let shown = &problem.jobs[..problem.jobs.len().min(SHOWN_JOBS)];
+    let more = if problem.jobs.len() > SHOWN { ", ..." } else { "" };
+    let shown = &problem.jobs[..problem.jobs.len().min(SHOWN)];
     format!("; concerns {}: {}{more}", output::count(problem.jobs.len() as u64, "job"), shown.join(", "))
 }

@@ -4,7 +4,7 @@ use super::{BadOption, Format, Look, OwnFigure, Picture};
 use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, refined, regimes, staircase};
 use super::{own, sets};
 use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
-use crate::results::commit::{Commit, alone};
+use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
 use crate::table::shown::shown;
@@ -19,7 +19,7 @@ const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 ///
 /// Returns the files, in the order in which they were written.
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
-    let _alone = alone(layout, WRITER)?;
+    let _alone = exclusive_lock(layout, WRITER)?;
     check_reduced(layout)?;
     let points = read(layout)?;
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
@@ -62,7 +62,7 @@ pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<
 
 /// Puts a figure into `figures/`, in these formats.
 pub fn write_own(layout: &Layout<'_>, picture: Picture, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
-    let _alone = alone(layout, WRITER)?;
+    let _alone = exclusive_lock(layout, WRITER)?;
     write(layout, &[picture], look, formats)
 }
 

@@ -65,16 +65,13 @@ pub fn reduce_jobs(
     results: &Results<'_>,
     is_wanted: impl Fn(&Parameters) -> bool,
 ) -> Result<Vec<SetRow>, ResultsError> {
-    let rows = results.layout().read_tables(|| {
-        let gathered = Gathering::of_jobs(results.layout(), &is_wanted)?;
-        let mut rows = Vec::new();
-        gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
-            rows.push(set.row);
-            Ok(())
-        })?;
-        Ok::<_, DatasetError>(rows)
-    });
-    Ok(rows??)
+    let gathered = Gathering::of_jobs(results.layout(), &is_wanted)?;
+    let mut rows = Vec::new();
+    gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
+        rows.push(set.row);
+        Ok(())
+    })?;
+    Ok(rows)
 }
 
 /// The jobs of a directory, whose slips are still to be gathered.

@@ -9,7 +9,7 @@ use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
 use crate::results::Results;
-use crate::results::commit::{Commit, alone};
+use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::tables::JOBS;
 use crate::table::columns::Table;
 use crate::table::file::TableWriter;
@@ -55,8 +55,8 @@ pub fn reduce(results: &Results<'_>) -> Result<ReductionSummary> {
 
 fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> {
     let layout = results.layout();
-    let _alone = alone(layout, WRITER)?;
-    let (commit, summary) = layout.read_tables(|| stage(results, max_slips))??;
+    let _alone = exclusive_lock(layout, WRITER)?;
+    let (commit, summary) = stage(results, max_slips)?;
     results.publish(commit)?;
     let cells = layout.reduced_file(CellRow::NAME);
     let is_refined = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
@@ -89,7 +89,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     layout.ensure_folder(&layout.reduced())?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let footer = &results.footer(results.extensions().len() - 1);
+    let footer = &results.footer_of_all();
     let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
     let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
     let mut refined_sets = BTreeMap::new();
@@ -141,6 +141,7 @@ mod tests {
     use crate::observe::{Averages, Measurements, Modulation, Slip};
     use crate::results::layout::Layout;
     use crate::results::tables::{DriveAndSeed, JobRecord, JobRow, Label, Loading, Names, SlipRow, relabel};
+    use crate::results::workers::tests::open;
     use crate::solver::Summary;
     use crate::sweep::Sweep;
     use crate::table::file::Footer;
@@ -197,7 +198,7 @@ mod tests {
     fn without_jobs() -> (tempfile::TempDir, Results<'static>) {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
-        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
+        let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         (root, results)
     }
 

@@ -102,7 +102,7 @@ impl Content {
         let sets_every = census.spacing();
         let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
         let slips_every = census.slips.div_ceil(sets_every);
-        let slips = layout.read_tables(|| Slips::read(results, &sets.places, slips_every))?.map_err(&damaged)?;
+        let slips = Slips::read(results, &sets.places, slips_every).map_err(&damaged)?;
         let live = refresh.map(|refresh| Live {
             refresh: refresh.as_secs_f64(),
             written: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64()),

@@ -17,7 +17,7 @@ mod tables;
 
 use crate::reduce::{SetRow, WRITER, reduce};
 use crate::results::Results;
-use crate::results::commit::{Commit, alone};
+use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
 use crate::table::columns::Table;
@@ -43,7 +43,7 @@ pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.
 pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf> {
     let (layout, page) = (results.layout(), page(results, refresh)?);
-    let _alone = alone(layout, WRITER)?;
+    let _alone = exclusive_lock(layout, WRITER)?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     commit.stage_bytes(&layout.report(), page.as_bytes())?;
     results.publish(commit)?;
@@ -56,8 +56,10 @@ fn is_reduced(layout: &Layout<'_>) -> Result<bool, StorageError> {
     if !storage.exists(&reduced)? {
         return Ok(false);
     }
-    let Some(folder) = storage.hold(&jobs)? else { return Ok(true) };
-    let changed = folder.modified().map_err(StorageError::at("look up", &jobs))?;
+    if !storage.exists(&jobs)? {
+        return Ok(true);
+    }
+    let changed = storage.modified(&jobs)?;
     // A clock may be coarse: at the same instant it is unknown which came first.
     Ok(storage.modified(&reduced)? > changed)
 }

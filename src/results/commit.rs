@@ -27,23 +27,22 @@ impl<'a> Commit<'a> {
     /// Begins in a staging folder of a directory.
     pub fn begin(layout: &Layout<'a>, staging: &Path) -> Result<Self, StorageError> {
         layout.ensure_folder(staging)?;
+        Ok(Self::within(layout.storage, staging))
+    }
+
+    /// Begins in a staging folder that must be there.
+    pub(super) fn within(storage: &'a dyn Storage, staging: &Path) -> Self {
         let token = format!("{:016x}", own_number());
-        Ok(Self { storage: layout.storage, staging: staging.to_owned(), token, staged: Vec::new() })
+        Self { storage, staging: staging.to_owned(), token, staged: Vec::new() }
     }
 
     /// Creates the next file, which is to be written, and synced, before it goes to its target.
     pub fn stage(&mut self, target: &Path) -> Result<StoredFile, StorageError> {
-        let staged = self.next_staged(target);
-        self.storage.create(&staged)
-    }
-
-    /// Where the next file is staged.
-    fn next_staged(&mut self, target: &Path) -> PathBuf {
         let mut name = OsString::from(format!("{}-{}-", self.token, self.staged.len()));
         name.push(target.file_name().unwrap_or_default());
         let staged = self.staging.join(name);
         self.staged.push((staged.clone(), target.to_owned()));
-        staged
+        self.storage.create(&staged)
     }
 
     /// Stages a small file of which all bytes are known.
@@ -51,12 +50,6 @@ impl<'a> Commit<'a> {
         let mut file = self.stage(target)?;
         file.write(bytes)?;
         file.sync()
-    }
-
-    /// Stages a file that lies elsewhere and is to stay there.
-    pub(super) fn stage_link(&mut self, from: &Path, target: &Path) -> Result<(), StorageError> {
-        let staged = self.next_staged(target);
-        self.storage.link(from, &staged)
     }
 
     /// Moves the staged files to their targets, in the order in which they were staged.
@@ -68,6 +61,19 @@ impl<'a> Commit<'a> {
         }
         self.staged.clear();
         Ok(())
+    }
+}
+
+impl Commit<'_> {
+    /// Gives the staged files their names, if nothing has them; false, and nothing more is done, where something has.
+    pub(super) fn publish_new(self) -> Result<bool, StorageError> {
+        for (staged, target) in &self.staged {
+            if !self.storage.link_new(staged, target)? {
+                return Ok(false);
+            }
+            self.storage.sync_folder(target.parent().unwrap_or(Path::new(".")))?;
+        }
+        Ok(true)
     }
 }
 
@@ -90,7 +96,7 @@ pub(super) fn own_number() -> u64 {
 /// Waits until no other process does what this writer does, and removes what a killed one left in its staging folder. A
 /// file system without locks lets in all, and nothing is removed: their files are then whole, but may be of one and of the
 /// other.
-pub fn alone(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
+pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, StorageError> {
     layout.ensure_folder(&layout.locks())?;
     let file = layout.locks().join(writer);
     let lock = layout.storage.wait_for_lock(&file, MAX_WAIT)?;

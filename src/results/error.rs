@@ -14,6 +14,8 @@ pub enum ErrorKind {
     Refused,
     /// Another process has the directory, or a share of it. Nothing was changed.
     Busy,
+    /// Others have taken over the work of this process.
+    Stopped,
     /// A file is not as it was written.
     Damaged,
     /// A file operation failed; what was committed is kept, and the same can be tried again.
@@ -44,6 +46,10 @@ impl ResultsError {
         Self::new(ErrorKind::Busy, path, problem)
     }
 
+    pub fn stopped(path: &Path, problem: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Stopped, path, problem)
+    }
+
     /// It is not as it was written.
     pub fn damaged(path: &Path, problem: impl Into<String>) -> Self {
         Self::new(ErrorKind::Damaged, path, problem)
@@ -55,7 +61,9 @@ impl fmt::Display for ResultsError {
         let Self { kind, path, problem } = self;
         let path = shown(path);
         match kind {
-            ErrorKind::Refused | ErrorKind::Busy | ErrorKind::Disk => write!(f, "{path}: {problem}"),
+            ErrorKind::Refused | ErrorKind::Busy | ErrorKind::Stopped | ErrorKind::Disk => {
+                write!(f, "{path}: {problem}")
+            }
             ErrorKind::Damaged => write!(
                 f,
                 "{path}: damaged: {}; `stickslip verify` on the results directory reports how to repair it",

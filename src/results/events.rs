@@ -4,15 +4,12 @@
 //! other's. Tables never depend on it.
 
 use crate::results::commit::own_number;
+use crate::results::directory::Results;
 use crate::results::error::ResultsError;
-use crate::results::handle::Results;
-use crate::results::layout::TableFile;
 use crate::results::rounds::RoundsSoFar;
-use crate::sweep::Outline;
-use crate::table::file::{FILE_EXTENSION, PROGRAM};
+use crate::table::file::PROGRAM;
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -90,18 +87,6 @@ pub enum RunEvent {
     /// The run ends with an error.
     Error {
         error: String,
-    },
-    /// The rows of a committed part were damaged and taken away, so that it is run again.
-    PartQuarantined {
-        part: String,
-    },
-    /// A part was taken over from another directory.
-    PartMerged {
-        part: String,
-    },
-    Compacted {
-        /// Names of the files of the jobs table.
-        files: Vec<String>,
     },
 }
 
@@ -198,13 +183,6 @@ impl Log {
     }
 }
 
-/// How the rows of a part were kept last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kept {
-    Alone,
-    Compacted,
-}
-
 impl Results<'_> {
     pub fn begin_log(&self) -> Result<Log, ResultsError> {
         self.check_place()?;
@@ -254,64 +232,13 @@ impl Results<'_> {
         })?;
         Ok((predicted > 0.0).then(|| measured / predicted))
     }
-
-    /// The parts that were committed and not taken away since, as the logs say.
-    pub(super) fn committed_parts(&self) -> Result<CommittedParts, StorageError> {
-        let mut parts = CommittedParts::default();
-        let file_of = |part: &str| TableFile::parse(&format!("{part}.{FILE_EXTENSION}"));
-        self.events(|event| match event {
-            RunEvent::PartCommitted { part, .. } | RunEvent::PartMerged { part } => {
-                parts.set(file_of(&part), Some(Kept::Alone));
-            }
-            RunEvent::PartQuarantined { part } => parts.set(file_of(&part), None),
-            RunEvent::Compacted { files } => {
-                for name in &files {
-                    parts.set(TableFile::parse(name), Some(Kept::Compacted));
-                }
-            }
-            _ => (),
-        })?;
-        Ok(parts)
-    }
-}
-
-/// How the rows of parts were kept last: ranges without overlap, as a log may name more parts than there can be.
-#[derive(Debug, Default)]
-pub(super) struct CommittedParts(BTreeMap<(usize, u64), (u64, Kept)>);
-
-impl CommittedParts {
-    /// How the rows of a part were kept; `None` if it was never committed, or taken away.
-    pub fn get(&self, part: &Outline) -> Option<Kept> {
-        let before = self.0.range((part.extension, 0)..=(part.extension, part.index)).next_back();
-        before.filter(|(_, (last, _))| part.index <= *last).map(|(_, (_, kept))| *kept)
-    }
-
-    /// Says how the parts of a file are kept from now on.
-    fn set(&mut self, file: Option<TableFile>, kept: Option<Kept>) {
-        let Some((extension, first, last)) = file.map(|file| (file.extension, file.first, file.last)) else { return };
-        let overlaps = |(begin, (end, _)): &(&(usize, u64), &(u64, Kept))| begin.0 == extension && *end >= first;
-        while let Some((&(_, begin), &(end, before))) =
-            self.0.range((extension, 0)..=(extension, last)).next_back().filter(overlaps)
-        {
-            self.0.remove(&(extension, begin));
-            // What sticks out on either side stays.
-            if end > last {
-                self.0.insert((extension, last + 1), (end, before));
-            }
-            if begin < first {
-                self.0.insert((extension, begin), (first - 1, before));
-            }
-        }
-        if let Some(kept) = kept {
-            self.0.insert((extension, first), (last, kept));
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::results::layout::Layout;
+    use crate::results::workers::tests::open;
     use crate::sweep::Sweep;
     use crate::table::storage::Disk;
     use std::path::Path;
@@ -320,7 +247,7 @@ mod tests {
     fn a_log_reads_back_without_its_half_written_end() {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
-        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
+        let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         let mut log = results.begin_log().unwrap();
         let events = [
             RunEvent::started("1/1".to_owned(), 1, 2, 3, 0, 4.0),
@@ -339,26 +266,10 @@ mod tests {
     }
 
     #[test]
-    fn the_last_event_says_how_a_part_is_kept() {
-        let part = |index| Outline { extension: 0, index, points: 0..=0, job_count: 1, cost: 0.0 };
-        let file = |first, last| Some(TableFile::compacted(0, &(first..=last), "0"));
-        let mut parts = CommittedParts::default();
-        parts.set(file(2, 2), Some(Kept::Alone));
-        parts.set(file(0, u64::MAX), Some(Kept::Compacted));
-        parts.set(file(3, 4), None);
-        parts.set(file(6, 6), Some(Kept::Alone));
-        parts.set(file(u64::MAX, u64::MAX), None);
-        let kept: Vec<_> = (0..8).chain([u64::MAX - 1, u64::MAX]).map(|index| parts.get(&part(index))).collect();
-        let [all, alone] = [Some(Kept::Compacted), Some(Kept::Alone)];
-        assert_eq!(kept, [all, all, all, None, None, all, alone, all, all, None]);
-        assert_eq!(parts.get(&Outline { extension: 1, ..part(0) }), None);
-    }
-
-    #[test]
     fn a_log_without_ends_of_lines_and_what_is_no_file_are_passed_over() {
         let root = tempfile::tempdir().unwrap();
         let sweep = Sweep::parse("name = \"test\"\n", Path::new("test.toml")).unwrap();
-        let results = Results::open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
+        let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         results.begin_log().unwrap().write(&RunEvent::Stopping).unwrap();
         let logs = results.layout().logs();
         std::fs::create_dir(logs.join("0")).unwrap();

@@ -3,31 +3,35 @@
 //! ```text
 //! tables.rs                   what is written: slips, precursors, jobs
 //! commit.rs                   files that appear whole or not at all
-//! layout.rs, manifest.rs      where everything lies, and which sweeps it belongs to
-//! handle.rs                   a directory that fits this program
-//!   parts.rs                  which parts are done, and the rows of one, in all tables at once
+//! layout.rs                   where everything lies, and what names say
+//! extension_file.rs           which sweeps the tables belong to
+//! directory.rs                a directory that fits this program
+//!   parts.rs                  the rows of a part, in all tables at once
+//!   pending.rs                what runs again
 //!   rounds.rs                 what a sweep that decides for itself runs next
 //!   workers.rs, claims.rs     who is at work, and at what
 //!   events.rs                 what happens, and its log
-//!   compact.rs, merge.rs      many parts in one file, many directories in one
-//!   verify/                   what is damaged, and its repair
+//!   verify.rs                 what is damaged, and its repair
+//!   export.rs                 a few large files for other tools
 //! error.rs                    why a directory cannot be used or changed
+//! settled.rs                  waiting for what a network disk does not show yet
 //! ```
 
 pub mod claims;
 pub mod commit;
-pub mod compact;
+pub mod directory;
 pub mod error;
 pub mod events;
-pub mod handle;
+pub mod export;
+mod extension_file;
 pub mod layout;
-pub mod manifest;
-pub mod merge;
 pub mod parts;
+pub mod pending;
 pub mod rounds;
+mod settled;
 pub mod tables;
 pub mod verify;
 pub mod workers;
 
+pub use directory::Results;
 pub use error::{ErrorKind, ResultsError};
-pub use handle::Results;

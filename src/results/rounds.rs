@@ -1,13 +1,16 @@
 //! Rounds of a directory: each is an extension with the same sweep file, begun when all parts of the one before are done.
 //!
-//! All workers look; one of them, which holds the lock of the manifest, decides what the next round runs, and writes it.
+//! All workers look; one of them, which holds a lock, decides what the next round runs, and writes it.
 
-use crate::results::commit::alone;
+use crate::results::commit::exclusive_lock;
+use crate::results::directory::Results;
 use crate::results::error::ResultsError;
-use crate::results::handle::{Found, Results};
-use crate::results::manifest::{self, Manifest};
+use crate::results::workers::Member;
 use crate::sweep::{Extension, Round, Standing};
 use serde::{Deserialize, Serialize};
+
+/// Name of the lock.
+const LOCK: &str = "round";
 
 /// How far the rounds of a sweep are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,32 +48,30 @@ impl Results<'_> {
     /// the one that `decide` has found. `None` if the rounds are over, or if there are none.
     pub fn next_round(
         &self,
+        member: &Member<'_>,
         decide: impl FnOnce(&Self) -> Result<Round, ResultsError>,
     ) -> Result<Option<Self>, ResultsError> {
         if self.round().is_none_or(Round::is_end) {
             return Ok(None);
         }
         let layout = self.layout();
-        let _alone = alone(layout, manifest::WRITER)?;
+        let _lock = exclusive_lock(layout, LOCK)?;
         self.check_place()?;
-        let found = Found::look(layout, self.sweep(), 1)?;
-        if !found.is_of(self.sweep()) {
+        let current = Self::read(layout)?;
+        if !current.is_of(self.sweep()) {
             let problem = "another sweep file was begun here meanwhile; choose another directory with --out";
             return Err(ResultsError::refused(layout.root(), problem));
         }
-        let current = Results::new(layout, found.extensions);
+        let done = current.done_parts()?;
         // Another worker was first; or a repair has taken a part away.
         if current.extensions().len() > self.extensions().len()
-            || current.plan().outlines().any(|part| !found.done.has(&part))
+            || current.plan().outlines().any(|part| !done.has(&part))
         {
             return Ok(Some(current));
         }
         let round = decide(&current)?;
-        let mut extensions = current.extensions().to_vec();
-        let last = extensions.len() - 1;
-        extensions[last].kept = Some(current.plan().ranges(last, |_| true));
-        extensions.push(Extension::next_round(current.sweep(), &extensions, round));
-        Manifest::new(&extensions).write(layout)?;
-        Ok(Some(Results::new(layout, extensions)))
+        let next = current.in_next_round(round).write_last(member)?;
+        // Without locks, another may have been first.
+        next.map_or_else(|| Self::read(layout), Ok).map(Some)
     }
 }

@@ -2,29 +2,30 @@
 //!
 //! `run/workers/<name>` says host, process and threads, and is rewritten every [`BEAT`] while the process lives
 //! and removed when it ends. On its own host a process is looked up; elsewhere it lives if its file is at most
-//! [`SILENCE`] older than the newest of one's own. Both times are the file server's, so no clocks are compared. Contract:
-//! who lives is a matter of double work, and no more. Should a suspended process be taken for dead, it and its heir write
-//! the same bytes, each under staged names of its own.
+//! [`SILENCE`] older than the newest of one's own. Both times are the file server's, so no clocks are compared.
 //!
-//! Who wants a directory alone, to change what is committed, joins as any other and then looks whether others are there;
-//! a run joins and then looks whether somebody wants to be alone. So of two that begin at once one sees the other, and
-//! leaves.
+//! A worker commits from its staging folder alone. Whoever takes over the work of one that it takes for dead, or begins
+//! another sweep, removes that folder first. So a worker that was suspended and wakes can commit nothing any more, and says
+//! why. All workers that live are at the same sweep: of two that join for different sweeps at once, one at least sees the
+//! other, and leaves.
 
-use crate::results::commit::own_number;
-use crate::results::compact::GRACE;
+use crate::results::commit::{Commit, own_number};
+use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::events::host;
-use crate::results::handle::Results;
-use crate::results::layout::{COMPACTION, Layout, MERGER, REPLACED};
+use crate::results::layout::Layout;
+use crate::sweep::Sweep;
+use crate::table::checksum;
 use crate::table::shown::shown_text;
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::ThreadId;
 use std::time::{Duration, Instant, SystemTime};
 
 pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
@@ -39,16 +40,6 @@ const NEW: &str = ".new";
 /// Staged file whose links are the claims of a worker.
 const CLAIM: &str = "claim";
 
-/// What a process is there for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Task {
-    /// To run jobs, beside others.
-    Run,
-    /// To change what is committed, alone.
-    Change,
-}
-
 /// A process, as its file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Worker {
@@ -59,45 +50,34 @@ pub struct Worker {
     system: String,
     /// When it began, in the ticks of its system: another process may get its id.
     process_start: Option<u64>,
-    /// What it is there for.
-    pub task: Task,
+    /// Checksum of the sweep file that it works at.
+    sweep: String,
     pub threads: usize,
     /// Jobs that it has finished, in a second.
     pub jobs_per_second: f64,
 }
 
-impl Living {
-    /// What it does, in words.
-    pub(super) fn doing(&self) -> String {
-        let Worker { host, process, task, .. } = &self.worker;
-        let what = match task {
-            Task::Run => "run",
-            Task::Change => "repaired, compacted or merged",
-        };
-        format!("is being {what} by process {process} on {}", shown_text(host))
-    }
-}
+/// Names of the workers of this process, and their threads: one that died under a test leaves a file like a living one's.
+static OWN: Mutex<BTreeMap<String, ThreadId>> = Mutex::new(BTreeMap::new());
 
-/// Names of the workers of this process: one that died under a test leaves a file like a living one's.
-static OWN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-
-fn own() -> MutexGuard<'static, BTreeSet<String>> {
+fn own() -> MutexGuard<'static, BTreeMap<String, ThreadId>> {
     // Nothing panics while it is held.
     OWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Worker {
-    fn here(task: Task, threads: usize) -> Self {
+    fn here(sweep: &Sweep, threads: usize) -> Self {
         let process = std::process::id();
         let (system, process_start) = (system(), process_start(process));
-        Self { host: host(), process, system, process_start, task, threads, jobs_per_second: 0.0 }
+        let sweep = checksum::of_text(sweep.text());
+        Self { host: host(), process, system, process_start, sweep, threads, jobs_per_second: 0.0 }
     }
 
     /// Whether the process lives, if it is one that can be looked up.
     fn lives_here(&self, name: &str) -> Option<bool> {
         let can_look = !self.system.is_empty() && self.system == system() && self.process_start.is_some();
         can_look.then(|| {
-            let is_lost = self.process == std::process::id() && !own().contains(name);
+            let is_lost = self.process == std::process::id() && !own().contains_key(name);
             !is_lost && process_start(self.process) == self.process_start
         })
     }
@@ -141,40 +121,34 @@ pub struct Member<'a> {
     jobs: AtomicU64,
 }
 
-impl<'a> Results<'a> {
-    /// Joins the workers, and is one of them while `body` runs.
-    pub fn join<T, E: From<ResultsError>>(
-        &self,
-        task: Task,
-        threads: usize,
-        body: impl FnOnce(&Member<'a>) -> Result<T, E>,
-    ) -> Result<T, E> {
-        let member = Member::join(self.layout(), Worker::here(task, threads)).map_err(ResultsError::from)?;
-        member.check_peace()?;
-        std::thread::scope(|scope| {
-            let (end, ended) = channel::<()>();
-            let member = &member;
-            let beats = move || {
-                while matches!(ended.recv_timeout(BEAT), Err(RecvTimeoutError::Timeout)) {
-                    // A beat that cannot be written costs double work at worst.
-                    let _ = member.beat();
-                }
-            };
-            let thread = std::thread::Builder::new().name(BEAT_THREAD.to_owned());
-            // Without beats, workers of other hosts take this one for dead: double work.
-            let _ = thread.spawn_scoped(scope, beats);
-            let _end = end;
-            body(member)
-        })
-    }
-
-    /// Runs `body` while nobody else changes the directory.
-    pub(crate) fn exclusively<T>(&self, body: impl FnOnce() -> Result<T, ResultsError>) -> Result<T, ResultsError> {
-        self.join(Task::Change, 1, |member| {
-            member.tidy()?;
-            body()
-        })
-    }
+/// Joins the workers on the directory of a sweep, opens it, and is one of them while `body` runs. Nothing is written if the
+/// directory is refused.
+pub fn join<'a, T, E: From<ResultsError>>(
+    layout: &Layout<'a>,
+    sweep: &Sweep,
+    threads: usize,
+    body: impl FnOnce(&Member<'a>, &Results<'a>) -> Result<T, E>,
+) -> Result<T, E> {
+    Results::check(layout, sweep)?;
+    layout.storage.ensure_folder(layout.root()).map_err(ResultsError::from)?;
+    let member = Member::join(layout, Worker::here(sweep, threads)).map_err(ResultsError::from)?;
+    member.check_peace()?;
+    std::thread::scope(|scope| {
+        let (end, ended) = channel::<()>();
+        let member = &member;
+        let beats = move || {
+            while matches!(ended.recv_timeout(BEAT), Err(RecvTimeoutError::Timeout)) {
+                // A beat that cannot be written costs double work at worst.
+                let _ = member.beat();
+            }
+        };
+        let thread = std::thread::Builder::new().name(BEAT_THREAD.to_owned());
+        // Without beats, workers of other hosts take this one for dead: double work.
+        let _ = thread.spawn_scoped(scope, beats);
+        let _end = end;
+        let ended = Results::open(member, sweep).map_err(E::from).and_then(|results| body(member, &results));
+        if ended.is_err() && member.is_buried() { Err(member.burial().into()) } else { ended }
+    })
 }
 
 impl Layout<'_> {
@@ -213,7 +187,7 @@ impl<'a> Member<'a> {
         let host: String = worker.host.chars().map(plain).collect();
         let number = own_number();
         let name = format!("{PREFIX}{host}-{}-{number:016x}", worker.process);
-        own().insert(name.clone());
+        own().insert(name.clone(), std::thread::current().id());
         let member =
             Self { layout: layout.clone(), name, number, worker, begin: Instant::now(), jobs: AtomicU64::new(0) };
         layout.ensure_folder(&layout.workers())?;
@@ -222,6 +196,10 @@ impl<'a> Member<'a> {
         layout.ensure_folder(&member.staging())?;
         layout.storage.create(&member.claim())?.write(member.name.as_bytes())?;
         Ok(member)
+    }
+
+    pub(super) const fn layout(&self) -> &Layout<'a> {
+        &self.layout
     }
 
     pub fn name(&self) -> &str {
@@ -271,18 +249,50 @@ impl<'a> Member<'a> {
         Ok(living)
     }
 
-    /// Looks whether those that are there let this one work.
+    /// Leaves if another is there that works at another sweep.
     fn check_peace(&self) -> Result<(), ResultsError> {
-        let wants_peace = |other: &Living| [self.worker.task, other.worker.task].contains(&Task::Change);
-        let other = self.others()?.into_values().find(wants_peace);
-        other.map_or(Ok(()), |other| {
-            let problem = format!("{}; wait for it or stop it, then try again", other.doing());
+        let other = self.others()?.into_values().find(|other| other.worker.sweep != self.worker.sweep);
+        other.map_or(Ok(()), |Living { worker: Worker { host, process, .. }, .. }| {
+            let problem = format!(
+                "is being run by process {process} on {}, for another sweep file; wait for it or stop it, or choose another \
+                 directory with --out",
+                shown_text(&host)
+            );
             Err(ResultsError::busy(self.layout.root(), problem))
         })
     }
 
+    /// Whether others took it for dead: the listing is true also on a network disk.
+    fn is_buried(&self) -> bool {
+        let is_listed = |folder: &Path, name: &str| {
+            self.layout.storage.list(folder).map_or(true, |names| names.iter().any(|there| there == name))
+        };
+        is_listed(&self.layout.run(), "staging") && !is_listed(&self.layout.staging(""), &self.name)
+    }
+
+    fn burial(&self) -> ResultsError {
+        let problem = format!(
+            "this worker gave no sign of life for over {} s, as on a machine that was suspended, so others have taken over \
+             its work; nothing that was committed is lost, and the same command goes on",
+            SILENCE.as_secs()
+        );
+        ResultsError::stopped(self.layout.root(), problem)
+    }
+
+    /// Begins to prepare files for their places.
+    pub(super) fn commit(&self) -> Commit<'a> {
+        Commit::within(self.layout.storage, &self.staging())
+    }
+
+    /// Creates a file with these bytes; false if there is one of this name.
+    pub(super) fn publish_new(&self, target: &Path, bytes: &[u8]) -> Result<bool, StorageError> {
+        let mut commit = self.commit();
+        commit.stage_bytes(target, bytes)?;
+        commit.publish_new()
+    }
+
     /// Removes what workers left that live no more. Their claims go only once nobody else is there, as one who is may have
-    /// looked up what is done before they ended; likewise what is left of compactions and mergers.
+    /// looked up what is done before they ended.
     pub fn tidy(&self) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
         let gone_is_fine = |removed: Result<(), StorageError>| match removed {
@@ -306,25 +316,9 @@ impl<'a> Member<'a> {
             }
         }
         if others.is_empty() {
-            for name in [COMPACTION, MERGER, REPLACED].into_iter().filter(|name| left.iter().any(|there| there == name))
-            {
-                if name != REPLACED || self.is_grace_over()? {
-                    storage.remove_folder(&layout.staging(name))?;
-                }
-            }
             claims.iter().try_for_each(|claim| gone_is_fine(storage.remove(&layout.claims().join(claim))))?;
         }
         Ok(())
-    }
-}
-
-impl Member<'_> {
-    /// Whether the tables that a compaction replaced need not stay any longer, by the clock of the file system.
-    fn is_grace_over(&self) -> Result<bool, StorageError> {
-        let (storage, replaced) = (self.layout.storage, self.layout.staging(REPLACED));
-        let Some(folder) = storage.hold(&replaced)? else { return Ok(true) };
-        let since = folder.modified().map_err(StorageError::at("look up", &replaced))?;
-        Ok(storage.modified(&self.file())?.duration_since(since).is_ok_and(|age| age > GRACE))
     }
 }
 
@@ -344,16 +338,28 @@ pub(crate) mod tests {
     use crate::sweep::Sweep;
     use crate::table::storage::Disk;
     use std::fs::{self, File};
-    use std::path::Path;
+
+    /// Opens a directory as a run does.
+    pub fn open<'a>(layout: &Layout<'a>, sweep: &Sweep) -> Result<Results<'a>, ResultsError> {
+        super::join(layout, sweep, 1, |_, results| Ok(results.clone()))
+    }
+
+    /// Lets the workers of a thread look dead, as if their machine had been suspended for long.
+    pub fn lose(thread: ThreadId) {
+        own().retain(|_, of| *of != thread);
+    }
+
+    fn sweep() -> Sweep {
+        Sweep::parse("name = \"test\"", Path::new("test.toml")).unwrap()
+    }
 
     fn results(root: &Path) -> Results<'static> {
-        let sweep = Sweep::parse("name = \"test\"", Path::new("test.toml")).unwrap();
-        Results::open(&Layout::new(&Disk, root), &sweep).unwrap()
+        open(&Layout::new(&Disk, root), &sweep()).unwrap()
     }
 
     /// Leaves the file of a worker on another host, or of one here that was killed, which last beat so long ago.
-    pub fn leave(layout: &Layout<'_>, name: &str, is_here: bool, silent: Duration) {
-        let here = Worker::here(Task::Run, 3);
+    pub fn leave(layout: &Layout<'_>, sweep: &Sweep, name: &str, is_here: bool, silent: Duration) {
+        let here = Worker::here(sweep, 3);
         let elsewhere = Worker { host: "elsewhere".to_owned(), system: "another".to_owned(), ..here.clone() };
         let path = layout.workers().join(name);
         fs::create_dir_all(layout.workers()).unwrap();
@@ -362,7 +368,7 @@ pub(crate) mod tests {
     }
 
     fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
-        results.join::<_, ResultsError>(Task::Run, 1, |member| Ok(body(member))).unwrap()
+        super::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| Ok(body(member))).unwrap()
     }
 
     #[test]
@@ -381,7 +387,7 @@ pub(crate) mod tests {
         for folder in ["run/workers", "run/staging"] {
             let left: Vec<_> =
                 fs::read_dir(root.path().join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
-            assert!(left.iter().all(|path| path.ends_with("manifest")), "{left:?}");
+            assert!(left.is_empty(), "{left:?}");
         }
     }
 
@@ -390,10 +396,10 @@ pub(crate) mod tests {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         let layout = results.layout();
-        leave(layout, "worker-here", true, Duration::ZERO);
-        leave(layout, "worker-fresh", false, Duration::ZERO);
-        leave(layout, "worker-slow", false, SILENCE / 2);
-        leave(layout, "worker-dead", false, 2 * SILENCE);
+        leave(layout, &sweep(), "worker-here", true, Duration::ZERO);
+        leave(layout, &sweep(), "worker-fresh", false, Duration::ZERO);
+        leave(layout, &sweep(), "worker-slow", false, SILENCE / 2);
+        leave(layout, &sweep(), "worker-dead", false, 2 * SILENCE);
         fs::write(layout.workers().join("worker-torn"), "{").unwrap();
         join(&results, |member| {
             let others = member.others().unwrap();
@@ -434,6 +440,38 @@ pub(crate) mod tests {
             std::thread::sleep(2 * BEAT);
             assert!(beat() > first);
         });
+    }
+
+    #[test]
+    fn a_worker_that_was_taken_for_dead_commits_nothing_any_more_and_says_why() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        let layout = results.layout();
+        let target = layout.run().join("target");
+        let suspended = super::join::<(), ResultsError>(layout, &sweep(), 1, |first, _| {
+            let mut commit = first.commit();
+            commit.stage_bytes(&target, b"late").unwrap();
+            lose(std::thread::current().id());
+            join(&results, |second| second.tidy().unwrap());
+            let late = commit.publish();
+            assert!(late.is_err() && first.commit().stage(&target).is_err());
+            Ok(late?)
+        });
+        let error = suspended.unwrap_err();
+        assert!(error.kind == crate::results::ErrorKind::Stopped && error.to_string().contains("suspended"), "{error}");
+        assert!(!target.exists());
+    }
+
+    #[test]
+    fn workers_at_different_sweeps_keep_each_other_out() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        let other = Sweep::parse("name = \"test\"\n[axes]\nseed = [1, 2]", Path::new("test.toml")).unwrap();
+        join(&results, |_| {
+            let error = open(results.layout(), &other).unwrap_err();
+            assert!(error.to_string().contains("for another sweep file"), "{error}");
+        });
+        assert_eq!(open(results.layout(), &other).unwrap().extensions().len(), 2);
     }
 
     #[test]

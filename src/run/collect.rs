@@ -2,11 +2,11 @@
 //! disk.
 
 use crate::results::ResultsError;
-use crate::results::layout::part_name;
+use crate::results::layout::PartName;
 use crate::results::parts::Outcome;
 use crate::results::workers::Member;
 use crate::run::cpu;
-use crate::run::share::{PartJob, Share, Taken, Work};
+use crate::run::take::{PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
@@ -134,7 +134,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             if *again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(&self.member.staging(), part, &open.outcomes, spilled)?;
+                self.share.results.spill(self.member, part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -257,12 +257,12 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.share.results.commit(&self.member.staging(), part, &whole.outcomes, spilled)?;
+        self.share.results.commit(self.member, part, &whole.outcomes, spilled)?;
         self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);
         }
-        let (part, jobs) = (part_name(part), whole.outcomes.len());
+        let (part, jobs) = (PartName::from(&**part).to_string(), whole.outcomes.len());
         let failed = whole.outcomes.values().filter(|outcome| outcome.is_err()).count();
         let OpenPart { predicted_cost, measured: JobTime { cpu: measured_cost, wall }, .. } = *whole;
         let report = &mut *self.report;

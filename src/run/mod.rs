@@ -1,7 +1,7 @@
 //! Run: the missing jobs of a sweep, on all cores, committed part by part.
 //!
 //! ```text
-//! share.rs    parts that are not there, in outline, claimed -> their jobs (walltime.rs: while there is time)
+//! take.rs     parts that are not there, in outline, claimed -> their jobs (walltime.rs: while there is time)
 //! collect.rs  jobs -> rayon -> kernel -> outcomes -> whole parts -> Results::commit, and events for the log and a display
 //! ```
 //!
@@ -16,8 +16,8 @@
 mod collect;
 pub mod cpu;
 mod shard;
-mod share;
 mod status;
+mod take;
 mod tally;
 #[cfg(test)]
 mod tests;
@@ -33,11 +33,11 @@ use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
-use crate::results::workers::{Member, Task};
+use crate::results::workers::{self, Member};
 use crate::results::{ErrorKind, Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
-use crate::run::share::{LOOK, Left, Share};
+use crate::run::take::{LOOK, Left, Share};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
@@ -105,11 +105,12 @@ pub fn join<T, E: From<ResultsError>>(
                        run it on a common disk, started as often as you like";
         return Err(ResultsError::refused(layout.root(), problem).into());
     }
-    let results = Results::open(layout, sweep)?;
-    let parts: Vec<Outline> = options.shard.parts(results.plan().outlines()).collect();
-    results.join(Task::Run, threads, |member| {
+    workers::join(layout, sweep, threads, |member, results| {
+        let all: Vec<Outline> = results.plan().outlines().collect();
+        results.refuse_strangers(&all)?;
+        let parts: Vec<Outline> = options.shard.parts(all.into_iter()).collect();
         layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
-        let ended = body(&Joined { results: &results, parts: &parts, member, begin, threads, options });
+        let ended = body(&Joined { results, parts: &parts, member, begin, threads, options });
         // That the directory was moved says more than what was not found in it.
         if ended.is_err()
             && let Err(moved) = results.check_place()
@@ -142,7 +143,7 @@ impl Joined<'_> {
             if report.jobs_left > 0 {
                 break;
             }
-            let Some(next) = results.next_round(rounds::next)? else { break };
+            let Some(next) = results.next_round(self.member, rounds::next)? else { break };
             let parts = next.plan().outlines().collect();
             round = (Cow::Owned(next), Cow::Owned(parts));
         }

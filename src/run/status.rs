@@ -1,12 +1,12 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
 use crate::results::events::RunEvent;
-use crate::results::parts::Unfinished;
+use crate::results::pending::{Again, PartState};
 use crate::results::rounds::RoundsSoFar;
 use crate::results::tables::{self, JobOutcome};
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
-use crate::run::share::Share;
+use crate::run::take::Share;
 use crate::sweep::{Outline, Part};
 use crate::table::columns::columns;
 use serde::Serialize;
@@ -83,46 +83,69 @@ impl Share<'_> {
         let looks = looks || self.may_run_again();
         let mut overview = Overview::default();
         for part in self.parts {
-            if !self.done.has(part) {
-                let spilled = self.spilled(part)?.unwrap_or_default();
-                let jobs = if spilled.is_empty() { Vec::new() } else { self.part(part).jobs };
-                let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
-                overview.parts_missing += 1;
-                overview.jobs_missing += (part.job_count - spilled.len()) as u64;
-                overview.predicted_cost_missing += part.cost - spilled_cost;
-                overview.jobs_done += spilled.len() as u64;
-                overview.predicted_cost_done += spilled_cost;
-                continue;
-            }
-            overview.parts_done += 1;
-            overview.jobs_done += part.job_count as u64;
-            overview.predicted_cost_done += part.cost;
-            let Some((part, unfinished)) = (if looks { self.unfinished(part)? } else { None }) else { continue };
-            for (position, why) in unfinished {
-                let cost = part.jobs[position].cost;
-                overview.jobs_done -= 1;
-                match why {
-                    Unfinished::Failed(reason) => {
-                        overview.jobs_failed += 1;
-                        overview.predicted_cost_failed += cost;
-                        visit(&part, position, &reason);
-                    }
-                    Unfinished::Cut => {
-                        overview.jobs_missing += 1;
-                        overview.predicted_cost_missing += cost;
-                        overview.predicted_cost_done -= cost;
-                    }
-                }
+            if looks || !self.pending.done.has(part) {
+                overview.add(part, &self.pending.state(part)?, || self.part(part), &mut visit);
+            } else {
+                overview.add_done(part);
             }
         }
         Ok(overview)
     }
 }
 
+impl Overview {
+    fn add_done(&mut self, part: &Outline) {
+        self.parts_done += 1;
+        self.jobs_done += part.job_count as u64;
+        self.predicted_cost_done += part.cost;
+    }
+
+    /// Adds a part; `part` gives its jobs, if their costs are wanted.
+    fn add(
+        &mut self,
+        outline: &Outline,
+        state: &PartState,
+        part: impl FnOnce() -> Part,
+        visit: &mut impl FnMut(&Part, usize, &str),
+    ) {
+        match state {
+            PartState::Missing { spilled } => {
+                let jobs = if spilled.is_empty() { Vec::new() } else { part().jobs };
+                let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
+                self.parts_missing += 1;
+                self.jobs_missing += (outline.job_count - spilled.len()) as u64;
+                self.predicted_cost_missing += outline.cost - spilled_cost;
+                self.jobs_done += spilled.len() as u64;
+                self.predicted_cost_done += spilled_cost;
+            }
+            PartState::Done { again } => {
+                self.add_done(outline);
+                let part = if again.is_empty() { return } else { part() };
+                for (&position, why) in again {
+                    let cost = part.jobs[position].cost;
+                    self.jobs_done -= 1;
+                    match why {
+                        Again::Failed(reason) => {
+                            self.jobs_failed += 1;
+                            self.predicted_cost_failed += cost;
+                            visit(&part, position, reason);
+                        }
+                        Again::CutOff => {
+                            self.jobs_missing += 1;
+                            self.predicted_cost_missing += cost;
+                            self.predicted_cost_done -= cost;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
 fn jobs_kept(share: &Share<'_>) -> u64 {
     let last = share.results.extensions().len() - 1;
-    let earlier = share.parts.iter().filter(|part| part.extension < last && share.done.has(part));
+    let earlier = share.parts.iter().filter(|part| part.extension < last && share.pending.done.has(part));
     let jobs = earlier.flat_map(|part| share.part(part).jobs);
     jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
 }
@@ -154,17 +177,14 @@ columns! {
 impl Status {
     /// How many jobs of the tables ended without a slip, and how many were run to an end.
     pub fn jobs_without_slips(results: &Results<'_>) -> Result<(u64, u64), ResultsError> {
-        let count = || -> Result<(u64, u64), ResultsError> {
-            let (mut without, mut ended) = (0, 0);
-            for batch in results.layout().dataset(tables::JOBS)?.rows::<OutcomeAlone>() {
-                for OutcomeAlone { outcome } in batch? {
-                    without += u64::from(outcome == JobOutcome::NoSlips);
-                    ended += u64::from(outcome != JobOutcome::Failed);
-                }
+        let (mut without, mut ended) = (0, 0);
+        for batch in results.layout().dataset(tables::JOBS)?.rows::<OutcomeAlone>() {
+            for OutcomeAlone { outcome } in batch? {
+                without += u64::from(outcome == JobOutcome::NoSlips);
+                ended += u64::from(outcome != JobOutcome::Failed);
             }
-            Ok((without, ended))
-        };
-        results.layout().read_tables(count)?
+        }
+        Ok((without, ended))
     }
 }
 
@@ -174,7 +194,7 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
 
 /// The same, with another number of failed jobs.
 pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
-    let (overview, failures) = results.layout().read_tables(|| overview_and_failures(results, max_failures))??;
+    let (overview, failures) = overview_and_failures(results, max_failures)?;
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {

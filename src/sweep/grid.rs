@@ -76,6 +76,11 @@ impl Sweep {
         })
     }
 
+    /// Keys of all axes.
+    pub fn swept(&self) -> impl Iterator<Item = String> {
+        self.axes.iter().flat_map(Axis::quantities).map(|quantity| quantity.key().to_owned())
+    }
+
     /// Number of points of the grid, before the conditions drop some.
     pub fn point_count(&self) -> u64 {
         self.axes.iter().map(Axis::len).product()

@@ -39,13 +39,29 @@ fn field(column: &Column) -> Field {
 
 /// Arrow schema of a row, with units and meanings in the metadata of its fields and, for pandas, of the schema.
 pub fn schema<R: Row>() -> SchemaRef {
-    let columns = R::columns();
-    let by_name = |text: fn(&Column) -> &'static str| {
-        columns.iter().map(|column| (column.name.to_string(), text(column).into())).collect::<Map<_, _>>()
+    schema_of(R::columns().iter().map(field).collect())
+}
+
+/// The same of fields that have a unit and a description.
+pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
+    let by_name = |key: &str| {
+        let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default().into();
+        fields.iter().map(|field| (field.name().clone(), text(field))).collect::<Map<_, _>>()
     };
-    let attributes = json!({ "meaning": by_name(|column| column.meaning), "units": by_name(|column| column.unit) });
-    let fields: Vec<Field> = columns.iter().map(field).collect();
+    let attributes = json!({ "meaning": by_name(DESCRIPTION), "units": by_name(UNIT) });
     Arc::new(Schema::new_with_metadata(fields, HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())])))
+}
+
+/// The rows of a batch as texts, which read back as the same values; empty where a value is missing.
+pub fn texts(rows: &RecordBatch) -> impl Iterator<Item = Vec<String>> {
+    let text = |array: &ArrayRef, row: usize| match array.data_type() {
+        _ if array.is_null(row) => String::new(),
+        DataType::Float64 => format!("{:?}", array.as_primitive::<Float64Type>().value(row)),
+        DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
+        DataType::Boolean => array.as_boolean().value(row).to_string(),
+        _ => array.as_string::<i32>().value(row).to_owned(),
+    };
+    (0..rows.num_rows()).map(move |row| rows.columns().iter().map(|array| text(array, row)).collect())
 }
 
 /// A row as JSON: an object with the names of the columns; null where a value is missing or not finite.

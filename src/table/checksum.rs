@@ -4,17 +4,11 @@
 //! footer under the key `seal`. Checksums of pages, which the format knows, cover neither its footer nor the headers of
 //! its pages.
 
-use crate::table::error::DatasetError;
-use crate::table::read_file::ReadFile;
-use crate::table::storage::{MAX_WHOLE, Storage, StorageError};
-use parquet::file::reader::Length;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::io::{self, Read};
-use std::path::Path;
 
 /// The footer's key of the checksum.
 pub const FOOTER_KEY: &str = "seal";
@@ -26,8 +20,6 @@ const ENCODED_KEY: &[u8] = b"\x18\x04seal\x18\x40";
 const END: usize = 8;
 /// First and last bytes of a file.
 const MAGIC: &[u8] = b"PAR1";
-/// Bytes that are read and hashed at once.
-const CHUNK: usize = 1 << 16;
 
 pub fn hexadecimal(hash: &[u8]) -> String {
     hash.iter().fold(String::new(), |mut text, byte| {
@@ -44,66 +36,36 @@ fn place(end: &[u8]) -> Option<usize> {
     (place + PLACEHOLDER.len() <= end.len()).then_some(place)
 }
 
-/// Puts the checksum into a footer, which comes last in a file: `hasher` has seen all bytes before it. Returns it.
-pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<String> {
+/// Puts the checksum into a footer, which comes last in a file: `hasher` has seen all bytes before it.
+/// `None` if it has no place for it.
+pub(super) fn close(mut hasher: Sha256, footer: &mut [u8]) -> Option<()> {
     let place = place(footer)?;
     hasher.update(&*footer);
     let checksum = hexadecimal(&hasher.finalize());
     footer[place..place + PLACEHOLDER.len()].copy_from_slice(checksum.as_bytes());
-    Some(checksum)
+    Some(())
 }
 
-/// Reads a file and compares its bytes with its checksum, which it returns.
-pub fn check(storage: &dyn Storage, path: &Path) -> Result<String, DatasetError> {
-    check_file(&ReadFile::open(storage, path)?, path)
-}
-
-/// The same of a file that is open.
-pub(super) fn check_file(file: &ReadFile, path: &Path) -> Result<String, DatasetError> {
-    let compared = compare(file).map_err(|error| {
-        // The error that the file remembers says more.
-        StorageError::at("read", path)(file.take_refused().unwrap_or(error))
-    })?;
-    compared.map_err(|problem| DatasetError::damaged(path)(problem))
-}
-
-fn compare(file: &ReadFile) -> io::Result<Result<String, &'static str>> {
+/// Compares the bytes of a file with their checksum; what is wrong with them.
+pub fn check(bytes: &[u8]) -> Result<(), &'static str> {
     const CUT: &str = "it is cut off, or no Parquet file";
-    let length = file.len();
-    if length < (MAGIC.len() + END) as u64 {
-        return Ok(Err(CUT));
-    }
-    let footer_end = length - END as u64;
-    let mut end = [0; END];
-    file.from(footer_end).read_exact(&mut end)?;
-    let [a, b, c, d, magic @ ..] = end;
-    let footer = u32::from_le_bytes([a, b, c, d]);
-    if magic != MAGIC || u64::from(footer) > footer_end {
-        return Ok(Err(CUT));
-    }
-    if u64::from(footer) > MAX_WHOLE {
-        return Ok(Err("its footer is longer than any"));
-    }
-    let begin = footer_end - u64::from(footer);
-    let mut bytes = file.bytes(begin, footer as usize + END)?;
-    let Some(place) = place(&bytes) else { return Ok(Err("it has no checksum")) };
-    let written = bytes[place..place + PLACEHOLDER.len()].to_owned();
-    bytes[place..place + PLACEHOLDER.len()].copy_from_slice(PLACEHOLDER.as_bytes());
-
+    let (Some(rest), true) = (bytes.len().checked_sub(END), bytes.ends_with(MAGIC)) else { return Err(CUT) };
+    let length = bytes[rest..].first_chunk().map_or(0, |length| u32::from_le_bytes(*length));
+    let footer = rest.checked_sub(length as usize).filter(|begin| *begin >= MAGIC.len()).ok_or(CUT)?;
+    let place = footer + place(&bytes[footer..]).ok_or("it has no checksum")?;
+    let (before, rest) = bytes.split_at(place);
+    let (written, after) = rest.split_at(PLACEHOLDER.len());
     let mut hasher = Sha256::new();
-    let mut data = file.from(0).take(begin);
-    let mut chunk = vec![0; CHUNK];
-    loop {
-        match data.read(&mut chunk) {
-            Ok(0) => break,
-            Ok(read) => hasher.update(&chunk[..read]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => (),
-            Err(error) => return Err(error),
-        }
+    [before, PLACEHOLDER.as_bytes(), after].into_iter().for_each(|bytes| hasher.update(bytes));
+    if hexadecimal(&hasher.finalize()).as_bytes() == written {
+        Ok(())
+    } else {
+        Err("its bytes are not those that were written")
     }
-    hasher.update(&bytes);
-    let expected = hexadecimal(&hasher.finalize());
-    Ok(if expected.as_bytes() == written { Ok(expected) } else { Err("its bytes are not those that were written") })
+}
+
+pub fn of_text(text: &str) -> String {
+    hexadecimal(&Sha256::digest(text))
 }
 
 /// A value with the SHA-256 of the rest of its text.
@@ -134,7 +96,7 @@ mod tests {
     use super::*;
     use crate::table::columns::tests::{Reading, readings};
     use crate::table::file::{Footer, TableWriter};
-    use crate::table::storage::Disk;
+    use crate::table::storage::{Disk, Storage};
     use std::collections::BTreeMap;
     use std::fs;
 
@@ -146,13 +108,10 @@ mod tests {
         for (reading, _) in &readings() {
             writer.push(reading).unwrap();
         }
-        let checksum = writer.finish().unwrap();
-        assert_eq!(check(&Disk, &path).unwrap(), checksum);
+        writer.finish().unwrap();
         let bytes = fs::read(&path).unwrap();
-        let is_found = |changed: &[u8]| {
-            fs::write(&path, changed).unwrap();
-            matches!(check(&Disk, &path), Err(DatasetError::Damaged { .. }))
-        };
+        check(&bytes).unwrap();
+        let is_found = |changed: &[u8]| check(changed).is_err();
         for bit in 0..8 * bytes.len() {
             let mut changed = bytes.clone();
             changed[bit / 8] ^= 1 << (bit % 8);

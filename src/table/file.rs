@@ -9,24 +9,25 @@ use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
 pub use crate::table::error::DatasetError;
-use crate::table::read_file::ReadFile;
-use crate::table::storage::{Storage, StorageError, StoredFile};
+use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
-use arrow_schema::{DataType, Field, Schema};
+use arrow_ipc::writer::FileWriter;
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use bytes::Bytes;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::marker::PhantomData;
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -64,6 +65,11 @@ impl Footer {
     pub fn with(mut self, key: &str, text: &str) -> Self {
         self.0.insert(key.to_owned(), text.to_owned());
         self
+    }
+
+    /// The text under a key.
+    pub fn get(&self, key: &str) -> Option<&str> {
+        self.0.get(key).map(String::as_str)
     }
 
     fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
@@ -150,22 +156,120 @@ impl<R: Row> TableWriter<R> {
         Ok(self.file.write(&bytes)?)
     }
 
-    /// Writes what is left and the footer, brings the file to the disk, and gives its [checksum].
+    /// Writes what is left and the footer, brings the file to the disk.
     /// Without it, the file is unreadable.
-    pub fn finish(mut self) -> Result<String, DatasetError> {
+    pub fn finish(mut self) -> Result<(), DatasetError> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }
         let mut file = self.file;
         let footer = self.writer.into_inner().and_then(|mut footer| {
-            let checksum = checksum::close(self.hasher, &mut footer);
             let missing = || ParquetError::General("the footer has no place for a checksum".to_owned());
-            Ok((checksum.ok_or_else(missing)?, footer))
+            checksum::close(self.hasher, &mut footer).ok_or_else(missing).map(|()| footer)
         });
-        let (checksum, footer) = footer.map_err(DatasetError::unwritten(file.path()))?;
+        let footer = footer.map_err(DatasetError::unwritten(file.path()))?;
         file.write(&footer)?;
+        Ok(file.sync()?)
+    }
+}
+
+/// How rows are written for other programs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    Parquet,
+    /// Plain text with a line of names; real numbers with as many digits as they have.
+    Csv,
+    /// The file format of Arrow.
+    Arrow,
+}
+
+impl Format {
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Parquet => FILE_EXTENSION,
+            Self::Csv => "csv",
+            Self::Arrow => "arrow",
+        }
+    }
+}
+
+/// Writes rows of any schema in any format.
+pub enum RowWriter {
+    Parquet(Box<ArrowWriter<Counted>>, PathBuf),
+    Csv(Box<csv::Writer<Counted>>, PathBuf),
+    Arrow(Box<FileWriter<Counted>>, PathBuf),
+}
+
+/// A file that counts its bytes.
+pub struct Counted {
+    file: StoredFile,
+    bytes: u64,
+}
+
+impl Write for Counted {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes).map_err(|error| error.source)?;
+        self.bytes += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl RowWriter {
+    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, DatasetError> {
+        let path = file.path().to_owned();
+        let file = Counted { file, bytes: 0 };
+        let writer = || -> Result<Self, ParquetError> {
+            Ok(match format {
+                Format::Parquet => {
+                    let properties = footer.properties(schema)?;
+                    let writer = ArrowWriter::try_new(file, Arc::clone(schema), Some(properties))?;
+                    Self::Parquet(Box::new(writer), path.clone())
+                }
+                Format::Csv => {
+                    let mut writer = csv::Writer::from_writer(file);
+                    let names = schema.fields().iter().map(|field| field.name());
+                    writer.write_record(names).map_err(|error| ParquetError::External(error.into()))?;
+                    Self::Csv(Box::new(writer), path.clone())
+                }
+                Format::Arrow => Self::Arrow(Box::new(FileWriter::try_new(file, schema)?), path.clone()),
+            })
+        };
+        writer().map_err(DatasetError::unwritten(&path))
+    }
+
+    pub fn write(&mut self, rows: &RecordBatch) -> Result<(), DatasetError> {
+        match self {
+            Self::Parquet(writer, path) => writer.write(rows).map_err(DatasetError::unwritten(path)),
+            Self::Csv(writer, path) => {
+                let written = arrow::texts(rows).try_for_each(|texts| writer.write_record(texts));
+                written.map_err(|error| DatasetError::unwritten(path)(ParquetError::External(error.into())))
+            }
+            Self::Arrow(writer, path) => {
+                writer.write(rows).map_err(|error| DatasetError::unwritten(path)(error.into()))
+            }
+        }
+    }
+
+    /// Writes what is left and brings the file to the disk; returns its number of bytes.
+    pub fn finish(self) -> Result<u64, DatasetError> {
+        let (counted, path) = match self {
+            Self::Parquet(writer, path) => (writer.into_inner(), path),
+            Self::Csv(writer, path) => {
+                let counted = writer.into_inner().map_err(|error| ParquetError::External(error.into_error().into()));
+                (counted, path)
+            }
+            Self::Arrow(mut writer, path) => {
+                let counted = writer.finish().and_then(|()| writer.into_inner());
+                (counted.map_err(ParquetError::from), path)
+            }
+        };
+        let Counted { mut file, bytes } = counted.map_err(DatasetError::unwritten(&path))?;
         file.sync()?;
-        Ok(checksum)
+        Ok(bytes)
     }
 }
 
@@ -183,80 +287,63 @@ impl Batch {
     }
 }
 
-/// The checksum of a file, and the texts under keys in its footer.
-pub fn footer(storage: &dyn Storage, path: &Path) -> Result<(String, BTreeMap<String, String>), DatasetError> {
-    let file = ReadFile::open(storage, path)?;
-    let checksum = checksum::check_file(&file, path)?;
-    let metadata = decode(&file, path, || ParquetMetaDataReader::new().parse_and_finish(&file))?;
+/// The bytes of a file that are those that were written.
+fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, DatasetError> {
+    let bytes = storage.read(path)?;
+    checksum::check(&bytes).map_err(DatasetError::damaged(path))?;
+    Ok(bytes.into())
+}
+
+/// The texts under keys in the footer of a file.
+pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
+    let bytes = load(storage, path)?;
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(DatasetError::damaged(path))?;
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    let texts = entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default()));
-    Ok((checksum, texts.collect()))
+    Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
 }
 
-/// Decodes bytes of a file. A disk that does not read says nothing about the file, so its errors are no damage; what panics
-/// the decoder, as some damaged files do, is.
-fn decode<T, E: std::fmt::Display>(
-    file: &ReadFile,
-    path: &Path,
-    decoder: impl FnOnce() -> Result<T, E>,
-) -> Result<T, DatasetError> {
-    let decoded = catch_unwind(AssertUnwindSafe(decoder));
-    if let Some(refused) = file.take_refused() {
-        return Err(StorageError::at("read", path)(refused).into());
-    }
-    match decoded {
-        Ok(decoded) => decoded.map_err(DatasetError::damaged(path)),
-        Err(_) => Err(DatasetError::damaged(path)("its content makes no sense")),
-    }
+/// How many rows a file must have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RowCount {
+    pub least: u64,
+    /// Whether it may have more.
+    pub may_exceed: bool,
 }
 
-/// Whether the counts of a footer are those of a file that [`TableWriter`] can have written; of others the decoder may ask
-/// for any amount of memory and time.
-fn has_counts(metadata: &ParquetMetaData) -> bool {
-    let groups = metadata.row_groups();
-    let rows_of = |group: &RowGroupMetaData| usize::try_from(group.num_rows()).ok();
-    let is_counted = |group: &RowGroupMetaData| rows_of(group).is_some_and(|rows| rows <= GROUP_ROWS);
-    let rows = groups.iter().fold(0_i64, |rows, group| rows.saturating_add(group.num_rows()));
-    groups.iter().all(is_counted) && rows == metadata.file_metadata().num_rows()
+impl RowCount {
+    /// Says what is wrong with this number of rows.
+    pub fn check(self, rows: u64) -> Result<(), String> {
+        let Self { least, may_exceed } = self;
+        if rows == least || (may_exceed && rows > least) {
+            Ok(())
+        } else {
+            Err(format!("it has {rows} rows, where the jobs of its part have {least}"))
+        }
+    }
 }
 
 /// Files of a table, in this order.
 #[derive(Clone)]
 pub struct Dataset<'a> {
     storage: &'a dyn Storage,
-    files: Vec<PathBuf>,
+    files: Vec<(PathBuf, Option<RowCount>)>,
 }
 
 impl<'a> Dataset<'a> {
-    pub const fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
+    pub fn new(storage: &'a dyn Storage, files: Vec<PathBuf>) -> Self {
+        Self { storage, files: files.into_iter().map(|path| (path, None)).collect() }
+    }
+
+    /// Files of which it is known how many rows they must have; one with others is damaged.
+    pub const fn of_known_rows(storage: &'a dyn Storage, files: Vec<(PathBuf, Option<RowCount>)>) -> Self {
         Self { storage, files }
     }
 
-    /// All files of a table folder, in order of their names; none if there is no such folder.
-    pub fn of_folder(storage: &'a dyn Storage, folder: &Path) -> Result<Self, DatasetError> {
-        let paths = storage.list(folder)?.into_iter().map(|name| folder.join(name));
-        let checked = |path: PathBuf| {
-            if path.extension().is_some_and(|extension| extension == FILE_EXTENSION) {
-                Ok(path)
-            } else {
-                Err(DatasetError::Stray { path })
-            }
-        };
-        Ok(Self::new(storage, paths.map(checked).collect::<Result<_, _>>()?))
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.files.iter().map(|(path, _)| path)
     }
 
-    pub fn files(&self) -> &[PathBuf] {
-        &self.files
-    }
-
-    /// Those of the files for which this is true.
-    pub fn filter(mut self, is_kept: impl FnMut(&PathBuf) -> bool) -> Self {
-        self.files.retain(is_kept);
-        self
-    }
-
-    /// Reads all rows, one batch after the other, holding one of them; an error ends it. Each file is held against its
-    /// checksum first.
+    /// Reads all rows, one batch after the other, holding one file; an error ends it.
     pub fn batches(self) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
         self.read(Vec::new())
     }
@@ -279,50 +366,45 @@ impl<'a> Dataset<'a> {
 /// Reads files one after the other.
 struct Reader<'a> {
     storage: &'a dyn Storage,
-    files: std::vec::IntoIter<PathBuf>,
+    files: std::vec::IntoIter<(PathBuf, Option<RowCount>)>,
     /// Names of the columns to read; all if there are none.
     columns: Vec<Cow<'static, str>>,
-    current: Option<Current>,
-}
-
-/// The file that is being read.
-struct Current {
-    path: Arc<Path>,
-    file: ReadFile,
-    rows: ParquetRecordBatchReader,
+    /// The file that is being read.
+    current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
 }
 
 impl Reader<'_> {
-    /// Opens a file whose bytes are those that were written: of others the decoder may make anything, or panic.
-    fn open(&self, path: &Path) -> Result<Current, DatasetError> {
-        let file = ReadFile::open(self.storage, path)?;
-        checksum::check_file(&file, path)?;
-        let rows = decode(&file, path, || {
-            let mut builder = ParquetRecordBatchReaderBuilder::try_new(file.clone())?.with_batch_size(BATCH_ROWS);
-            if !has_counts(builder.metadata()) {
-                return Err(ParquetError::General("its counts of rows make no sense".to_owned()));
+    fn open(&self, path: &Path, expected: Option<RowCount>) -> Result<ParquetRecordBatchReader, DatasetError> {
+        let bytes = load(self.storage, path)?;
+        let reader = || {
+            let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
+            if let Some(expected) = expected {
+                let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
+                expected.check(rows).map_err(ParquetError::General)?;
             }
             if !self.columns.is_empty() {
                 let mask = ProjectionMask::columns(builder.parquet_schema(), self.columns.iter().map(AsRef::as_ref));
                 builder = builder.with_projection(mask);
             }
             builder.build()
-        })?;
-        Ok(Current { path: path.into(), file, rows })
+        };
+        reader().map_err(|error| match error {
+            ParquetError::General(problem) => DatasetError::damaged(path)(problem),
+            error => DatasetError::damaged(path)(error),
+        })
     }
 
     fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
         loop {
-            if let Some(Current { path, file, rows }) = &mut self.current {
-                match decode(file, path, || rows.next().transpose())? {
-                    Some(rows) => {
-                        return Ok(Some(Batch { path: Arc::clone(path), rows }));
-                    }
-                    None => self.current = None,
+            if let Some((path, rows)) = &mut self.current {
+                if let Some(rows) = rows.next().transpose().map_err(DatasetError::damaged(path))? {
+                    return Ok(Some(Batch { path: Arc::clone(path), rows }));
                 }
+                self.current = None;
             }
-            let Some(path) = self.files.next() else { return Ok(None) };
-            self.current = Some(self.open(&path)?);
+            let Some((path, expected)) = self.files.next() else { return Ok(None) };
+            let rows = self.open(&path, expected)?;
+            self.current = Some((path.into(), rows));
         }
     }
 }
@@ -344,8 +426,8 @@ impl Iterator for Reader<'_> {
 mod tests {
     use super::*;
     use crate::table::columns::columns;
-    use crate::table::storage::Disk;
     use crate::table::storage::over_disk::OverDisk;
+    use crate::table::storage::{Disk, StorageError};
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use std::fs::{self, File};
 
@@ -378,9 +460,14 @@ mod tests {
         writer.finish().unwrap();
     }
 
+    fn dataset(folder: &Path) -> Dataset<'static> {
+        let names = Disk.list(folder).unwrap();
+        Dataset::new(&Disk, names.into_iter().map(|name| folder.join(name)).collect())
+    }
+
     fn numbers(folder: &Path) -> Result<Vec<u64>, DatasetError> {
         let mut numbers = Vec::new();
-        for batch in Dataset::of_folder(&Disk, folder)?.batches() {
+        for batch in dataset(folder).batches() {
             numbers.extend(batch?.rows_of()?.into_iter().map(|number: Number| number.value));
         }
         Ok(numbers)
@@ -393,7 +480,7 @@ mod tests {
         write(&folder.path().join("a.parquet"), 0..5);
         write(&folder.path().join("c.parquet"), 0..0);
         assert_eq!(numbers(folder.path()).unwrap(), (0..9).collect::<Vec<_>>());
-        let rows = Dataset::of_folder(&Disk, folder.path()).unwrap().rows().collect::<Result<Vec<Vec<Number>>, _>>();
+        let rows = dataset(folder.path()).rows().collect::<Result<Vec<Vec<Number>>, _>>();
         assert_eq!(rows.unwrap().concat(), (0..9).map(Number::of).collect::<Vec<_>>());
     }
 
@@ -463,24 +550,25 @@ mod tests {
     }
 
     #[test]
-    fn an_error_of_the_disk_is_no_damage_whatever_the_decoder_makes_of_it() {
+    fn an_error_of_the_disk_is_no_damage() {
         let path = Path::new("a.parquet");
         let is_of_disk = |error: DatasetError| matches!(error, DatasetError::Storage(error) if error.path == path);
         assert!(is_of_disk(footer(&Unreadable, path).unwrap_err()));
         assert!(is_of_disk(Dataset::new(&Unreadable, vec![path.to_owned()]).batches().next().unwrap().unwrap_err()));
-        let file = ReadFile::open(&Unreadable, path).unwrap();
-        assert!(is_of_disk(decode(&file, path, || ParquetMetaDataReader::new().parse_and_finish(&file)).unwrap_err()));
-        let read = || file.bytes(0, 1).map(drop);
-        assert!(is_of_disk(decode(&file, path, || read().or(Ok::<_, String>(()))).unwrap_err()), "taken for an end");
-        assert!(is_of_disk(decode(&file, path, || read().map_err(|_| "too small")).unwrap_err()), "another text");
-        assert!(decode(&file, path, || Ok::<_, String>(())).is_ok(), "each error is reported once");
     }
 
     #[test]
-    fn a_stray_file_is_named() {
+    fn a_file_with_other_numbers_of_rows_than_expected_is_damaged() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("notes.txt"), "").unwrap();
-        let error = numbers(folder.path()).unwrap_err();
-        assert!(error.to_string().contains("notes.txt"), "{error}");
+        let path = folder.path().join("a.parquet");
+        write(&path, 0..5);
+        let read = |least, may_exceed| {
+            let expected = Some(RowCount { least, may_exceed });
+            Dataset::of_known_rows(&Disk, vec![(path.clone(), expected)]).batches().next().unwrap().map(|_| ())
+        };
+        assert!(read(5, false).is_ok() && read(5, true).is_ok() && read(4, true).is_ok());
+        for error in [read(4, false), read(6, false), read(6, true)].map(Result::unwrap_err) {
+            assert!(error.to_string().contains("it has 5 rows, where the jobs of its part have"), "{error}");
+        }
     }
 }

@@ -5,7 +5,6 @@
 //! columns.rs     name, unit, meaning and value of each column -> row types
 //! arrow.rs       rows as record batches and as JSON
 //! file.rs        one table as a file: the same rows, the same bytes
-//! read_file.rs   a file that is read from any place
 //! error.rs       why a file cannot be written or read
 //! checksum.rs    files that hold their own SHA-256
 //! shown.rs       paths and texts in messages
@@ -21,8 +20,6 @@ pub mod columns;
 pub mod error;
 #[cfg(feature = "sweeps")]
 pub mod file;
-#[cfg(feature = "sweeps")]
-mod read_file;
 #[cfg(feature = "sweeps")]
 pub mod shown;
 #[cfg(feature = "sweeps")]

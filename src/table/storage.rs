@@ -6,17 +6,17 @@ pub(crate) mod over_disk;
 use crate::table::shown::shown;
 use std::error::Error;
 use std::ffi::OsString;
-use std::fs::{self, File, FileType, OpenOptions, TryLockError};
+use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write};
 #[cfg(unix)]
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// How often to look whether a lock is free.
 const LOCK_POLL: Duration = Duration::from_millis(if cfg!(test) { 1 } else { 20 });
-/// Most bytes that are held in memory as a whole: far more than any manifest, sweep file or footer has.
-pub const MAX_WHOLE: u64 = 1 << 28;
+/// Most bytes of a file that is read as a whole: more than a part can have whose jobs fit in memory.
+pub const MAX_WHOLE: u64 = 1 << 32;
 
 /// Where the bytes of a file go.
 pub trait Sink: Write + Send {
@@ -60,8 +60,6 @@ pub trait Storage: Sync {
     fn create(&self, file: &Path) -> Result<StoredFile, StorageError>;
     /// Renames a file within the file system, over another if there is one; or a folder.
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
-    /// Gives a file a second name within the file system; copies it where files have one name only.
-    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError>;
     /// Gives a file a second name that nothing has; false if something has it. Copies it where files have one name only.
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError>;
     /// Returns when the names in a folder are on the disk.
@@ -75,26 +73,24 @@ pub trait Storage: Sync {
     fn remove(&self, file: &Path) -> Result<(), StorageError>;
     /// Removes a folder with all that is in it; nothing happens if there is none.
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError>;
-    /// Exchanges the names of two folders of a file system in one step. [`io::ErrorKind::Unsupported`]: it cannot.
-    /// [`io::ErrorKind::CrossesDevices`]: it cannot move one of these two.
-    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError>;
-    /// The folder that has a path now; `None` if there is none.
-    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError>;
-    /// Whether a path is that of a symbolic link.
-    fn is_link(&self, path: &Path) -> Result<bool, StorageError>;
     /// Tries to lock a file, created if needed.
     fn lock(&self, file: &Path) -> Result<Lock, StorageError>;
 
     /// All bytes of a file, up to [`MAX_WHOLE`].
     fn read(&self, file: &Path) -> Result<Vec<u8>, StorageError> {
-        let mut bytes = Vec::new();
-        let read = self.open(file)?.take(MAX_WHOLE + 1).read_to_end(&mut bytes);
-        let read = read.and_then(|length| if length as u64 > MAX_WHOLE { Err(NoFile::TooLong.into()) } else { Ok(()) });
-        read.map_err(StorageError::at("read", file))?;
-        Ok(bytes)
+        let mut opened = self.open(file)?;
+        let mut read = || match opened.metadata()?.len() {
+            ..=MAX_WHOLE => {
+                let mut bytes = Vec::new();
+                opened.read_to_end(&mut bytes)?;
+                Ok(bytes)
+            }
+            _ => Err(NoFile::TooLong.into()),
+        };
+        read().map_err(StorageError::at("read", file))
     }
 
-    /// When a file was written last, by the clock of its file system.
+    /// When a file, or a name in a folder, was written last, by the clock of its file system.
     fn modified(&self, file: &Path) -> Result<SystemTime, StorageError> {
         let modified = self.open(file)?.metadata().and_then(|metadata| metadata.modified());
         modified.map_err(StorageError::at("look up", file))
@@ -147,32 +143,6 @@ pub trait Storage: Sync {
         [free.parent(), from.parent()].into_iter().flatten().try_for_each(|folder| self.sync_folder(folder))
     }
 
-    /// Moves files that belong together, those that are there, under names that are free, in this order. All have their
-    /// new names before the first loses its old one, so that a kill leaves none alone in a place where it may be replaced.
-    fn move_away_together(&self, moves: &[(&Path, PathBuf)]) -> Result<(), StorageError> {
-        let mut moved = Vec::new();
-        for (from, to) in moves {
-            if self.exists(from)? {
-                let free = self.free_name(to)?;
-                // A folder has no second name, nor can what is damaged always be copied.
-                let has_both = self.link(from, &free).is_ok();
-                moved.push((*from, free, has_both));
-            }
-        }
-        let sync = |file: &Path| file.parent().map_or(Ok(()), |folder| self.sync_folder(folder));
-        moved.iter().try_for_each(|(_, free, _)| sync(free))?;
-        for (from, free, has_both) in moved {
-            if has_both {
-                self.remove(from)?;
-            } else {
-                self.rename(from, &free)?;
-                sync(&free)?;
-            }
-            sync(from)?;
-        }
-        Ok(())
-    }
-
     /// A name like this one that is free, in a folder that is there.
     fn free_name(&self, file: &Path) -> Result<PathBuf, StorageError> {
         file.parent().map_or(Ok(()), |folder| self.ensure_folder(folder))?;
@@ -195,26 +165,6 @@ pub trait Storage: Sync {
             }
             std::thread::sleep(LOCK_POLL);
         }
-    }
-}
-
-/// A folder, by its number in the file system. It stays open, so that no other folder gets the number.
-#[derive(Debug)]
-pub struct HeldFolder {
-    open: File,
-    number: (u64, u64),
-}
-
-impl HeldFolder {
-    /// When a name in it was changed last, by the clock of its file system.
-    pub fn modified(&self) -> io::Result<SystemTime> {
-        self.open.metadata()?.modified()
-    }
-}
-
-impl PartialEq for HeldFolder {
-    fn eq(&self, other: &Self) -> bool {
-        self.number == other.number
     }
 }
 
@@ -261,29 +211,10 @@ impl StorageError {
 /// What has the name of a file and is none.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 enum NoFile {
-    #[error("it is a folder, not a file")]
-    Folder,
-    #[error("it is a FIFO, not a regular file")]
-    Fifo,
-    #[error("it is a socket, not a regular file")]
-    Socket,
-    #[error("it is a device, not a regular file")]
-    Device,
+    #[error("it is no regular file, but a folder, a device, a FIFO or a socket")]
+    Irregular,
     #[error("it has more than {} MiB", MAX_WHOLE >> 20)]
     TooLong,
-}
-
-impl NoFile {
-    /// `None` for a regular file.
-    fn of(kind: FileType) -> Option<Self> {
-        #[cfg(unix)]
-        if kind.is_fifo() {
-            return Some(Self::Fifo);
-        } else if kind.is_socket() {
-            return Some(Self::Socket);
-        }
-        if kind.is_file() { None } else { Some(if kind.is_dir() { Self::Folder } else { Self::Device }) }
-    }
 }
 
 impl From<NoFile> for io::Error {
@@ -294,16 +225,16 @@ impl From<NoFile> for io::Error {
 
 /// Opens a regular file. A FIFO would make the program wait, and opening a device may have effects.
 fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    let is_regular = |kind: FileType| NoFile::of(kind).map_or(Ok(()), |what| Err(io::Error::from(what)));
+    let check = |metadata: Metadata| if metadata.is_file() { Ok(()) } else { Err(io::Error::from(NoFile::Irregular)) };
     match fs::metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => (),
-        metadata => is_regular(metadata?.file_type())?,
+        metadata => check(metadata?)?,
     }
     // Something else may have taken its place.
     #[cfg(unix)]
     options.custom_flags(libc::O_NONBLOCK);
     let file = options.open(path)?;
-    is_regular(file.metadata()?.file_type())?;
+    check(file.metadata()?)?;
     Ok(file)
 }
 
@@ -344,11 +275,6 @@ impl Storage for Disk {
         fs::rename(from, to).map_err(StorageError::at("move a file here", to))
     }
 
-    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        let copied = || fs::copy(from, to).and_then(|_| File::open(to)?.sync_all());
-        fs::hard_link(from, to).or_else(|_| copied()).map_err(StorageError::at("copy a file here", to))
-    }
-
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
         let copied = || -> io::Result<()> {
             let bytes = fs::read(from)?;
@@ -383,6 +309,12 @@ impl Storage for Disk {
         open_regular(File::options().read(true), file).map_err(StorageError::at("read", file))
     }
 
+    fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
+        // A network file system tells the truth about what is opened.
+        let opened = open_regular(File::options().read(true), path).or_else(|_| open_folder(path));
+        opened.and_then(|opened| opened.metadata()?.modified()).map_err(StorageError::at("look up", path))
+    }
+
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {
         match file.try_exists() {
             // What should be a folder on the way is a file.
@@ -399,24 +331,6 @@ impl Storage for Disk {
         match fs::remove_dir_all(folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             removed => removed.map_err(StorageError::at("remove", folder)),
-        }
-    }
-
-    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
-        exchange(one, other).map_err(StorageError::at("exchange folders with", one))
-    }
-
-    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
-        match held(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            held => held.map_err(StorageError::at("look up", folder)),
-        }
-    }
-
-    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
-        match fs::symlink_metadata(path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-            found => Ok(found.map_err(StorageError::at("look up", path))?.is_symlink()),
         }
     }
 
@@ -437,41 +351,9 @@ impl Storage for Disk {
     }
 }
 
-#[cfg(unix)]
-fn held(folder: &Path) -> io::Result<Option<HeldFolder>> {
-    use std::os::unix::fs::MetadataExt;
-    let open = File::open(folder)?;
-    let metadata = open.metadata()?;
-    Ok(Some(HeldFolder { number: (metadata.dev(), metadata.ino()), open }))
-}
-
-/// Elsewhere no folder takes the place of another, as none can be exchanged.
-#[cfg(not(unix))]
-fn held(_: &Path) -> io::Result<Option<HeldFolder>> {
-    Ok(None)
-}
-
-#[cfg(any(target_os = "linux", target_os = "macos"))]
-fn exchange(one: &Path, other: &Path) -> io::Result<()> {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    use rustix::io::Errno;
-    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).map_err(|error| match error {
-        // A file system that does not know the flag, or a kernel that does not know the call.
-        Errno::INVAL | Errno::NOSYS | Errno::NOTSUP => io::ErrorKind::Unsupported.into(),
-        error => error.into(),
-    })
-}
-
-#[cfg(not(any(target_os = "linux", target_os = "macos")))]
-fn exchange(_: &Path, _: &Path) -> io::Result<()> {
-    Err(io::ErrorKind::Unsupported.into())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeSet;
-    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn a_lock_is_refused_while_held_and_free_afterwards() {
@@ -501,39 +383,12 @@ mod tests {
                 Disk.lock(&path(name)).map(drop),
             ];
             for error in looked_at.map(Result::unwrap_err) {
-                assert!(error.is_no_file() && error.to_string().to_lowercase().contains(name), "{error}");
+                assert!(error.is_no_file() && error.to_string().contains(name), "{error}");
             }
         }
         assert!(Disk.sync_folder(&path("fifo")).unwrap_err().is_missing());
         File::create(path("long")).unwrap().set_len(1 << 40).unwrap();
         assert!(Disk.read(&path("long")).unwrap_err().is_no_file());
         assert!(Disk.read(&path("missing")).unwrap_err().is_missing());
-    }
-
-    #[test]
-    #[cfg(any(target_os = "linux", target_os = "macos"))]
-    fn exchanged_folders_are_there_at_every_instant() {
-        let root = tempfile::tempdir().unwrap();
-        let [one, other] = ["one", "other"].map(|name| root.path().join(name));
-        for folder in [&one, &other] {
-            fs::create_dir(folder).unwrap();
-            fs::write(folder.join(folder.file_name().unwrap()), "").unwrap();
-        }
-        let done = AtomicBool::new(false);
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                while !done.load(Ordering::Relaxed) {
-                    Disk.exchange(&one, &other).unwrap();
-                }
-            });
-            let there = (0..20_000).all(|_| one.exists() && other.exists());
-            done.store(true, Ordering::Relaxed);
-            assert!(there);
-        });
-        let names = |folder| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
-        assert_eq!(
-            BTreeSet::from([names(&one), names(&other)]),
-            BTreeSet::from([["one".into()], ["other".into()]].map(Vec::from))
-        );
     }
 }

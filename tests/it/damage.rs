@@ -70,20 +70,9 @@ fn swap(one: &Path, other: &Path) {
     fs::rename(aside, other).unwrap();
 }
 
-/// The compacted file of a table with the first two parts.
-fn compacted(root: &Path, table: &str) -> PathBuf {
-    let files = fs::read_dir(root.join("tables").join(table)).unwrap().map(|entry| entry.unwrap().path());
-    files.min().unwrap()
-}
-
 /// The directory of another sweep beside this one.
 fn other(root: &Path) -> PathBuf {
     root.with_file_name("other")
-}
-
-/// The same, compacted.
-fn other_compacted(root: &Path) -> PathBuf {
-    root.with_file_name("other-compacted")
 }
 
 const PARTS: &[Damage] = &[
@@ -126,11 +115,10 @@ const PARTS: &[Damage] = &[
     damage("a missing precursors file", "tables/precursors/part-001-000000.parquet", 1, |root| {
         fs::remove_file(path(root, "precursors", EXTENSION)).unwrap();
     }),
-    damage("a missing jobs file", "tables/jobs/part-000-000001.parquet", 1, |root| {
-        fs::remove_file(path(root, "jobs", SECOND)).unwrap();
-    }),
-    damage("a missing part", "tables/jobs/part-001-000000.parquet", 1, |root| {
-        in_all_tables(|table| fs::remove_file(path(root, table, EXTENSION)).unwrap());
+    damage("all tables but the jobs missing", "tables/slips/part-000-000000.parquet", 3, |root| {
+        for table in ["slips", "precursors"] {
+            fs::remove_dir_all(root.join("tables").join(table)).unwrap();
+        }
     }),
     damage("a missing table", "tables/precursors/part-000-000000.parquet", 3, |root| {
         fs::remove_dir_all(root.join("tables/precursors")).unwrap();
@@ -179,92 +167,50 @@ const PARTS: &[Damage] = &[
         fs::create_dir(root.join("tables/backup")).unwrap();
         fs::copy(path(root, "jobs", SECOND), path(root, "backup", SECOND)).unwrap();
     }),
-    damage("a manifest cut in half", "run/manifest.json", 0, |root| {
-        change(&root.join("run/manifest.json"), |bytes| bytes.truncate(bytes.len() / 2));
+    damage("an extension cut in half", "run/extension-000.json", 0, |root| {
+        change(&root.join("run/extension-000.json"), |bytes| bytes.truncate(bytes.len() / 2));
     }),
-    damage("a bit of the manifest's texts", "run/manifest.json", 0, |root| {
-        let path = root.join("run/manifest.json");
+    damage("a bit of an extension's texts", "run/extension-000.json", 0, |root| {
+        let path = root.join("run/extension-000.json");
         let text = fs::read_to_string(&path).unwrap();
         fs::write(path, text.replace("count = 3", "count = 4")).unwrap();
     }),
-    damage("a missing manifest", "run/manifest.json", 0, |root| {
-        fs::remove_file(root.join("run/manifest.json")).unwrap();
+    damage("a missing first extension", "run/extension-000.json", 0, |root| {
+        fs::remove_file(root.join("run/extension-000.json")).unwrap();
     }),
-    damage("the manifest of another directory", "run/manifest.json", 0, |root| {
-        fs::copy(other(root).join("run/manifest.json"), root.join("run/manifest.json")).unwrap();
+    damage("the extension of another directory", "run/extension-000.json", 0, |root| {
+        fs::copy(other(root).join("run/extension-000.json"), root.join("run/extension-000.json")).unwrap();
     }),
-    damage("a changed sweep file", "run/sweep-000.toml", 0, |root| {
-        fs::write(root.join("run/sweep-000.toml"), sweep("damaged", 7)).unwrap();
+    damage("an extension of random bytes", "run/extension-001.json", 0, |root| {
+        fs::write(root.join("run/extension-001.json"), [0xff, 0xfe, 0x00]).unwrap();
     }),
-    damage("a sweep file of random bytes", "run/sweep-001.toml", 0, |root| {
-        fs::write(root.join("run/sweep-001.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    damage("a missing last extension", "run/extension-001.json", 0, |root| {
+        fs::remove_file(root.join("run/extension-001.json")).unwrap();
     }),
-    damage("a missing sweep file", "run/sweep-000.toml", 0, |root| {
-        fs::remove_file(root.join("run/sweep-000.toml")).unwrap();
+    damage("all extensions missing", "run/extension-000.json", 0, |root| {
+        for number in [0, 1] {
+            fs::remove_file(root.join(format!("run/extension-00{number}.json"))).unwrap();
+        }
+    }),
+    damage("files of two extensions swapped", "run/extension-000.json", 0, |root| {
+        swap(&root.join("run/extension-000.json"), &root.join("run/extension-001.json"));
     }),
     #[cfg(unix)]
     damage("a FIFO in a file's place", "tables/slips/part-000-000001.parquet", 1, |root| {
         fifo(&path(root, "slips", SECOND));
     }),
     #[cfg(unix)]
-    damage("a FIFO in the manifest's place", "run/manifest.json", 0, |root| fifo(&root.join("run/manifest.json"))),
-    damage("a folder in the manifest's place", "run/manifest.json", 0, |root| {
-        fs::remove_file(root.join("run/manifest.json")).unwrap();
-        fs::create_dir_all(root.join("run/manifest.json/full")).unwrap();
+    damage("a FIFO in an extension's place", "run/extension-000.json", 0, |root| {
+        fifo(&root.join("run/extension-000.json"))
     }),
-    damage("a folder in a sweep file's place", "run/sweep-001.toml", 0, |root| {
-        fs::remove_file(root.join("run/sweep-001.toml")).unwrap();
-        fs::create_dir(root.join("run/sweep-001.toml")).unwrap();
+    damage("a folder in an extension's place", "run/extension-000.json", 0, |root| {
+        fs::remove_file(root.join("run/extension-000.json")).unwrap();
+        fs::create_dir_all(root.join("run/extension-000.json/full")).unwrap();
     }),
     #[cfg(unix)]
     damage("a FIFO among reduced data", "reduced/sets.parquet", 0, |root| fifo(&root.join("reduced/sets.parquet"))),
     damage("a bit of reduced data", "reduced/sets.parquet", 0, |root| {
         flip(&root.join("reduced/sets.parquet"), |length| length / 2);
-    }),
-];
-
-const COMPACTED: &[Damage] = &[
-    damage("a bit of compacted slips", "tables/slips/compact-000-000000-000001-", 2, |root| {
-        flip(&compacted(root, "slips"), |length| length / 2);
-    }),
-    damage("compacted jobs cut in half", "tables/jobs/compact-000-000000-000001-", 2, |root| {
-        change(&compacted(root, "jobs"), |bytes| bytes.truncate(bytes.len() / 2));
-    }),
-    damage("missing compacted precursors", "tables/precursors/compact-000-000000-000001-", 2, |root| {
-        fs::remove_file(compacted(root, "precursors")).unwrap();
-    }),
-    damage("missing compacted jobs", "tables/jobs/compact-000-000000-000001-", 2, |root| {
-        fs::remove_file(compacted(root, "jobs")).unwrap();
-    }),
-    damage("all compacted files of a sweep missing", "tables/jobs/part-000-000000.parquet", 2, |root| {
-        in_all_tables(|table| fs::remove_file(compacted(root, table)).unwrap());
-    }),
-    damage("all tables missing", "tables/jobs/part-001-000000.parquet", 3, |root| {
-        fs::remove_dir_all(root.join("tables")).unwrap();
-    }),
-    damage("compacted files in each other's place", "tables/slips/compact-000-000000-000001-", 2, |root| {
-        swap(&compacted(root, "slips"), &compacted(root, "precursors"));
-        let (slips, precursors) = (compacted(root, "slips"), compacted(root, "precursors"));
-        let names = [&slips, &precursors].map(|path| path.file_name().unwrap().to_owned());
-        fs::rename(&slips, slips.with_file_name(&names[1])).unwrap();
-        fs::rename(&precursors, precursors.with_file_name(&names[0])).unwrap();
-    }),
-    damage("a compacted file under the name of other parts", "tables/slips/compact-000-000000-000000-", 2, |root| {
-        let path = compacted(root, "jobs");
-        let name = path.file_name().unwrap().to_str().unwrap().replace("000000-000001", "000000-000000");
-        fs::rename(&path, path.with_file_name(name)).unwrap();
-    }),
-    damage("a compacted part back among the files", "tables/jobs/part-000-000001.parquet", 0, |root| {
-        let parts = root.with_file_name("parts");
-        fs::copy(path(&parts, "jobs", SECOND), path(root, "jobs", SECOND)).unwrap();
-    }),
-    damage("a compacted file of another directory", "tables/slips/compact-000-000000-000000-", 0, |root| {
-        let from = compacted(&other_compacted(root), "slips");
-        fs::copy(&from, path(root, "slips", from.file_name().unwrap().to_str().unwrap())).unwrap();
-    }),
-    damage("a compacted file of parts past the plan", "tables/slips/compact-000-000007-000009-", 0, |root| {
-        let name = "compact-000-000007-000009-0123456789abcdef.parquet";
-        fs::copy(compacted(root, "slips"), path(root, "slips", name)).unwrap();
     }),
 ];
 
@@ -290,7 +236,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
-/// A directory `parts`, and `compacted`, which is the same compacted; and both of another sweep.
+/// A directory `parts`, and `other` of another sweep.
 fn folder() -> Folder {
     let folder = Folder::new();
     folder.write("a.toml", &sweep("damaged", 2));
@@ -299,11 +245,7 @@ fn folder() -> Folder {
     folder.ends(0, "run a.toml --out parts --no-reduce");
     folder.ends(0, "run b.toml --out parts");
     folder.ends(0, "run c.toml --out other --no-reduce");
-    for (parts, compacted) in [("parts", "compacted"), ("other", "other-compacted")] {
-        copy_all(&folder.path(parts), &folder.path(compacted));
-        folder.ends(0, &format!("compact {compacted}"));
-    }
-    for directory in ["parts", "compacted", "other", "other-compacted"] {
+    for directory in ["parts", "other"] {
         let report = json(&folder.ends(0, &format!("verify {directory} --json")).stdout);
         assert_eq!(report["whole"], true, "{report}");
     }
@@ -328,7 +270,9 @@ fn damage_and_repair(folder: &Folder, whole: &str, damage: &Damage) {
     assert!(!commands.is_empty(), "{name}");
     for command in &commands {
         assert!(text.contains(command), "{name}: {command} is not in {text}");
-        folder.ends(0, command.strip_prefix("stickslip ").unwrap());
+        // A repair leaves parts to be run.
+        let ended = folder.run(command.strip_prefix("stickslip ").unwrap());
+        assert!(matches!(ended.code, Some(0 | 3)), "{name}: {command}: {ended:?}");
     }
     let after = folder.ends(0, "verify r").stdout;
     assert!(tables(folder, "r") == tables(folder, whole), "{name}: {commands:?}\n{text}\n{after}");
@@ -343,8 +287,40 @@ fn every_kind_of_damage_is_found_named_and_repaired_by_what_is_printed() {
     for damage in PARTS {
         damage_and_repair(&folder, "parts", damage);
     }
-    for damage in COMPACTED {
-        damage_and_repair(&folder, "compacted", damage);
+}
+
+#[test]
+fn a_part_that_is_gone_is_named_and_run_again() {
+    let folder = folder();
+    let whole = tables(&folder, "parts");
+    for missing in [&["jobs"][..], &TABLES] {
+        for table in missing {
+            fs::remove_file(path(&folder.path("parts"), table, EXTENSION)).unwrap();
+        }
+        let text = folder.ends(3, "verify parts").stdout;
+        assert!(text.contains("1 part, 1 job: part-001-000000") && text.contains("  stickslip run parts\n"), "{text}");
+        assert_eq!(json(&folder.ends(0, "run parts --json").stdout)["jobs_run"], 1);
+        assert!(tables(&folder, "parts") == whole);
+    }
+}
+
+#[test]
+fn a_missing_slips_file_ends_every_command_that_reads_it_with_code_4_and_run_makes_it_again() {
+    let folder = folder();
+    let whole = tables(&folder, "parts");
+    for table in ["slips", "precursors"] {
+        let missing = path(&folder.path("parts"), table, FIRST);
+        fs::remove_file(&missing).unwrap();
+        let commands: &[&str] = if table == "slips" { &["reduce parts", "report parts -o x.html"] } else { &[] };
+        for command in commands {
+            let ended = folder.ends(4, command);
+            let expected =
+                format!("parts/tables/{table}/{FIRST}: damaged: it is missing, though the jobs of its part are");
+            assert!(ended.stderr.contains(&expected), "{command}: {}", ended.stderr);
+        }
+        assert_eq!(json(&folder.ends(0, "status parts --json").stdout)["jobs_missing"], 1, "{table}");
+        assert_eq!(json(&folder.ends(0, "run parts --json").stdout)["jobs_run"], 1, "{table}");
+        assert!(tables(&folder, "parts") == whole, "{table}");
     }
 }
 
@@ -356,11 +332,11 @@ fn what_is_not_yet_done_is_no_damage() {
     // As a run leaves it that is killed between two files of a part.
     folder.ends(0, "run a.toml --out other --no-reduce");
     fs::copy(path(&folder.path("other"), "slips", FIRST), path(&folder.path("r"), "slips", FIRST)).unwrap();
-    let text = folder.ends(0, "verify r").stdout;
-    assert!(text.contains("not yet done  1 part, 1 job\ndamaged       nothing\n"), "{text}");
-    let report = json(&folder.ends(0, "verify r --json").stdout);
+    let text = folder.ends(3, "verify r").stdout;
+    assert!(text.contains("not there  1 part, 1 job: part-000-000000\ndamaged    nothing\n"), "{text}");
+    let report = json(&folder.ends(3, "verify r --json").stdout);
     assert_eq!((report["parts"].as_u64(), report["jobs"].as_u64()), (Some(1), Some(1)));
-    assert!(report["commands"].as_array().unwrap().is_empty(), "{report}");
+    assert_eq!(report["missing"][0], "part-000-000000", "{report}");
     // Readers see that file, so it must be whole nevertheless.
     flip(&path(&folder.path("r"), "slips", FIRST), |length| length / 2);
     let text = folder.ends(4, "verify r").stdout;

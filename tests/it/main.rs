@@ -4,13 +4,13 @@
 mod accuracy;
 mod bad_input;
 mod batch;
-mod compaction;
 mod damage;
 mod deterministic_rows;
 mod differential;
 mod drops;
 mod energy_ledger;
 mod equation_of_motion;
+mod export;
 mod failures;
 mod figures;
 mod first_steps;

@@ -262,7 +262,7 @@ fn damaged_data_end_with_code_4_and_the_file_and_its_remedy_works() {
         assert_eq!(report["jobs_run"].as_u64(), Some(437));
         assert!(folder.tables("r") == whole, "{table}");
     }
-    for (file, text) in [("run/manifest.json", "{"), ("run/sweep-000.toml", "name = \"other\"")] {
+    for (file, text) in [("run/extension-000.json", "{"), ("run/extension-000.json", "")] {
         let kept = fs::read(folder.path("r").join(file)).unwrap();
         folder.write(&format!("r/{file}"), text);
         for command in ["run many.toml --out r", "status r", "reduce r", "plot r"] {
@@ -285,11 +285,11 @@ fn a_pipe_gets_the_report_and_nothing_else() {
         "status r --json",
         "reduce r --json",
         "verify r --json",
-        "compact r --json",
+        "export r -o e --json",
         "simulate --set N=3 --slips 1 --json",
     ] {
         let format = match command.split(' ').next() {
-            Some("verify") => 3,
+            Some("verify") => 4,
             Some("status") => 2,
             _ => 1,
         };
@@ -327,8 +327,8 @@ fn the_help_of_every_command_holds_an_example() {
     let folder = Folder::new();
     assert!(folder.ends(0, "--help").stdout.contains("Exit codes: 0 done"));
     let commands = [
-        "", "init", "plan", "run", "batch", "status", "reduce", "plot", "report", "verify", "compact", "merge",
-        "simulate", "accuracy", "generate",
+        "", "init", "plan", "run", "batch", "status", "reduce", "plot", "report", "verify", "export", "simulate",
+        "accuracy", "generate",
     ];
     for command in commands {
         let help = folder.ends(0, &format!("{command} --help")).stdout;

@@ -120,47 +120,6 @@ fn shards_in_directories_of_their_own_reduce_what_is_there_and_report_what_is_mi
 }
 
 #[test]
-fn merged_shards_are_the_whole_and_what_does_not_belong_together_is_refused() {
-    let folder = Folder::new();
-    folder.write("many.toml", MANY);
-    folder.write("other.toml", &MANY.replace("28000", "27999"));
-    folder.ends(0, "run many.toml --out whole");
-    for shard in 1..=3 {
-        folder.ends(0, &format!("run many.toml --out shard-{shard} --shard {shard}/3 --no-reduce"));
-    }
-    folder.ends(0, "run other.toml --out other --no-reduce");
-    let before = folder.contents("shard-1");
-    for (command, reason) in [
-        ("merge shard-1 other -o r", "was run with other sweep files than shard-1"),
-        ("merge shard-1 -o other", "holds results of other sweep files"),
-        ("merge shard-1 missing -o r", "there is no such directory"),
-    ] {
-        let refused = folder.ends(2, command);
-        assert!(refused.stderr.contains(reason), "{}", refused.stderr);
-    }
-    let merged = |command: &str| json(&folder.ends(0, command).stdout);
-    let some = merged("merge shard-1 shard-2 -o r --json");
-    assert_eq!(some["jobs"].as_u64().unwrap() + some["jobs_missing"].as_u64().unwrap(), 28_000);
-    let rest = merged("merge shard-3 shard-1 -o r --json");
-    assert_eq!((rest["parts_missing"].as_u64(), rest["parts_there"].as_u64()), (Some(0), some["parts"].as_u64()));
-    assert!(folder.contents("shard-1") == before);
-    assert!(folder.ends(0, "run r").stdout.starts_with("jobs run         0, 0 failed"));
-    for results in ["tables", "reduced", "figures"] {
-        assert!(folder.contents(&format!("r/{results}")) == folder.contents(&format!("whole/{results}")), "{results}");
-    }
-    folder.ends(0, "verify r");
-    // A source that is damaged is named, and nothing of it is taken.
-    let part = folder.parts("shard-2", "slips")[1].clone();
-    fs::write(&part, "half a file").unwrap();
-    let damaged = folder.ends(4, "merge shard-2 -o again");
-    let name = part.file_name().unwrap().to_str().unwrap();
-    assert!(damaged.stderr.contains(&format!("shard-2/tables/slips/{name}: damaged")), "{}", damaged.stderr);
-    assert!(!folder.path(&format!("again/tables/jobs/{name}")).exists());
-    folder.ends(0, "compact shard-1");
-    assert!(folder.ends(2, "merge shard-1 -o again").stderr.contains("is compacted"));
-}
-
-#[test]
 fn a_shard_without_parts_has_nothing_to_reduce_and_says_so() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);

@@ -5,7 +5,7 @@
 
 use super::fault::{Fault, Operation};
 use crate::results::workers::BEAT_THREAD;
-use crate::table::storage::{HeldFolder, Lock, Sink, Storage, StorageError, StoredFile};
+use crate::table::storage::{Lock, Sink, Storage, StorageError, StoredFile};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs::File;
@@ -326,11 +326,6 @@ impl Storage for FaultyDisk {
         })
     }
 
-    /// Compaction meets its faults in `maintenance.rs`.
-    fn link(&self, _: &Path, to: &Path) -> Result<(), StorageError> {
-        Err(StorageError::at("link", to)(io::ErrorKind::Unsupported.into()))
-    }
-
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
         self.on(Operation::Create, to, |state| {
             let bytes = Arc::clone(state.file(from)?);
@@ -391,20 +386,6 @@ impl Storage for FaultyDisk {
             state.seen.retain(|path, _| !path.starts_with(folder));
             Ok(())
         })
-    }
-
-    /// Compaction meets its faults in `maintenance.rs`.
-    fn exchange(&self, one: &Path, _: &Path) -> Result<(), StorageError> {
-        Err(StorageError::at("exchange", one)(io::ErrorKind::Unsupported.into()))
-    }
-
-    /// Only an exchange puts another folder in the place of one.
-    fn hold(&self, _: &Path) -> Result<Option<HeldFolder>, StorageError> {
-        Ok(None)
-    }
-
-    fn is_link(&self, _: &Path) -> Result<bool, StorageError> {
-        Ok(false)
     }
 
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {

@@ -8,7 +8,7 @@
 
 use super::schedule::Schedule;
 use crate::results::workers::BEAT_THREAD;
-use crate::table::storage::{Disk, HeldFolder, Lock, Storage, StorageError, StoredFile};
+use crate::table::storage::{Disk, Lock, Storage, StorageError, StoredFile};
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::fs::File;
@@ -99,10 +99,6 @@ impl Storage for Host<'_> {
         self.change("rename", [from, to], || Disk.rename(from, to))
     }
 
-    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        self.change("link", [from, to], || Disk.link(from, to))
-    }
-
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
         self.change("link", [from, to], || Disk.link_new(from, to))
     }
@@ -156,20 +152,6 @@ impl Storage for Host<'_> {
 
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.change("remove", [folder, folder], || Disk.remove_folder(folder))
-    }
-
-    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
-        self.change("exchange", [one, other], || Disk.exchange(one, other))
-    }
-
-    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
-        self.turn("look up", folder)?;
-        Disk.hold(folder)
-    }
-
-    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
-        self.turn("look up", path)?;
-        Disk.is_link(path)
     }
 
     /// Network file systems are often mounted without locks.

@@ -13,10 +13,10 @@ use crate::model::Parameters;
 use crate::observe::{Measurements, Precursor, Slip};
 use crate::reduce::SetRow;
 use crate::results::ErrorKind;
-use crate::results::layout::part_name;
+use crate::results::layout::PartName;
 use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
 use crate::results::workers::SILENCE;
-use crate::results::workers::tests::leave;
+use crate::results::workers::tests::{leave, open};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::Job;
 use crate::table::columns::Row;
@@ -481,17 +481,17 @@ fn parts_of_a_dead_worker_elsewhere_are_taken_over_and_those_of_a_living_one_lef
     {
         let root = tempfile::tempdir().unwrap();
         let layout = Layout::new(&Disk, root.path());
-        let results = Results::open(&layout, &sweep(SEEDS, "")).unwrap();
-        leave(&layout, "worker-elsewhere", false, silent);
+        let results = open(&layout, &sweep(SEEDS, "")).unwrap();
+        leave(&layout, &sweep(SEEDS, ""), "worker-elsewhere", false, silent);
         fs::create_dir_all(layout.claims()).unwrap();
         for part in results.plan().parts().skip(1).take(2) {
-            fs::write(layout.claims().join(format!("{}.0", part_name(&part))), "worker-elsewhere").unwrap();
+            fs::write(layout.claims().join(format!("{}.0", PartName::from(&*part))), "worker-elsewhere").unwrap();
         }
         let done = AtomicBool::new(false);
         let report = std::thread::scope(|scope| {
             scope.spawn(|| {
                 while beats && !done.load(Ordering::Relaxed) {
-                    leave(&layout, "worker-elsewhere", false, Duration::ZERO);
+                    leave(&layout, &sweep(SEEDS, ""), "worker-elsewhere", false, Duration::ZERO);
                     std::thread::sleep(SILENCE / 20);
                 }
             });
@@ -608,7 +608,7 @@ fn events_account_for_every_job() {
 fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
     let root = tempfile::tempdir().unwrap();
     let (layout, stop) = (Layout::new(&Disk, root.path()), AtomicBool::new(false));
-    let results = Results::open(&layout, &sweep(SEEDS, "")).unwrap();
+    let results = open(&layout, &sweep(SEEDS, "")).unwrap();
     let parts: Vec<Outline> = results.plan().outlines().collect();
     let share = Share::look_up(&results, &parts, false).unwrap();
     assert_eq!(share.done_since().unwrap(), (0, 0.0));

@@ -1,6 +1,7 @@
 //! A schedule: processes do one operation on the disk at a time, in an order that a seed decides. One of them may be
-//! killed at an operation.
+//! killed at an operation, or suspended.
 
+use crate::results::workers::tests::lose;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::collections::BTreeSet;
@@ -17,6 +18,9 @@ struct State {
     /// Who is killed, and how many operations it does before.
     kill: Option<(usize, u64)>,
     killed: BTreeSet<usize>,
+    /// Who is suspended until all others have ended, and how many operations it does before.
+    freeze: Option<(usize, u64)>,
+    frozen: Option<usize>,
     log: Vec<(usize, &'static str)>,
 }
 
@@ -26,9 +30,12 @@ impl State {
         if self.turn.is_some() || self.waiting.is_empty() || self.waiting != self.running {
             return;
         }
-        let total: u64 = self.waiting.iter().map(|&process| self.weights[process]).sum();
+        let is_alone = self.running.len() == 1;
+        self.frozen.take_if(|_| is_alone);
+        let awake = || self.waiting.iter().copied().filter(|process| Some(*process) != self.frozen);
+        let total: u64 = awake().map(|process| self.weights[process]).sum();
         let mut left = self.random.next_u64() % total;
-        self.turn = self.waiting.iter().copied().find(|&process| {
+        self.turn = awake().find(|&process| {
             let weight = self.weights[process];
             let is_it = left < weight;
             left = left.saturating_sub(weight);
@@ -47,11 +54,13 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at most.
-    pub fn new(seed: u64, processes: usize, kill_before: Option<u64>) -> Self {
+    /// Schedules `processes`. With `kill_before`, one of them is killed at one of its first operations, this number at most;
+    /// with `freeze_before`, the first is suspended likewise, for so long that others take it for dead.
+    pub fn new(seed: u64, processes: usize, kill_before: Option<u64>, freeze_before: Option<u64>) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let weights = (0..processes).map(|_| 1 << (random.next_u64() % 8)).collect();
         let kill = kill_before.map(|below| (random_index(&mut random, processes), random.next_u64() % below));
+        let freeze = freeze_before.map(|below| (0, random.next_u64() % below));
         let state = State {
             random,
             weights,
@@ -60,6 +69,8 @@ impl Schedule {
             turn: None,
             kill,
             killed: BTreeSet::new(),
+            freeze,
+            frozen: None,
             log: Vec::new(),
         };
         Self { state: Mutex::new(state), turned: Condvar::new() }
@@ -73,6 +84,14 @@ impl Schedule {
     pub fn turn(&self, process: usize, action: &'static str) -> io::Result<()> {
         self.outside(process)?;
         let mut state = self.state();
+        if let Some((_, left)) = state.freeze.as_mut().filter(|(victim, _)| *victim == process) {
+            if *left == 0 {
+                (state.freeze, state.frozen) = (None, Some(process));
+                lose(std::thread::current().id());
+            } else {
+                *left -= 1;
+            }
+        }
         state.waiting.insert(process);
         state.choose();
         self.turned.notify_all();

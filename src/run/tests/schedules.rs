@@ -1,5 +1,6 @@
 //! Several processes on one directory, whose operations on the disk are interleaved as a seed decides, with caches as of
-//! a network file system or without. Whatever the order, and whoever is killed: nothing is lost, done twice, moved or
+//! a network file system or without. Whatever the order, whoever is killed, and whoever is suspended and wakes when others
+//! have taken over its work: nothing is lost, done twice, moved or
 //! reported as damaged, and the end is the same bytes.
 
 use super::faults::{files_below, results, small_sweep, small_sweep_in_rounds};
@@ -7,9 +8,10 @@ use super::host::Host;
 use super::schedule::{Schedule, random_index};
 use super::*;
 use crate::reduce::{NoJobs, reduce};
-use crate::results::commit::tests::KNOWN_NUMBER;
+use crate::results::commit::tests::{KNOWN_NUMBER, own_number};
 use crate::results::tables::Names;
 use crate::results::verify::{Remedy, Verification};
+use crate::table::file::Format;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -27,8 +29,8 @@ const SCHEDULES: u64 = 150;
 const WANTED: &str = "STICKSLIP_SCHEDULES";
 /// Operations of a process within which it is killed.
 const KILL_BEFORE: u64 = 250;
-/// Parts of a compacted file.
-const PARTS_PER_FILE: u64 = 2;
+/// Operations of a process within which it is suspended.
+const FREEZE_BEFORE: u64 = 150;
 
 /// What is in the directory before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,7 +40,6 @@ enum There {
     StoppedRun,
     /// All jobs of the sweep with fewer seeds.
     FewerJobs,
-    Compacted,
     AllJobs,
 }
 
@@ -47,7 +48,9 @@ enum Process {
     Run,
     /// A run that is stopped after some jobs.
     StoppedRun,
-    Compact,
+    /// A run of the sweep with fewer seeds.
+    RunFewer,
+    Export,
     Repair,
     Verify,
     Reduce,
@@ -61,21 +64,30 @@ type Runs = Mutex<BTreeMap<(u64, u64), usize>>;
 const STOP_AFTER: u64 = 3;
 
 impl Process {
-    const ALL: [Self; 7] =
-        [Self::Run, Self::StoppedRun, Self::Compact, Self::Repair, Self::Verify, Self::Reduce, Self::Read];
+    const ALL: [Self; 8] = [
+        Self::Run,
+        Self::StoppedRun,
+        Self::RunFewer,
+        Self::Export,
+        Self::Repair,
+        Self::Verify,
+        Self::Reduce,
+        Self::Read,
+    ];
 
     fn act(self, layout: &Layout<'_>, in_rounds: bool, runs: &Runs) -> anyhow::Result<()> {
         match self {
             Self::Run => run_some(layout, (SEEDS, in_rounds), None, runs).map(|_| ()),
             Self::StoppedRun => run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), runs).map(|_| ()),
-            Self::Compact => Ok(Results::read(layout)?.compact_by(PARTS_PER_FILE).map(|_| ())?),
+            Self::RunFewer => run_some(layout, (FEWER, in_rounds), None, runs).map(|_| ()),
+            Self::Export => {
+                let folder = layout.root().with_file_name(format!("export-{:016x}", own_number()));
+                Ok(Results::read(layout)?.export(&folder, Format::Arrow, &mut |_, _| ()).map(|_| ())?)
+            }
             Self::Repair => assert_sound(&Results::repair(layout)?),
             Self::Verify => assert_sound(&Results::verify(layout)?),
             Self::Reduce => Ok(reduce(&Results::read(layout)?).map(|_| ())?),
-            Self::Read => layout.read_tables(|| {
-                layout.dataset("jobs")?.rows::<Names>().try_for_each(|batch| batch.map(drop))?;
-                Ok(())
-            })?,
+            Self::Read => Ok(layout.dataset("jobs")?.rows::<Names>().try_for_each(|batch| batch.map(drop))?),
         }
     }
 }
@@ -115,7 +127,7 @@ fn run_some(
 }
 
 impl There {
-    const ALL: [Self; 5] = [Self::Nothing, Self::StoppedRun, Self::FewerJobs, Self::Compacted, Self::AllJobs];
+    const ALL: [Self; 4] = [Self::Nothing, Self::StoppedRun, Self::FewerJobs, Self::AllJobs];
 
     fn prepare(self, layout: &Layout<'_>, in_rounds: bool) -> anyhow::Result<()> {
         let runs = Runs::default();
@@ -124,11 +136,8 @@ impl There {
             Self::StoppedRun => {
                 assert!(run_some(layout, (SEEDS, in_rounds), Some(STOP_AFTER), &runs)?.jobs_spilled > 0);
             }
-            Self::FewerJobs | Self::Compacted => {
+            Self::FewerJobs => {
                 run_some(layout, (FEWER, in_rounds), None, &runs)?;
-                if self == Self::Compacted {
-                    assert!(Results::read(layout)?.compact_by(PARTS_PER_FILE)?.changed);
-                }
             }
             Self::AllJobs => {
                 run_some(layout, (SEEDS, in_rounds), None, &runs)?;
@@ -139,7 +148,7 @@ impl There {
 }
 
 /// A folder where syncs cost nothing, if there is such a place.
-fn folder() -> tempfile::TempDir {
+pub(super) fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap()
 }
 
@@ -150,13 +159,12 @@ fn write_files(root: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
     }
 }
 
-/// Completes a directory alone: runs, compacts, reduces; its files, and the jobs that were missing.
+/// Completes a directory alone: runs, reduces; its files, and the jobs that were missing.
 fn complete(root: &Path, in_rounds: bool, runs: &Runs) -> anyhow::Result<BTreeMap<PathBuf, Vec<u8>>> {
     let layout = Layout::new(&Disk, root);
     let report = run_some(&layout, (SEEDS, in_rounds), None, runs)?;
     anyhow::ensure!((report.jobs_failed, report.jobs_left) == (0, 0), "{report:?}");
     let results = Results::read(&layout)?;
-    results.compact_by(PARTS_PER_FILE)?;
     reduce(&results)?;
     anyhow::ensure!(Results::verify(&layout)?.whole, "it is not whole");
     Ok(files_below(root))
@@ -184,14 +192,19 @@ static TRIALS: LazyLock<BTreeMap<(There, bool), Trial>> = LazyLock::new(|| {
 });
 
 /// Whether a process of these may end with this error, though nothing has befallen it.
-fn is_allowed(error: &anyhow::Error, process: Process, processes: &[Process], there: There) -> bool {
-    let (is_run, is_change) = (
-        |process: &Process| matches!(process, Process::Run | Process::StoppedRun),
-        |process: &Process| matches!(process, Process::Compact | Process::Repair),
-    );
+fn is_allowed(error: &anyhow::Error, process: Process, processes: &[Process], there: There, is_frozen: bool) -> bool {
+    let is_run = matches!(process, Process::Run | Process::StoppedRun | Process::RunFewer);
     if let Some(error) = error.downcast_ref::<ResultsError>() {
-        let is_busy = error.kind == ErrorKind::Busy && (!is_run(&process) || processes.iter().any(is_change));
-        return is_busy || (error.kind == ErrorKind::Refused && there == There::Nothing && !is_run(&process));
+        let has_other_sweep = processes.contains(&Process::RunFewer);
+        return match error.kind {
+            ErrorKind::Busy => is_run && has_other_sweep,
+            ErrorKind::Refused => {
+                (there == There::Nothing && !is_run)
+                    || (is_run && has_other_sweep && error.problem.contains("meanwhile"))
+            }
+            ErrorKind::Stopped => is_frozen,
+            _ => false,
+        };
     }
     error.is::<NoJobs>()
 }
@@ -203,18 +216,20 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
     let there = There::ALL[below(There::ALL.len())];
     let mut processes = vec![Process::Run];
     processes.extend((0..=below(2)).map(|_| Process::ALL[below(Process::ALL.len())]));
-    let (has_caches, is_killing, in_rounds) = (below(2) == 0, below(3) == 0, below(3) == 0);
+    let (has_caches, is_killing, in_rounds, is_freezing) = (below(2) == 0, below(3) == 0, below(3) == 0, below(3) == 0);
     let case = format!(
-        "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}{}",
+        "{WANTED}=1:{seed}: {processes:?} on {there:?}{}{}{}{}",
         if has_caches { ", with caches" } else { "" },
         if is_killing { ", one is killed" } else { "" },
+        if is_freezing { ", the first is suspended" } else { "" },
         if in_rounds { ", in rounds" } else { "" }
     );
     let trial = &TRIALS[&(there, in_rounds)];
     let (folder, runs) = (folder(), Runs::default());
     let root = folder.path().join("small");
     write_files(&root, &trial.before);
-    let schedule = Schedule::new(seed, processes.len(), is_killing.then_some(KILL_BEFORE));
+    let schedule =
+        Schedule::new(seed, processes.len(), is_killing.then_some(KILL_BEFORE), is_freezing.then_some(FREEZE_BEFORE));
     let is_any_killed = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..processes.len())
             .map(|number| {
@@ -229,26 +244,42 @@ fn go_through(seed: u64) -> Vec<(usize, &'static str)> {
             })
             .collect();
         let mut is_any_killed = false;
-        for (thread, process) in threads.into_iter().zip(&processes) {
+        for (number, (thread, process)) in threads.into_iter().zip(&processes).enumerate() {
             let (acted, is_killed) = thread.join().unwrap();
             is_any_killed |= is_killed;
             let acted = acted.unwrap_or_else(|_| panic!("{case}: {process:?} panicked"));
             if let Err(error) = acted
                 && !is_killed
             {
-                assert!(is_allowed(&error, *process, &processes, there), "{case}: {process:?} ends with: {error:#}");
+                let is_frozen = is_freezing && number == 0;
+                let is_allowed = is_allowed(&error, *process, &processes, there, is_frozen);
+                assert!(is_allowed, "{case}: {process:?} ends with: {error:#}");
             }
         }
         is_any_killed
     });
     let completed =
         complete(&root, in_rounds, &runs).unwrap_or_else(|error| panic!("{case}: cannot be completed: {error:#}"));
-    let differing: Vec<_> = completed.iter().filter(|(path, bytes)| trial.after.get(*path) != Some(bytes)).collect();
-    let differing: Vec<_> = differing.iter().map(|(path, _)| path).collect();
-    assert!(results(&completed) == results(&trial.after), "{case}: {differing:?}");
-    if !is_any_killed {
-        assert_eq!(runs.into_inner().unwrap(), trial.missing, "{case}");
+    let ids = |of: &BTreeMap<PathBuf, Vec<u8>>| {
+        let folder = self::folder();
+        write_files(folder.path(), of);
+        let mut ids = texts(folder.path(), "jobs", "job_id");
+        ids.sort();
+        (ids, texts(folder.path(), "slips", "job_id").len())
+    };
+    let runs = runs.into_inner().unwrap();
+    if processes.contains(&Process::RunFewer) {
+        // Extensions are others, but every job is there once.
+        assert!(ids(&completed) == ids(&trial.after), "{case}");
+    } else {
+        let differing = completed.iter().filter(|(path, bytes)| trial.after.get(*path) != Some(bytes));
+        let differing: Vec<_> = differing.map(|(path, _)| path).collect();
+        assert!(results(&completed) == results(&trial.after), "{case}: {differing:?}");
+        if !is_any_killed && !is_freezing {
+            assert_eq!(runs, trial.missing, "{case}");
+        }
     }
+    assert!(runs.values().all(|&times| times <= 2), "{case}: {runs:?}");
     schedule.log()
 }
 

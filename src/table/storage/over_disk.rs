@@ -1,6 +1,6 @@
 //! Disks of tests: that of the operating system, but for what a test says otherwise.
 
-use super::{Disk, HeldFolder, Lock, Sink, Storage, StorageError, StoredFile};
+use super::{Disk, Lock, Sink, Storage, StorageError, StoredFile};
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
@@ -29,10 +29,6 @@ pub trait OverDisk: Sync {
         Box::new(file)
     }
 
-    fn exchange_folders(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
-        Disk.exchange(one, other)
-    }
-
     fn try_lock(&self, file: &Path) -> Result<Lock, StorageError> {
         Disk.lock(file)
     }
@@ -51,10 +47,6 @@ impl<T: OverDisk> Storage for T {
     fn rename(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
         self.before(Access::Change).map_err(StorageError::at("move a file here", to))?;
         Disk.rename(from, to)
-    }
-    fn link(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("copy a file here", to))?;
-        Disk.link(from, to)
     }
     fn link_new(&self, from: &Path, to: &Path) -> Result<bool, StorageError> {
         self.before(Access::Change).map_err(StorageError::at("create", to))?;
@@ -83,18 +75,6 @@ impl<T: OverDisk> Storage for T {
     fn remove_folder(&self, folder: &Path) -> Result<(), StorageError> {
         self.before(Access::Change).map_err(StorageError::at("remove", folder))?;
         Disk.remove_folder(folder)
-    }
-    fn exchange(&self, one: &Path, other: &Path) -> Result<(), StorageError> {
-        self.before(Access::Change).map_err(StorageError::at("exchange folders with", one))?;
-        self.exchange_folders(one, other)
-    }
-    fn hold(&self, folder: &Path) -> Result<Option<HeldFolder>, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("look up", folder))?;
-        Disk.hold(folder)
-    }
-    fn is_link(&self, path: &Path) -> Result<bool, StorageError> {
-        self.before(Access::Look).map_err(StorageError::at("look up", path))?;
-        Disk.is_link(path)
     }
     fn lock(&self, file: &Path) -> Result<Lock, StorageError> {
         self.before(Access::Look).map_err(StorageError::at("lock", file))?;

@@ -5,15 +5,14 @@
 //! others are at.
 
 use crate::results::claims::{Claims, Standing};
-use crate::results::layout::part_name;
-use crate::results::parts::{DoneParts, Unfinished};
+use crate::results::layout::PartName;
+use crate::results::pending::{Again, PartState, Pending};
 use crate::results::tables;
 use crate::results::workers::{Living, Member};
 use crate::results::{Results, ResultsError};
 use crate::run::walltime::Walltime;
-use crate::sweep::{Extension, Outline, Part};
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
+use crate::sweep::{Outline, Part};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 use std::vec::IntoIter;
@@ -31,13 +30,8 @@ pub(super) struct Share<'a> {
     pub parts: &'a [Outline],
     /// Whether failed jobs are to be run again.
     retry_failed: bool,
-    pub done: DoneParts,
-    /// The parts of which jobs are spilled.
-    spilled: RefCell<HashSet<(usize, u64)>>,
+    pub pending: Pending<'a>,
 }
-
-/// Positions of the jobs of a part that may run again.
-pub(super) type Again = BTreeMap<usize, Unfinished>;
 
 /// A part that this worker has taken.
 #[derive(Debug)]
@@ -81,8 +75,7 @@ pub(super) struct Left {
 impl<'a> Share<'a> {
     /// Looks up which of these parts are done.
     pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
-        let (done, spilled) = (results.done_parts()?, RefCell::new(results.spilled_parts()?));
-        Ok(Self { results, parts, retry_failed, done, spilled })
+        Ok(Self { results, parts, retry_failed, pending: Pending::look_up(results)? })
     }
 
     /// The part of an outline.
@@ -92,30 +85,13 @@ impl<'a> Share<'a> {
 
     /// Whether a part that is done may have jobs to be run.
     pub fn may_run_again(&self) -> bool {
-        let max_time = |extension: &Extension| extension.sweep.recording().max_time;
-        self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
-    }
-
-    /// A part that is done, with those of its jobs that may run again and are asked for; `None` if no job may.
-    pub fn unfinished(&self, part: &Outline) -> Result<Option<(Part, Again)>, ResultsError> {
-        let unfinished = self.results.unfinished(&self.done, part)?.filter(|unfinished| !unfinished.is_empty());
-        Ok(unfinished.map(|mut unfinished| {
-            let part = self.part(part);
-            unfinished.retain(|&position, _| self.results.wants(&part, &part.jobs[position]));
-            (part, unfinished)
-        }))
-    }
-
-    /// Positions of the jobs of a part that are spilled, if it is one of which some are; `None` if that cannot be seen yet.
-    pub fn spilled(&self, part: &Outline) -> Result<Option<BTreeSet<usize>>, ResultsError> {
-        let is_spilled = self.spilled.borrow().contains(&(part.extension, part.index));
-        if is_spilled { self.results.spilled(&self.part(part)) } else { Ok(Some(BTreeSet::new())) }
+        self.retry_failed || self.pending.may_have_cut_off()
     }
 
     /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
     pub fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let new = self.parts.iter().filter(|part| done.has(part) && !self.done.has(part));
+        let new = self.parts.iter().filter(|part| done.has(part) && !self.pending.done.has(part));
         Ok(new.fold((0, 0.0), |(jobs, cost), part| (jobs + part.job_count as u64, cost + part.cost)))
     }
 
@@ -127,7 +103,7 @@ impl<'a> Share<'a> {
         let mut left = Left::default();
         for part in self.parts.iter().filter(|part| !done.has(part)) {
             left.jobs += part.job_count as u64;
-            match claims.standing(&part_name(part), &others)? {
+            match claims.standing(&PartName::from(part).to_string(), &others)? {
                 Standing::Taken(owner) => {
                     left.hosts.insert(others[owner].worker.host.clone());
                 }
@@ -161,7 +137,7 @@ pub(super) struct Work<'a> {
 impl<'a> Work<'a> {
     pub fn new(share: &'a Share<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
         let (others, claims) = (member.others()?, Claims::list(share.results, member)?);
-        let parts = share.parts.iter().filter(|part| !share.done.has(part) || share.may_run_again());
+        let parts = share.parts.iter().filter(|part| !share.pending.done.has(part) || share.may_run_again());
         let mut pass: Vec<&Outline> = parts.collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
@@ -228,15 +204,12 @@ impl<'a> Work<'a> {
     /// Takes a part in the first pass: one that nobody has claimed; or one that is done, if its jobs may run again and
     /// nobody is at it.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
-        let name = part_name(outline);
-        if !self.share.done.has(outline) {
-            return Ok(self.claims.last(&name).is_none() && self.take_missing(outline, 0)?);
+        let name = PartName::from(outline).to_string();
+        if !self.share.pending.done.has(outline) {
+            return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
-        let Some((part, unfinished)) = self.share.unfinished(outline)? else { return Ok(false) };
-        let again = unfinished.into_iter().map(|(position, why)| (position, why != Unfinished::Cut));
-        let again: Vec<_> = again.filter(|&(_, failed)| self.share.retry_failed || !failed).collect();
         match self.claims.standing(&name, &self.others)? {
-            Standing::Free(generation) if !again.is_empty() => self.take(part, BTreeSet::new(), again, generation),
+            Standing::Free(generation) => self.take_part(outline, generation),
             _ => Ok(false),
         }
     }
@@ -247,11 +220,11 @@ impl<'a> Work<'a> {
         // In this order: who has ended has committed or spilled before.
         let others = self.member.others()?;
         self.claims.refresh()?;
-        *self.share.spilled.borrow_mut() = self.share.results.spilled_parts()?;
+        self.share.pending.look_at_spill()?;
         let done = self.share.results.done_parts()?;
         let mut is_certain = true;
         for part in self.share.parts.iter().filter(|part| !done.has(part)) {
-            match self.claims.standing(&part_name(part), &others)? {
+            match self.claims.standing(&PartName::from(part).to_string(), &others)? {
                 Standing::Own => (),
                 Standing::Taken(owner) => {
                     let Living { beat, is_certain: is_known, .. } = &others[owner];
@@ -261,7 +234,9 @@ impl<'a> Work<'a> {
                 Standing::Free(generation) => {
                     // If it goes to another, the next look decides.
                     is_certain = false;
-                    if self.take_missing(part, generation)? || self.walltime.has_refused() {
+                    // Its owner may be suspended, and must not commit it later.
+                    self.member.tidy()?;
+                    if self.take_part(part, generation)? || self.walltime.has_refused() {
                         break;
                     }
                 }
@@ -270,13 +245,20 @@ impl<'a> Work<'a> {
         Ok(is_certain)
     }
 
-    /// Takes the jobs of a part that is not done, but for those that are spilled.
-    fn take_missing(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        // A later look decides on what cannot be seen yet.
-        let Some(spilled) = self.share.spilled(outline)? else { return Ok(false) };
-        let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
-        let jobs = left.map(|position| (position, false)).collect();
-        self.take(self.share.part(outline), spilled, jobs, generation)
+    /// Takes what is to be run of a part.
+    fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
+        match self.share.pending.state(outline)? {
+            PartState::Missing { spilled } => {
+                let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
+                let jobs = left.map(|position| (position, false)).collect();
+                self.take(self.share.part(outline), spilled, jobs, generation)
+            }
+            PartState::Done { again } => {
+                let again = again.into_iter().map(|(position, why)| (position, why != Again::CutOff));
+                let jobs: Vec<_> = again.filter(|&(_, failed)| self.share.retry_failed || !failed).collect();
+                Ok(!jobs.is_empty() && self.take(self.share.part(outline), BTreeSet::new(), jobs, generation)?)
+            }
+        }
     }
 
     /// Claims a part, if there is time for it. `jobs` are those to be run, each with whether it has failed before.
@@ -290,7 +272,7 @@ impl<'a> Work<'a> {
         if !self.walltime.admits_part() {
             return Ok(false);
         }
-        if !self.claims.take(&part_name(&part), generation)? {
+        if !self.claims.take(&PartName::from(&*part).to_string(), generation)? {
             self.losses += 1;
             if self.losses == LOSSES {
                 self.losses = 0;
@@ -298,7 +280,7 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
-        let again = self.share.done.has(&part);
+        let again = self.share.pending.done.has(&part);
         let taken = Arc::new(Taken { part, spilled, again, together: jobs.len(), begin: Instant::now() });
         let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
         self.jobs.extend(jobs.into_iter().map(job));

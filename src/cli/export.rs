@@ -1,0 +1,75 @@
+//! `stickslip export`: the tables of a results directory as a few large files, for other tools.
+
+use super::exit::Exit;
+use super::output;
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::table::file::Format;
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Write the tables of a results directory to a folder: one file each, every row with all swept parameters
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  stickslip export results/fig3 -o fig3-tables
+  stickslip export results/fig3 -o fig3-csv --format csv     for spreadsheets
+
+The same jobs give the same bytes, whatever runs and interruptions came before. The directory is not changed.")]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// Folder to write to; it must be empty, and is made if need be
+    #[arg(long, short, value_name = "FOLDER")]
+    out: PathBuf,
+    #[arg(long, value_enum, default_value = "parquet")]
+    format: FormatName,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FormatName {
+    Parquet,
+    Csv,
+    Arrow,
+}
+
+/// Version of the JSON.
+const FORMAT: u32 = 1;
+
+pub fn export(arguments: &Arguments) -> Result<Exit> {
+    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let format = match arguments.format {
+        FormatName::Parquet => Format::Parquet,
+        FormatName::Csv => Format::Csv,
+        FormatName::Arrow => Format::Arrow,
+    };
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
+    bar.set_style(ProgressStyle::with_template("{wide_bar} {percent} % of the parts, {eta} left")?);
+    let exported = results.export(&arguments.out, format, &mut |done, total| {
+        bar.set_length(total);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    if arguments.json {
+        output::json(FORMAT, &exported)?;
+        return Ok(Exit::Done);
+    }
+    for file in &exported.files {
+        let (rows, megabytes) = (output::count(file.rows, "row"), file.bytes as f64 / 1e6);
+        output::print(&format!("{}  {rows}, {megabytes:.1} MB\n", shown(&arguments.out.join(&file.name))))?;
+    }
+    if exported.jobs_missing > 0 {
+        let jobs = output::count(exported.jobs_missing, "job");
+        output::report(&format!("exported what is there: {jobs} are missing; stickslip run continues with them"));
+    }
+    Ok(Exit::Done)
+}

@@ -1,0 +1,320 @@
+//! A results directory that fits this program: opened once, valid from then on.
+
+use crate::results::commit::Commit;
+use crate::results::error::ResultsError;
+use crate::results::extension_file::{self, Record};
+use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
+use crate::results::tables;
+use crate::results::workers::Member;
+use crate::sweep::{Extension, Outline, Part, Plan, Round, Sweep};
+use crate::table::file::Footer;
+use crate::table::storage::StorageError;
+use std::collections::HashSet;
+use std::io::ErrorKind;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
+/// for, since other processes may be at work on it.
+#[derive(Clone, Debug)]
+pub struct Results<'a> {
+    layout: Layout<'a>,
+    records: Vec<Record>,
+    /// At least one; the last is that of the sweep that was asked for last.
+    extensions: Vec<Extension>,
+}
+
+/// What is wrong with a name in the folder of a table that no part has.
+const STRANGER: &str =
+    "is no part of this directory's sweeps, and readers of the folder would take it for one; move it elsewhere";
+
+impl<'a> Results<'a> {
+    /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
+    /// Nothing is written if the directory is refused.
+    pub fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        let layout = member.layout();
+        loop {
+            let found = Self::look(layout, sweep)?;
+            if found.is_of(sweep) {
+                return Ok(found);
+            }
+            // In this order: a worker that was taken for dead and lives can commit nothing any more, and what it has left of
+            // parts that are not done must not stay, since their jobs now belong to the new sweep.
+            member.tidy()?;
+            let done = found.done_parts()?;
+            found.remove_unfinished(&done)?;
+            if let Some(begun) = found.extended(sweep, &done).write_last(member)? {
+                return Ok(begun);
+            }
+        }
+    }
+
+    /// Refuses a directory that a sweep cannot be run in; nothing is written.
+    pub fn check(layout: &Layout<'a>, sweep: &Sweep) -> Result<(), ResultsError> {
+        Self::look(layout, sweep)?.done_parts().map(drop)
+    }
+
+    /// The directory of a sweep as a run would find it; nothing is written.
+    pub fn preview(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        let found = Self::look(layout, sweep)?;
+        if found.is_of(sweep) { Ok(found) } else { Ok(found.extended(sweep, &found.done_parts()?)) }
+    }
+
+    /// Reads a directory as it is.
+    pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
+        let results = Self::new(layout, extension_file::read(layout)?)?;
+        if results.records.is_empty() {
+            return Err(layout.no_results());
+        }
+        results.refuse(&results.version_differences(), "use the program that wrote it")?;
+        Ok(results)
+    }
+
+    /// The directory of these records.
+    pub(super) fn new(layout: &Layout<'a>, records: Vec<Record>) -> Result<Self, ResultsError> {
+        let extensions = extension_file::extensions(layout, &records)?;
+        Ok(Self { layout: layout.clone(), records, extensions })
+    }
+
+    /// Looks into a directory that a sweep is to be run in; one without extensions is fresh.
+    fn look(layout: &Layout<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+        // In this order: another run may begin in between.
+        let is_fresh = is_fresh(layout)?;
+        let found = Self::new(layout, extension_file::read(layout)?)?;
+        if found.records.is_empty() {
+            if layout.root().is_symlink() && !layout.root().exists() {
+                let problem = "is a link that leads nowhere; remove it, or choose another with --out";
+                return Err(ResultsError::refused(layout.root(), problem));
+            }
+            if is_fresh {
+                return Ok(found);
+            }
+            let problem = "is neither empty nor a results directory (there is no run/extension-000.json); choose another \
+                           with --out, or see what `stickslip verify` says of it";
+            return Err(ResultsError::refused(layout.root(), problem));
+        }
+        let mut differences = found.version_differences();
+        differences.extend(found.sweep().difference(sweep).iter().map(ToString::to_string));
+        found.refuse(&differences, "choose another directory with --out, or undo the change")?;
+        Ok(found)
+    }
+
+    /// Whether this sweep was the one asked for last.
+    pub(super) fn is_of(&self, sweep: &Sweep) -> bool {
+        self.extensions.last().is_some_and(|last| last.sweep.text() == sweep.text())
+    }
+
+    /// In what versions differ from those of this program. There is one extension at least.
+    pub(super) fn version_differences(&self) -> Vec<String> {
+        let all = self.records.iter().zip(&self.extensions);
+        all.map(|(record, extension)| record.difference(&extension.sweep)).max_by_key(Vec::len).unwrap_or_default()
+    }
+
+    /// Refuses a directory that differs in something, with the way out.
+    pub(super) fn refuse(&self, differences: &[String], way_out: &str) -> Result<(), ResultsError> {
+        if differences.is_empty() {
+            return Ok(());
+        }
+        let differences = differences.join("\n  ");
+        let problem = format!("holds other results, nothing was changed:\n  {differences}\n{way_out}");
+        Err(ResultsError::refused(self.layout.root(), problem))
+    }
+
+    /// The same with this sweep after the others: what is done stays where it is; what is not belongs to the new sweep, or to
+    /// none. Walks through the plan.
+    fn extended(&self, sweep: &Sweep, done: &DoneParts) -> Self {
+        let last = self.extensions.len().checked_sub(1);
+        let kept = last.map(|last| Plan::new(&self.extensions).ranges(last, |part| done.has(part)));
+        self.followed_by(kept, |earlier| Extension::new(sweep, earlier))
+    }
+
+    /// The same with the next round of its sweep, all parts of the last being done.
+    pub(super) fn in_next_round(&self, round: Round) -> Self {
+        self.followed_by(None, |earlier| Extension::next_round(self.sweep(), earlier, round))
+    }
+
+    fn followed_by(
+        &self,
+        kept: Option<Vec<RangeInclusive<u64>>>,
+        extension: impl FnOnce(&[Extension]) -> Extension,
+    ) -> Self {
+        let mut all = self.clone();
+        if let Some(last) = all.extensions.last_mut() {
+            last.kept.clone_from(&kept);
+        }
+        let extension = extension(&all.extensions);
+        all.records.push(Record::new(&extension, &self.records, kept));
+        all.extensions.push(extension);
+        all
+    }
+
+    /// Writes the file of the last extension; `None` if another worker was first.
+    pub(super) fn write_last(self, member: &Member<'_>) -> Result<Option<Self>, ResultsError> {
+        let number = self.records.len() - 1;
+        let text = self.records[number].text();
+        let is_first = member.publish_new(&self.layout.extension(number), text.as_bytes())?;
+        Ok(is_first.then_some(self))
+    }
+
+    /// Makes sure that the directory is still the one that was opened. Another that has taken its place belongs to other
+    /// sweeps, so rows of these must not get into it.
+    pub fn check_place(&self) -> Result<(), ResultsError> {
+        let last = self.records.len() - 1;
+        let found = match self.layout.storage.read(&self.layout.extension(last)) {
+            Err(error) if error.is_missing() || error.is_no_file() => None,
+            bytes => Some(bytes?),
+        };
+        if found.is_some_and(|bytes| bytes == self.records[last].text().as_bytes()) {
+            return Ok(());
+        }
+        let problem = "the results directory was moved, removed or replaced since it was opened; \
+                       move it back or name its new place, and the same command resumes";
+        Err(ResultsError::refused(self.layout.root(), problem))
+    }
+
+    /// Looks up which parts are done, and refuses names in the folders of the tables that no part can have.
+    pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
+        if self.extensions.is_empty() {
+            return Ok(DoneParts::default());
+        }
+        let mut done: Option<DoneParts> = None;
+        // The jobs first: whoever has its jobs there has had the rest there before.
+        for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
+            let folder = self.layout.table(table);
+            let mut parts = HashSet::new();
+            for name in self.layout.storage.list(&folder)? {
+                let path = folder.join(name);
+                match PartName::of_path(&path).filter(|part| part.extension < self.extensions.len()) {
+                    Some(part) => _ = parts.insert(part),
+                    None if PartName::of_path(&path).is_some() && self.has_grown()? => (),
+                    None => {
+                        return Err(ResultsError::refused(&path, STRANGER));
+                    }
+                }
+            }
+            match &mut done {
+                Some(done) => done.0.retain(|part| parts.contains(part)),
+                None => done = Some(DoneParts(parts)),
+            }
+        }
+        Ok(done.unwrap_or_default())
+    }
+
+    /// Refuses files of parts that are none of these, which are all: their jobs would be there twice.
+    pub fn refuse_strangers(&self, parts: &[Outline]) -> Result<(), ResultsError> {
+        let planned: HashSet<PartName> = parts.iter().map(PartName::from).collect();
+        for table in self.tables() {
+            let folder = self.layout.table(table);
+            let strangers = self.layout.parts_in(&folder)?.into_iter().filter(|part| !planned.contains(part));
+            if let Some(stranger) = strangers.min()
+                && !self.has_grown()?
+            {
+                return Err(ResultsError::refused(&folder.join(stranger.file()), STRANGER));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a run has added an extension since the directory was opened.
+    fn has_grown(&self) -> Result<bool, StorageError> {
+        Ok(self.layout.listed_extensions()?.len() > self.extensions.len())
+    }
+
+    /// Removes what earlier runs have left of parts that are not done: files of some of their tables, and spilled jobs.
+    fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
+        let (layout, storage) = (&self.layout, self.layout.storage);
+        for table in [tables::SLIPS, tables::PRECURSORS, tables::JOBS] {
+            for (folder, is_spill) in [(layout.table(table), false), (layout.spill().join(table), true)] {
+                let mut parts: Vec<_> = layout.parts_in(&folder)?.into_iter().collect();
+                // Whoever begins the same sweep at once may be at the parts of the next extension.
+                parts.retain(|part| part.extension < self.extensions.len() && (is_spill || !done.0.contains(part)));
+                for part in &parts {
+                    storage.remove(&folder.join(part.file()))?;
+                }
+                if !parts.is_empty() {
+                    storage.sync_folder(&folder)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves staged files to their targets, if the directory is still in its place. Should it be moved after this check,
+    /// the staged files, which lie in it, are not found.
+    pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
+        self.check_place()?;
+        Ok(commit.publish()?)
+    }
+
+    /// Where it and everything in it lie.
+    pub const fn layout(&self) -> &Layout<'a> {
+        &self.layout
+    }
+
+    /// What was run here, one sweep after the other.
+    pub fn extensions(&self) -> &[Extension] {
+        &self.extensions
+    }
+
+    /// The sweep that was asked for last.
+    pub fn sweep(&self) -> &Sweep {
+        &self.extensions[self.extensions.len() - 1].sweep
+    }
+
+    /// All jobs in their parts.
+    pub fn plan(&self) -> Plan<'_> {
+        Plan::new(&self.extensions)
+    }
+
+    pub(super) fn record(&self, extension: usize) -> &Record {
+        &self.records[extension]
+    }
+
+    /// What the footers of the parts of an extension hold.
+    pub fn footer(&self, extension: usize) -> Footer {
+        self.records[extension].footer(self.extensions[extension].sweep.name())
+    }
+
+    /// What the footers of files hold that are made from all tables: the sweep that was asked for last.
+    pub fn footer_of_all(&self) -> Footer {
+        Footer::default().with_sweep(self.sweep().name(), self.sweep().text())
+    }
+
+    /// Names of the tables, that of the jobs last.
+    pub fn tables(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let precursors = self.sweep().recording().precursors.then_some(tables::PRECURSORS);
+        [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
+    }
+
+    /// The id of a job of a part.
+    pub fn job_id(&self, part: &Part, position: usize) -> String {
+        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters).to_string()
+    }
+
+    /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
+    /// folder, and the sync after it leaves names that are seen but would not survive a power cut.
+    pub fn sync_names(&self) -> Result<(), StorageError> {
+        for above in self.layout.root().ancestors().skip(1) {
+            // Most are not ours, and who made the folders in them synced them if that is possible at all.
+            let _ = self.layout.storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
+        }
+        for folder in self.layout.result_folders() {
+            match self.layout.storage.sync_folder(&folder) {
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                synced => synced?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a directory holds nothing, or no more than what a run leaves that was killed before its first extension.
+pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
+    let storage = layout.storage;
+    let ours = |name: &std::ffi::OsString| RUN_FOLDERS.iter().any(|folder| name == folder);
+    match storage.list(layout.root()) {
+        // A file at this place is somebody else's.
+        Err(error) if error.kind() == ErrorKind::NotADirectory => Ok(false),
+        names => Ok(names?.iter().all(|name| name == RUN) && storage.list(&layout.run())?.iter().all(ours)),
+    }
+}

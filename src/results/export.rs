@@ -1,0 +1,235 @@
+//! Export: the tables of a directory as one file each, elsewhere, for other tools.
+//!
+//! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not on
+//! how it came to that. Every row has all swept parameters and the frequency 1/T, so that no table need be joined. Nothing
+//! of the directory is changed. Memory: one part, and one row group.
+
+use crate::results::directory::Results;
+use crate::results::error::ResultsError;
+use crate::results::parts::row_count;
+use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
+use crate::sweep::Outline;
+use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
+use crate::table::file::{Batch, Dataset, DatasetError, Format, RowCount, RowWriter};
+use crate::table::storage::Storage;
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{ArrayRef, Float64Array, RecordBatch, UInt32Array};
+use arrow_schema::{ArrowError, DataType, Field, Fields, SchemaRef};
+use arrow_select::concat::concat_batches;
+use arrow_select::take::take;
+use serde::Serialize;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Column by which rows are joined with those of the jobs.
+const JOB_ID: &str = "job_id";
+/// Column of the period, and of the frequency that is added.
+const PERIOD: &str = "T";
+const FREQUENCY: &str = "frequency";
+/// What the name of the folder begins with in which an export is prepared, within the one that it is for.
+const UNFINISHED: &str = ".unfinished-";
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Exported {
+    pub files: Vec<ExportedFile>,
+    pub parts: u64,
+    pub jobs: u64,
+    /// Parts that are not done, and their jobs; they are left out.
+    pub parts_missing: u64,
+    pub jobs_missing: u64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct ExportedFile {
+    pub name: String,
+    pub rows: u64,
+    pub bytes: u64,
+}
+
+impl Results<'_> {
+    /// Writes the tables to a folder, which must be empty and is made if need be. `progress` hears how many of how many parts
+    /// of all tables are done.
+    pub fn export(
+        &self,
+        folder: &Path,
+        format: Format,
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Exported, ResultsError> {
+        let storage = self.layout().storage;
+        let unfinished = prepare(storage, folder)?;
+        let exported = self.write_all(&unfinished, format, progress).and_then(|exported| {
+            for ExportedFile { name, .. } in &exported.files {
+                storage.rename(&unfinished.join(name), &folder.join(name))?;
+            }
+            storage.sync_folder(folder)?;
+            Ok(exported)
+        });
+        // What stays is removed by the next export.
+        let _ = storage.remove_folder(&unfinished);
+        exported
+    }
+
+    fn write_all(
+        &self,
+        to: &Path,
+        format: Format,
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Exported, ResultsError> {
+        let done = self.done_parts()?;
+        let mut exported = Exported::default();
+        let mut parts = Vec::new();
+        for part in self.plan().outlines() {
+            let (parts_so_far, jobs) = if done.has(&part) {
+                (&mut exported.parts, &mut exported.jobs)
+            } else {
+                (&mut exported.parts_missing, &mut exported.jobs_missing)
+            };
+            *parts_so_far += 1;
+            *jobs += part.job_count as u64;
+            parts.extend(done.has(&part).then_some(part));
+        }
+        let names: Vec<&str> = self.tables().collect();
+        let total = (names.len() * parts.len()) as u64;
+        for (number, table) in names.into_iter().enumerate() {
+            let columns = match table {
+                tables::SLIPS => schema::<SlipRow<'_>>(),
+                tables::PRECURSORS => schema::<PrecursorRow<'_>>(),
+                _ => schema::<JobRow>(),
+            };
+            let name = format!("{table}.{}", format.extension());
+            let file = self.layout().storage.create(&to.join(&name))?;
+            let schema = schema_of(self.joined(&columns));
+            let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
+            let mut rows = 0;
+            for (done, part) in parts.iter().enumerate() {
+                progress((number * parts.len() + done) as u64, total);
+                rows += self.copy_part(table, part, &schema, &mut writer)?;
+            }
+            let bytes = writer.finish()?;
+            exported.files.push(ExportedFile { name, rows, bytes });
+        }
+        progress(total, total);
+        Ok(exported)
+    }
+
+    /// The columns of a table, with those that are joined to it.
+    fn joined(&self, columns: &SchemaRef) -> Vec<Field> {
+        let of_jobs = schema::<JobRow>();
+        let mut fields: Vec<Field> = columns.fields().iter().map(|field| Field::clone(field)).collect();
+        let swept: HashSet<String> = self.extensions().iter().flat_map(|extension| extension.sweep.swept()).collect();
+        let is_new = |field: &&Arc<Field>| columns.field_with_name(field.name()).is_err();
+        let swept = of_jobs.fields().iter().filter(is_new).filter(|field| swept.contains(field.name()));
+        fields.extend(swept.map(|field| Field::clone(field)));
+        fields.push(Field::new(FREQUENCY, DataType::Float64, true).with_metadata(HashMap::from([
+            (UNIT.to_owned(), "Hz".to_owned()),
+            (DESCRIPTION.to_owned(), "1/T of the modulation; null without".to_owned()),
+        ])));
+        fields
+    }
+
+    /// Copies the rows of a part; returns their number.
+    fn copy_part(
+        &self,
+        table: &str,
+        part: &Outline,
+        schema: &SchemaRef,
+        writer: &mut RowWriter,
+    ) -> Result<u64, ResultsError> {
+        let storage = self.layout().storage;
+        let path = self.part_file(tables::JOBS, part);
+        let expected = RowCount { least: part.job_count as u64, may_exceed: false };
+        let dataset = || Dataset::of_known_rows(storage, vec![(path.clone(), Some(expected))]);
+        let jobs = Jobs::read(dataset(), &path)?;
+        let rows = if table == tables::JOBS {
+            dataset()
+        } else {
+            let count = row_count(dataset(), table)?;
+            Dataset::of_known_rows(storage, vec![(self.part_file(table, part), Some(count))])
+        };
+        let mut copied = 0;
+        for batch in rows.batches() {
+            let batch = batch?;
+            writer.write(&jobs.join(&batch, schema)?)?;
+            copied += batch.rows.num_rows() as u64;
+        }
+        Ok(copied)
+    }
+}
+
+/// The folder in which an export is prepared. The one that it is for may hold what a killed export left, and nothing else.
+fn prepare(storage: &dyn Storage, folder: &Path) -> Result<PathBuf, ResultsError> {
+    storage.ensure_folder(folder)?;
+    for name in storage.list(folder)? {
+        if !name.to_string_lossy().starts_with(UNFINISHED) {
+            let problem = "is not empty, and nothing in it was changed; choose another folder, or empty this one";
+            return Err(ResultsError::refused(folder, problem));
+        }
+        storage.remove_folder(&folder.join(name))?;
+    }
+    let unfinished = folder.join(format!("{UNFINISHED}{:016x}", crate::results::commit::own_number()));
+    storage.create_folder(&unfinished)?;
+    Ok(unfinished)
+}
+
+/// The jobs of a part.
+struct Jobs {
+    rows: RecordBatch,
+    by_id: HashMap<String, u32>,
+}
+
+impl Jobs {
+    fn read(dataset: Dataset<'_>, path: &Path) -> Result<Self, DatasetError> {
+        let batches = dataset.batches().map(|batch| Ok(batch?.rows)).collect::<Result<Vec<_>, DatasetError>>()?;
+        let first = batches.first().map(RecordBatch::schema);
+        let rows =
+            first.map_or_else(|| Ok(RecordBatch::new_empty(schema::<JobRow>())), |of| concat_batches(&of, &batches));
+        let rows = rows.map_err(DatasetError::damaged(path))?;
+        let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
+        let ids = ids.ok_or("there is no column job_id").map_err(DatasetError::damaged(path))?;
+        let by_id = ids.iter().zip(0..).filter_map(|(id, row)| Some((id?.to_owned(), row))).collect();
+        Ok(Self { rows, by_id })
+    }
+
+    /// The rows of a batch with the columns of a schema: its own, those of its jobs, and the frequency.
+    fn join(&self, batch: &Batch, schema: &SchemaRef) -> Result<RecordBatch, DatasetError> {
+        self.joined(&batch.rows, schema).map_err(DatasetError::damaged(&batch.path))
+    }
+
+    fn joined(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+        let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
+        let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
+        let job = |id: Option<&str>| id.and_then(|id| self.by_id.get(id)).copied();
+        let jobs: Option<Vec<u32>> = ids.ok_or_else(|| missing(JOB_ID))?.iter().map(job).collect();
+        let jobs =
+            UInt32Array::from(jobs.ok_or_else(|| ArrowError::SchemaError("it has rows of other jobs".to_owned()))?);
+        let of_jobs = |name: &str| -> Result<ArrayRef, ArrowError> {
+            take(self.rows.column_by_name(name).ok_or_else(|| missing(name))?, &jobs, None)
+        };
+        let columns = columns_of(schema.fields(), |name| match rows.column_by_name(name) {
+            Some(column) => Ok(Arc::clone(column)),
+            None if name == FREQUENCY => {
+                let periods = of_jobs(PERIOD)?;
+                let periods = periods.as_primitive_opt::<Float64Type>().ok_or_else(|| missing(PERIOD))?;
+                Ok(Arc::new(
+                    periods.iter().map(|period| period.map(|period| rounded(1.0 / period))).collect::<Float64Array>(),
+                ))
+            }
+            None => of_jobs(name),
+        })?;
+        RecordBatch::try_new(Arc::clone(schema), columns)
+    }
+}
+
+fn columns_of(
+    fields: &Fields,
+    column: impl Fn(&str) -> Result<ArrayRef, ArrowError>,
+) -> Result<Vec<ArrayRef>, ArrowError> {
+    fields.iter().map(|field| column(field.name())).collect()
+}
+
+/// A number as people wrote it, before its reciprocal was taken: to twelve significant digits, as axes are.
+fn rounded(number: f64) -> f64 {
+    format!("{number:.11e}").parse().unwrap_or(number)
+}

@@ -1,0 +1,161 @@
+//! What runs again, and what does not: the only place that decides it, for `run`, `status` and `plan`.
+//!
+//! | layer | what is decided | where | the test that fails if it goes wrong |
+//! |---|---|---|---|
+//! | directory | whether what is there may count at all: the same versions, model, recording | `directory.rs`, `extension_file.rs` | `another_model_recording_or_version_is_refused_with_the_difference_and_nothing_is_written` |
+//! | extensions | which extension has a job: the first that keeps it, else the last | `sweep/plan.rs` | `what_is_taken_out_of_the_sweep_is_kept_if_done_and_else_not_run` |
+//! | parts | a part is done if all its files are there | [`Results::done_parts`] | `a_part_without_its_slips_is_run_again` |
+//! | retries | of a part that is done, jobs that failed, or that a shorter `max_time` cut off | [`Pending::state`] | `failing_and_panicking_jobs_become_rows_others_go_on_and_a_retry_mends_them`, `a_longer_time_runs_the_jobs_again_that_the_shorter_one_ended_and_no_others` |
+//! | spill | of one that is not, all jobs but those that a stopped run has finished | [`Pending::state`] | `finished_jobs_of_an_unfinished_part_are_kept_by_a_stop_and_none_is_run_again` |
+//!
+//! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
+
+use crate::results::directory::Results;
+use crate::results::error::ResultsError;
+use crate::results::layout::{DoneParts, PartName};
+use crate::results::settled::settled;
+use crate::results::tables::{self, JobOutcome, RowOfJob};
+use crate::sweep::{Extension, Outline};
+use crate::table::columns::columns;
+use crate::table::file::{Dataset, DatasetError};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::io::ErrorKind;
+
+/// Times within this share of each other are the same bound.
+const SAME_TIME: f64 = 1e-9;
+
+/// What is not finished of a part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PartState {
+    /// All its jobs are missing but those at these positions, which are spilled.
+    Missing { spilled: BTreeSet<usize> },
+    /// It is done; jobs at these positions may run again.
+    Done { again: BTreeMap<usize, Again> },
+}
+
+/// Why a job of a part that is done may run again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Again {
+    /// It failed, for this reason.
+    Failed(String),
+    /// A shorter `max_time` than the present one ended it.
+    CutOff,
+}
+
+/// What is done and what is spilled, as the names in a directory said at one instant.
+#[derive(Debug)]
+pub struct Pending<'a> {
+    results: &'a Results<'a>,
+    pub done: DoneParts,
+    /// Looked up again, since workers that end spill.
+    spilled: RefCell<HashSet<PartName>>,
+}
+
+impl<'a> Pending<'a> {
+    pub fn look_up(results: &'a Results<'a>) -> Result<Self, ResultsError> {
+        let pending = Self { results, done: results.done_parts()?, spilled: RefCell::default() };
+        pending.look_at_spill()?;
+        Ok(pending)
+    }
+
+    /// Looks up again what is spilled.
+    pub fn look_at_spill(&self) -> Result<(), ResultsError> {
+        *self.spilled.borrow_mut() = self.results.spilled_parts(tables::JOBS)?;
+        Ok(())
+    }
+
+    /// Whether jobs of parts that are done may have been cut off.
+    pub fn may_have_cut_off(&self) -> bool {
+        let max_time = |extension: &Extension| extension.sweep.recording().max_time;
+        self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
+    }
+
+    /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its
+    /// jobs.
+    pub fn state(&self, part: &Outline) -> Result<PartState, ResultsError> {
+        if self.done.has(part) {
+            Ok(PartState::Done { again: self.results.again(part)? })
+        } else {
+            let is_spilled = self.spilled.borrow().contains(&part.into());
+            let spilled = if is_spilled { self.results.spilled(part)? } else { BTreeSet::new() };
+            Ok(PartState::Missing { spilled })
+        }
+    }
+}
+
+columns! {
+    /// How a job ended, as a row of the jobs table says.
+    struct OutcomeRow {
+        outcome: JobOutcome;
+        reason: Option<String>;
+        simulated_time: Option<f64>;
+    }
+}
+
+impl Results<'_> {
+    /// The jobs of a part that is done which failed or were cut off. Those of values that the sweep no longer has stay as they are.
+    fn again(&self, part: &Outline) -> Result<BTreeMap<usize, Again>, ResultsError> {
+        let max_time = self.sweep().recording().max_time.unwrap_or(f64::INFINITY);
+        let is_cut_off = |time: f64| time < max_time * (1.0 - SAME_TIME);
+        let (mut again, mut rows) = (BTreeMap::new(), 0);
+        let path = self.part_file(tables::JOBS, part);
+        for batch in Dataset::new(self.layout().storage, vec![path.clone()]).rows::<OutcomeRow>() {
+            for row in batch? {
+                let why = match row.outcome {
+                    JobOutcome::Failed => Some(Again::Failed(row.reason.unwrap_or_default())),
+                    JobOutcome::TimeLimit if row.simulated_time.is_some_and(is_cut_off) => Some(Again::CutOff),
+                    _ => None,
+                };
+                again.extend(why.map(|why| (rows, why)));
+                rows += 1;
+            }
+        }
+        if rows != part.job_count {
+            return Err(ResultsError::damaged(&path, format!("{rows} jobs where the plan has {}", part.job_count)));
+        }
+        if !again.is_empty() && part.extension + 1 < self.extensions().len() {
+            let jobs = self.plan().part(part).jobs;
+            again.retain(|&position, _| self.sweep().contains(&jobs[position].parameters));
+        }
+        Ok(again)
+    }
+
+    /// The parts of which something is spilled in this table.
+    pub(super) fn spilled_parts(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
+        Ok(self.layout().parts_in(&self.layout().spill().join(table))?)
+    }
+
+    /// Positions of the jobs of a part that are spilled: none if a file is damaged or gone, and they then run again.
+    fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
+        let mut ids = HashSet::new();
+        for table in self.tables() {
+            match settled(|| self.spilled_ids(table, outline))?.flatten() {
+                Some(of_table) => ids = of_table,
+                None => return Ok(BTreeSet::new()),
+            }
+        }
+        let part = self.plan().part(outline);
+        Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(&part, position))).collect())
+    }
+
+    /// Ids in the spilled file of a part in a table, if it is whole; `None` if this host does not see a file that the folder
+    /// lists.
+    fn spilled_ids(&self, table: &str, part: &Outline) -> Result<Option<Option<HashSet<String>>>, ResultsError> {
+        let file = self.spilled_file(table, part);
+        let mut ids = HashSet::new();
+        for batch in Dataset::new(self.layout().storage, vec![file]).rows::<RowOfJob>() {
+            match batch {
+                Ok(rows) => ids.extend(rows.into_iter().map(|row| row.job_id)),
+                Err(DatasetError::Damaged { .. }) => return Ok(Some(None)),
+                Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
+                    // Not listed: another worker has just committed the part.
+                    let is_listed = self.spilled_parts(table)?.contains(&part.into());
+                    return Ok((!is_listed).then_some(None));
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(Some(Some(ids)))
+    }
+}
