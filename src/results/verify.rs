@@ -166,8 +166,10 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
     let (mut records, mut lost) = (Vec::new(), Vec::new());
     for number in 0.. {
         let path = layout.extension(number);
-        let of_file = match Record::read(layout, number) {
-            _ if !listed.contains(&number) => Err("it is missing".to_owned()),
+        let is_listed = listed.contains(&number);
+        let read =
+            if is_listed { Record::read(layout, number) } else { Err(ResultsError::damaged(&path, "it is missing")) };
+        let of_file = match read {
             Ok(record) if record.follows(&records) => Ok(record),
             Ok(_) => Err("it does not follow the file before it".to_owned()),
             Err(error) if error.kind == ErrorKind::Damaged => Err(error.problem),
