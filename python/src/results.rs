@@ -78,7 +78,7 @@ pub fn read(
         py,
         |stop, _| {
             let results = Results::read(&layout)?;
-            layout.read_tables(|| wanted.read(&results, stop))?
+            wanted.read(&results, stop)
         },
         |()| (),
         |_| Ok(()),

@@ -93,6 +93,13 @@ columns! {
     }
 }
 
+/// A spilled file, and the ids of the jobs of its rows.
+struct Spilled {
+    /// Whether it is there and not damaged.
+    is_whole: bool,
+    ids: HashSet<String>,
+}
+
 impl Results<'_> {
     /// The jobs of a part that is done which failed or were cut off. Those of values that the sweep no longer has stay as they are.
     fn again(&self, part: &Outline) -> Result<BTreeMap<usize, Again>, ResultsError> {
@@ -130,32 +137,32 @@ impl Results<'_> {
     fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
         let mut ids = HashSet::new();
         for table in self.tables() {
-            match settled(|| self.spilled_ids(table, outline))?.flatten() {
-                Some(of_table) => ids = of_table,
-                None => return Ok(BTreeSet::new()),
+            match settled(|| self.spilled_ids(table, outline))? {
+                Some(Spilled { is_whole: true, ids: of_table }) => ids = of_table,
+                _ => return Ok(BTreeSet::new()),
             }
         }
         let part = self.plan().part(outline);
         Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(&part, position))).collect())
     }
 
-    /// Ids in the spilled file of a part in a table, if it is whole; `None` if this host does not see a file that the folder
-    /// lists.
-    fn spilled_ids(&self, table: &str, part: &Outline) -> Result<Option<Option<HashSet<String>>>, ResultsError> {
+    /// The spilled file of a part in a table; `None` if this host does not see a file that the folder lists.
+    fn spilled_ids(&self, table: &str, part: &Outline) -> Result<Option<Spilled>, ResultsError> {
         let file = self.spilled_file(table, part);
-        let mut ids = HashSet::new();
+        let mut spilled = Spilled { is_whole: true, ids: HashSet::new() };
+        let nothing = || Spilled { is_whole: false, ids: HashSet::new() };
         for batch in Dataset::new(self.layout().storage, vec![file]).rows::<RowOfJob>() {
             match batch {
-                Ok(rows) => ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(DatasetError::Damaged { .. }) => return Ok(Some(None)),
+                Ok(rows) => spilled.ids.extend(rows.into_iter().map(|row| row.job_id)),
+                Err(DatasetError::Damaged { .. }) => return Ok(Some(nothing())),
                 Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
                     // Not listed: another worker has just committed the part.
                     let is_listed = self.spilled_parts(table)?.contains(&part.into());
-                    return Ok((!is_listed).then_some(None));
+                    return Ok((!is_listed).then(nothing));
                 }
                 Err(error) => return Err(error.into()),
             }
         }
-        Ok(Some(Some(ids)))
+        Ok(Some(spilled))
     }
 }

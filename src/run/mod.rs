@@ -224,7 +224,7 @@ impl Joined<'_> {
                 (report.jobs_left, report.hosts) = (left.jobs, left.hosts.into_iter().collect());
             }
         }
-        Ok(results.tidy_spill(parts)?)
+        results.tidy_spill(parts)
     }
 
     /// Reduces with `body`, once every job is done; `None` if another worker does so, or has.

@@ -56,7 +56,9 @@ pub fn check(bytes: &[u8]) -> Result<(), &'static str> {
     let (before, rest) = bytes.split_at(place);
     let (written, after) = rest.split_at(PLACEHOLDER.len());
     let mut hasher = Sha256::new();
-    [before, PLACEHOLDER.as_bytes(), after].into_iter().for_each(|bytes| hasher.update(bytes));
+    for bytes in [before, PLACEHOLDER.as_bytes(), after] {
+        hasher.update(bytes);
+    }
     if hexadecimal(&hasher.finalize()).as_bytes() == written {
         Ok(())
     } else {

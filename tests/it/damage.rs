@@ -201,7 +201,7 @@ const PARTS: &[Damage] = &[
     }),
     #[cfg(unix)]
     damage("a FIFO in an extension's place", "run/extension-000.json", 0, |root| {
-        fifo(&root.join("run/extension-000.json"))
+        fifo(&root.join("run/extension-000.json"));
     }),
     damage("a folder in an extension's place", "run/extension-000.json", 0, |root| {
         fs::remove_file(root.join("run/extension-000.json")).unwrap();
