@@ -43,7 +43,10 @@ pub fn report(arguments: &Arguments) -> Result<Exit> {
             path.clone()
         }
     };
-    output::print(&format!("{}\n", shown(&path)))?;
+    // Where the page itself went to standard output, nothing follows it.
+    if path.is_file() {
+        output::print(&format!("{}\n", shown(&path)))?;
+    }
     Ok(Exit::Done)
 }
 
