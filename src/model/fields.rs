@@ -148,7 +148,7 @@ macro_rules! fields {
 
             /// The field with this key.
             pub fn from_key(key: &str) -> Option<Self> {
-                $crate::table::value::Field::from_value($crate::table::value::Value::Text(key))
+                Self::from_word(key)
             }
 
             /// The canonical form of a value that the field can take by itself: equal values have equal bits.

@@ -18,6 +18,7 @@ pub use segment::{CubicStep, Extremes, ForcePath, Segment};
 use self::ledger::Audit;
 use crate::model::equation::stability_limit;
 use crate::model::{ContactEvent, Parameters};
+use crate::table::value::words;
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
 
@@ -38,28 +39,22 @@ pub enum Solver {
     },
 }
 
-/// How the event-driven solver resolves motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Resolve {
-    /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept; else
-    /// in Taylor steps.
-    #[default]
-    Auto,
-    /// On a constant grid of time, corrected for events to fourth order.
-    Grid,
-    /// In Taylor series, each up to the next event.
-    Taylor,
+words! {
+    /// How the event-driven solver resolves motion.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Resolve {
+        /// On the grid from a tolerance of [`GRID_TOLERANCE`] on, if the clock resolves its step and no ledger is kept;
+        /// else in Taylor steps.
+        #[default]
+        Auto = "auto",
+        /// On a constant grid of time, corrected for events to fourth order.
+        Grid = "grid",
+        /// In Taylor series, each up to the next event.
+        Taylor = "taylor",
+    }
 }
 
 impl Resolve {
-    /// All of them, with their words in sweep files.
-    pub const ALL: [(Self, &str); 3] = [(Self::Auto, "auto"), (Self::Grid, "grid"), (Self::Taylor, "taylor")];
-
-    /// Its word in sweep files.
-    pub const fn word(self) -> &'static str {
-        Self::ALL[self as usize].1
-    }
-
     /// Whether motion is resolved on the grid at a tolerance, but for the exceptions of [`Self::Auto`].
     pub fn takes_grid(self, tolerance: f64) -> bool {
         match self {
@@ -67,11 +62,6 @@ impl Resolve {
             Self::Grid => true,
             Self::Taylor => false,
         }
-    }
-
-    /// The one with this word.
-    pub fn from_word(word: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|(_, known)| *known == word).map(|(resolve, _)| resolve)
     }
 }
 

@@ -249,7 +249,7 @@ impl<'a> Entry<'a> {
             }
             DeValue::Float(float) => float.as_str().parse().map(Value::Real).ok(),
             DeValue::Boolean(flag) => Some(Value::Flag(*flag)),
-            DeValue::String(word) => BreakOn::from_value(Value::Text(word)).map(|rule| rule.value()),
+            DeValue::String(word) => BreakOn::from_word(word).map(|rule| rule.value()),
             _ => None,
         }
     }

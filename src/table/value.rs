@@ -5,23 +5,58 @@ use std::fmt;
 /// Largest integer that a double, and so every reader of a table, holds exactly.
 const MAX_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
 
-/// What a field holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    Real,
-    Count,
-    Flag,
-    Text,
-}
+/// Defines an enum whose values are words in files and tables, each written once behind its variant.
+macro_rules! words {
+    (
+        $(#[$about:meta])*
+        $visibility:vis enum $Enum:ident {$(
+            $(#[$of_variant:meta])*
+            $variant:ident = $word:literal,
+        )+}
+    ) => {
+        $(#[$about])*
+        $visibility enum $Enum {$(
+            $(#[$of_variant])*
+            $variant,
+        )+}
 
-impl Kind {
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Real => "real",
-            Self::Count => "count",
-            Self::Flag => "flag",
-            Self::Text => "text",
+        impl $Enum {
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+
+            pub fn from_word(word: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|known| known.word() == word)
+            }
         }
+
+        impl $crate::table::value::Field for $Enum {
+            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
+
+            fn value(&self) -> $crate::table::value::Value<'static> {
+                $crate::table::value::Value::Text(self.word())
+            }
+
+            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
+                if let $crate::table::value::Value::Text(word) = value { Self::from_word(word) } else { None }
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+words! {
+    /// What a field holds.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Kind {
+        Real = "real",
+        Count = "count",
+        Flag = "flag",
+        Text = "text",
     }
 }
 
@@ -165,43 +200,3 @@ impl<T: Field> Field for Option<T> {
         if value == Value::Null { Some(None) } else { T::from_value(value).map(Some) }
     }
 }
-
-/// Defines an enum whose values are words in files and tables, each written once behind its variant.
-macro_rules! words {
-    (
-        $(#[$about:meta])*
-        $visibility:vis enum $Enum:ident {$(
-            $(#[$of_variant:meta])*
-            $variant:ident = $word:literal,
-        )+}
-    ) => {
-        $(#[$about])*
-        $visibility enum $Enum {$(
-            $(#[$of_variant])*
-            $variant,
-        )+}
-
-        impl $Enum {
-            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
-
-            pub const fn word(self) -> &'static str {
-                match self {
-                    $(Self::$variant => $word,)+
-                }
-            }
-        }
-
-        impl $crate::table::value::Field for $Enum {
-            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
-
-            fn value(&self) -> $crate::table::value::Value<'static> {
-                $crate::table::value::Value::Text(self.word())
-            }
-
-            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
-                Self::ALL.into_iter().find(|known| known.value() == value)
-            }
-        }
-    };
-}
-pub(crate) use words;

@@ -143,7 +143,7 @@ fn every_value_of_the_schema_has_kind_range_default_and_words_of_the_parser() {
     let solver = &schema["properties"]["solver"]["properties"];
     let tolerances = json!({ "type": "number", "minimum": TOLERANCES.start(), "maximum": TOLERANCES.end() });
     assert_value(&schema, &solver["tolerance"], &tolerances, None);
-    assert_eq!(solver["resolve"]["enum"], json!(Resolve::ALL.map(|(_, word)| word)));
+    assert_eq!(solver["resolve"]["enum"], json!(Resolve::ALL.map(Resolve::word)));
 }
 
 #[test]
