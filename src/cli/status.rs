@@ -30,13 +30,16 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Version of [`Status`] as JSON.
+const FORMAT: u32 = 2;
+
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
     let no_slips = if arguments.json { None } else { no_slips(&results) };
     let overview = status.overview;
     if arguments.json {
-        output::plain_json(&status)?;
+        output::json(FORMAT, &status)?;
     } else {
         let left = match (overview.jobs_missing, status.time_left) {
             (0, _) => "nothing left to run".to_owned(),

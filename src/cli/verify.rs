@@ -35,6 +35,9 @@ pub struct Arguments {
 /// Names of parts, and ids of jobs of each problem, that are shown; `--json` has all.
 const SHOWN: usize = 3;
 
+/// Version of [`Report`] as JSON.
+const FORMAT: u32 = 4;
+
 #[derive(Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
@@ -47,11 +50,15 @@ struct Report<'a> {
 
 pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let layout = &Layout::new(&Disk, &arguments.directory);
+    if arguments.directory.is_file() {
+        // Says what it is instead.
+        Results::read(layout)?;
+    }
     let verification = if arguments.repair { Results::repair(layout)? } else { Results::verify(layout)? };
     let repaired = arguments.repair && verification.wants_repair();
     let commands = commands(layout, &verification, !arguments.repair);
     if arguments.json {
-        output::plain_json(&Report { verification: &verification, repaired, commands })?;
+        output::json(FORMAT, &Report { verification: &verification, repaired, commands })?;
     } else {
         print_summary(&verification, &commands, repaired)?;
     }

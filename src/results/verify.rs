@@ -20,17 +20,14 @@ use serde::Serialize;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::PathBuf;
 
-/// Version of [`Verification`] as JSON.
-const FORMAT: u32 = 4;
 /// Staging folder of a repair.
 const WRITER: &str = "repair";
 /// Keys of a footer that say which program wrote a file, as far as its numbers depend on it.
 const VERSIONS: [&str; 2] = ["model_version", "rng_scheme"];
 
-/// What a verification found. Serialises to a stable form, whose version is `format`.
+/// What a verification found.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
-    pub format: u32,
     /// Whether nothing is damaged; parts may be missing.
     pub whole: bool,
     /// Damage, in the order in which it was found.
@@ -132,7 +129,7 @@ impl<'a> Results<'a> {
 
 fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), ResultsError> {
     loop {
-        let mut verification = Verification { format: FORMAT, ..Verification::default() };
+        let mut verification = Verification::default();
         let salvaged = salvage(layout, &mut verification.problems)?;
         verify_parts(&salvaged.results, &mut verification)?;
         for name in layout.storage.list(&layout.reduced())? {

@@ -12,8 +12,6 @@ use crate::table::columns::columns;
 use serde::Serialize;
 use std::time::SystemTime;
 
-/// Version of [`Status`] as JSON.
-const FORMAT: u32 = 2;
 /// Failed jobs that [`status`] lists one by one, at most.
 pub const MAX_FAILURES: usize = 10;
 
@@ -38,10 +36,9 @@ pub struct Overview {
     pub predicted_cost_missing: f64,
 }
 
-/// The state of a results directory. Serialises to a stable form, whose version is `format`.
+/// The state of a results directory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
-    pub format: u32,
     pub name: String,
     /// How far all parts are.
     #[serde(flatten)]
@@ -214,7 +211,6 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
     };
     let pace = results.pace()?;
     Ok(Status {
-        format: FORMAT,
         name: results.sweep().name().to_owned(),
         overview,
         workers,
