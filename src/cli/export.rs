@@ -8,7 +8,7 @@ use crate::table::file::Format;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -28,18 +28,12 @@ pub struct Arguments {
     /// Folder to write to; it must be empty, and is made if need be
     #[arg(long, short, value_name = "FOLDER")]
     out: PathBuf,
-    #[arg(long, value_enum, default_value = "parquet")]
-    format: FormatName,
+    /// Format of the files
+    #[arg(long, value_enum, default_value_t = Format::Parquet)]
+    format: Format,
     /// Print JSON
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FormatName {
-    Parquet,
-    Csv,
-    Arrow,
 }
 
 /// Version of the JSON.
@@ -47,14 +41,9 @@ const FORMAT: u32 = 1;
 
 pub fn export(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
-    let format = match arguments.format {
-        FormatName::Parquet => Format::Parquet,
-        FormatName::Csv => Format::Csv,
-        FormatName::Arrow => Format::Arrow,
-    };
     let bar = if std::io::stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
     bar.set_style(ProgressStyle::with_template("{wide_bar} {percent} % of the parts, {eta} left")?);
-    let exported = results.export(&arguments.out, format, &mut |done, total| {
+    let exported = results.export(&arguments.out, arguments.format, &mut |done, total| {
         bar.set_length(total);
         bar.set_position(done);
     })?;
