@@ -31,15 +31,7 @@ const ALIKE: f64 = 0.1;
 const ALIKE_MEANS: f64 = 3.0;
 const SEEDS: u64 = 24;
 
-/// What a case must lead to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Expected {
-    Ends,
-    /// Parameters or solver are refused, in a message that contains this, with - for a blank.
-    Refused(&'static str),
-    /// It cannot continue, and its message contains this.
-    Stops(&'static str),
-}
+const REFUSED: &str = "refused";
 
 #[derive(Clone, Debug)]
 pub struct HardCase {
@@ -53,7 +45,8 @@ pub struct HardCase {
     slips: u64,
     /// Whether counts of breaks differ so far from seed to seed that only means compare.
     pub is_chaotic: bool,
-    expected: Expected,
+    /// If it must not reach its end: how its outcome begins, `refused` or `stopped`, and what that contains, - for a blank.
+    failure: Option<(&'static str, &'static str)>,
 }
 
 columns! {
@@ -82,32 +75,6 @@ impl Table for Stability {
     const MEANING: &'static str = "One row per hard case that is refused or takes fixed steps, else two: in Taylor steps with an audit, and as a job";
 }
 
-/// Why a case did not reach its end, in words.
-#[derive(Debug, thiserror::Error)]
-enum Failure {
-    #[error("refused: {0}")]
-    Refused(String),
-    #[error("stopped {0}")]
-    Stopped(String),
-}
-
-impl From<ParameterError> for Failure {
-    fn from(error: ParameterError) -> Self {
-        Self::Refused(error.to_string())
-    }
-}
-
-impl From<SimulationError> for Failure {
-    fn from(error: SimulationError) -> Self {
-        match error {
-            SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
-                Self::Refused(error.to_string())
-            }
-            _ => Self::Stopped(error.to_string()),
-        }
-    }
-}
-
 impl HardCase {
     /// A case from its line in the table; `None` if that says something else.
     fn parsed(threat: &'static str, line: &'static str) -> Option<Self> {
@@ -119,7 +86,7 @@ impl HardCase {
             end_time: words.next()?.parse().ok()?,
             slips: 3,
             is_chaotic: false,
-            expected: Expected::Ends,
+            failure: None,
         };
         for word in words {
             let (key, value) = word.split_once('=').unwrap_or((word, ""));
@@ -129,8 +96,7 @@ impl HardCase {
                 "chaotic" => case.is_chaotic = true,
                 "dt" => case.solver = Solver::FixedStep { time_step: value.parse().ok()? },
                 "tolerance" => case.solver = Solver::event_driven(value.parse().ok()?),
-                "refused" => case.expected = Expected::Refused(value),
-                "stops" => case.expected = Expected::Stops(value),
+                REFUSED | "stopped" => case.failure = Some((key, value)),
                 _ => {
                     let symbol = Symbol::from_key(key)?;
                     let value = match Parameters::default().get(symbol) {
@@ -146,7 +112,7 @@ impl HardCase {
 
     /// Parameters and end, in s, of a case that the event-driven solver must bring to its end.
     pub fn to_the_end(&self) -> Option<(Parameters, f64)> {
-        let ends = self.expected == Expected::Ends && matches!(self.solver, Solver::EventDriven { .. });
+        let ends = self.failure.is_none() && matches!(self.solver, Solver::EventDriven { .. });
         self.parameters().ok().filter(|_| ends).map(|parameters| (parameters, self.end_time))
     }
 
@@ -161,7 +127,7 @@ impl HardCase {
     pub fn run(&self) -> Vec<Stability> {
         let Solver::EventDriven { tolerance, .. } = self.solver else { return vec![self.row(self.solver, None)] };
         let audited = self.row(Solver::EventDriven { tolerance, resolve: Resolve::Taylor }, None);
-        if matches!(self.expected, Expected::Refused(_)) {
+        if self.failure.is_some_and(|(how, _)| how == REFUSED) {
             return vec![audited];
         }
         let as_a_job = self.row(self.solver, Some(&audited));
@@ -190,7 +156,7 @@ impl HardCase {
                     (_, false) => "done, but with too many or too few breaks",
                 };
                 Stability {
-                    passed: self.expected == Expected::Ends && is_balanced && is_alike,
+                    passed: self.failure.is_none() && is_balanced && is_alike,
                     outcome: outcome.to_owned(),
                     simulated_seconds: Some(summary.end_time),
                     ledger_residual: residual,
@@ -202,15 +168,10 @@ impl HardCase {
                     ..row
                 }
             }
-            Err(failure) => {
-                let passed = match (self.expected, &failure) {
-                    (Expected::Stops(words), Failure::Stopped(message))
-                    | (Expected::Refused(words), Failure::Refused(message)) => {
-                        message.contains(&words.replace('-', " "))
-                    }
-                    _ => false,
-                };
-                Stability { passed, outcome: failure.to_string(), ..row }
+            Err(outcome) => {
+                let is_as_expected =
+                    |(how, words): (&str, &str)| outcome.starts_with(how) && outcome.contains(&words.replace('-', " "));
+                Stability { passed: self.failure.is_some_and(is_as_expected), outcome, ..row }
             }
         }
     }
@@ -256,14 +217,14 @@ impl HardCase {
         parameters.validated()
     }
 
-    /// Summary, slips and, with an audit, residual of the ledger.
+    /// Summary, slips and, with an audit, residual of the ledger; or how it failed, in words.
     fn simulate(
         &self,
         solver: Solver,
         parameters: Result<Parameters, ParameterError>,
         has_audit: bool,
-    ) -> Result<(Summary, u64, Option<f64>), Failure> {
-        let parameters = parameters?;
+    ) -> Result<(Summary, u64, Option<f64>), String> {
+        let parameters = parameters.map_err(|error| format!("{REFUSED}: {error}"))?;
         let recording = Recording { slips: self.slips, discard: 0, ..Recording::default() };
         let mut observer = SlipObserver::new(&parameters, &recording);
         let (summary, residual) = interrupted_after(TIME_BUDGET, |interrupt| {
@@ -274,6 +235,12 @@ impl HardCase {
             } else {
                 simulate(&parameters, solver, limits, &mut observer).map(|summary| (summary, None))
             }
+        })
+        .map_err(|error| match error {
+            SimulationError::UnstableStep { .. } | SimulationError::BadTolerance { .. } => {
+                format!("{REFUSED}: {error}")
+            }
+            _ => format!("stopped {error}"),
         })?;
         Ok((summary, observer.into_rows().0.len() as u64, residual))
     }
