@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn ids_are_pinned() {
-        // A change here orphans every result: raise FORMAT of the manifest with it, or leave the hash alone.
+        // A change here orphans every result: raise FORMAT of results directories with it, or leave the hash alone.
         let modulated = Parameters {
             drive_velocity: 2e-4,
             modulation_amplitude: 1e-6,
