@@ -3,6 +3,7 @@
 import inspect
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from conftest import ROOT, results_in
 from nbclient import NotebookClient
 
 import stickslip as module
+from stickslip.tables import Sweep
 
 KEYS = {"N": 9, "Delta": 1e-6, "frequency": 29, "slips": 6}
 FLAGS = ("--set", "N=9", "--set", "Delta=1e-6", "--set", "frequency=29", "--slips", 6)
@@ -84,7 +86,7 @@ def test_a_dict_runs_as_the_file_with_its_text_does(stickslip, tmp_path):
     module.run(tmp_path / "sweep.toml", out=tmp_path / "file", threads=1, progress=False)
     expected = results_in(tmp_path / "command")
     # Three tables of six parts, one for each job, and the reduced data.
-    assert len(expected) == 3 * 6 + 5
+    assert len(expected) == 3 * 6 + 4
     assert results_in(tmp_path / "dict") == results_in(tmp_path / "file") == expected
     again = module.run(tmp_path / "dict", progress=False)
     assert again.directory == tmp_path / "dict" and results_in(tmp_path / "dict") == expected
@@ -145,6 +147,30 @@ def test_parameters_of_the_job_join_the_slips(opened):
         opened.slips(["Kdd"])
     with pytest.raises(ValueError, match="jobs: there is no column phase; there are job_id"):
         opened.jobs(["phase"])
+
+
+DAMAGES = {
+    "missing": Path.unlink,
+    "without its folder": lambda file: shutil.rmtree(file.parent),
+    "cut": lambda file: file.write_bytes(file.read_bytes()[:-9]),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("table", ["slips", "precursors"])
+def test_a_damaged_part_is_an_error_that_says_what_to_do_and_never_fewer_rows(results, tmp_path, table, damage):
+    copy = shutil.copytree(results, tmp_path / "copy")
+    file = min((copy / "tables" / table).iterdir())
+    DAMAGES[damage](file)
+    opened = module.open(copy)
+    read = getattr(opened, table)
+    readers = [read, lambda: read("onset"), lambda: read(["Kd"]), lambda: read(join=True), lambda: Sweep(copy).table(table)]
+    if table == "slips":
+        readers += [opened.reduce, Sweep(copy).slips]
+    for reader in readers:
+        with pytest.raises(module.ResultsError, match=rf"{file.name}: .*`?stickslip verify"):
+            reader()
+    assert len(opened.jobs()) == 10
 
 
 def test_mistakes_have_the_words_of_the_command(program, tmp_path):
@@ -296,7 +322,7 @@ def test_simulations_run_in_threads_at_once():
 def test_keys_are_described_where_people_look():
     signature = inspect.signature(module.simulate)
     assert signature.parameters["V0"].default == 1e-4 and signature.parameters["slips"].default == 20
-    assert "V0\n    Drive velocity. A finite number > 0, in m/s. Default: 0.0001." in module.simulate.__doc__
+    assert "V0\n    Drive velocity. A finite number > 0, in m/s, not so low" in module.simulate.__doc__
     assert {"eta", "frequency", "max_time", "tolerance", "dt", "method"} <= set(signature.parameters)
 
 

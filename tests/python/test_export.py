@@ -1,0 +1,76 @@
+"""pandas, polars and DuckDB read an export alike, in each format: the rows of the tables in the order of the plan, each
+with all that was swept and the frequency."""
+
+import csv
+
+import duckdb
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+SWEEP = """
+name = "exported"
+model = {{ N = 9 }}
+axes = {{ Kd = [4e6, 8e6], seed = {{ count = {seeds} }}, zip = [{{ Delta = [0, 1e-6], frequency = [29, 29] }}] }}
+record = {{ slips = 4, precursors = true }}
+"""
+TABLES = ("jobs", "precursors", "slips")
+READERS = {
+    "pandas": {"parquet": pd.read_parquet, "csv": pd.read_csv, "arrow": pd.read_feather},
+    "polars": {"parquet": pl.read_parquet, "csv": pl.read_csv, "arrow": pl.read_ipc},
+    "duckdb": {"arrow": lambda file: duckdb.from_arrow(pa.ipc.open_file(file).read_all())}
+    | dict.fromkeys(("parquet", "csv"), lambda file: duckdb.sql(f"from '{file}'")),
+}
+
+
+@pytest.fixture(scope="module")
+def extended(stickslip, tmp_path_factory):
+    """The results of a sweep that was extended, and its export in each format."""
+    folder = tmp_path_factory.mktemp("exported")
+    for seeds in (2, 3):
+        (folder / "sweep.toml").write_text(SWEEP.format(seeds=seeds))
+        stickslip("run", folder / "sweep.toml", "--out", folder / "results", "--no-reduce")
+    for format in ("parquet", "csv", "arrow"):
+        stickslip("export", folder / "results", "--out", folder / format, "--format", format)
+    return folder
+
+
+def rows(table):
+    """Names of columns, and rows as plain values, of any library's table."""
+    if isinstance(table, pd.DataFrame):
+        return list(table), table.astype(object).where(table.notna(), None).values.tolist()
+    return table.columns, [list(row) for row in (table.rows() if isinstance(table, pl.DataFrame) else table.fetchall())]
+
+
+def expected(results, name):
+    """A table in the order of its parts, with the frequency as people write it, and Kd, which only the jobs have."""
+    table, jobs = (pd.read_parquet(results / "tables" / folder) for folder in (name, "jobs"))
+    jobs = jobs.assign(frequency=[float(f"{1 / period:.12g}") for period in jobs["T"]])
+    return table.join(jobs.set_index("job_id")[["Kd", "frequency"][name == "jobs" :]], on="job_id")
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("format", ["parquet", "csv", "arrow"])
+def test_every_reader_finds_the_rows_of_the_tables_with_what_was_swept(extended, format, reader):
+    assert sorted(file.name for file in (extended / format).iterdir()) == [f"{table}.{format}" for table in TABLES]
+    for table in TABLES:
+        columns, found = rows(READERS[reader][format](extended / format / f"{table}.{format}"))
+        names, wanted = rows(expected(extended / "results", table))
+        assert columns == names and found == wanted and len(found) >= 2 * 2 * 3
+
+
+def test_units_are_in_the_fields(extended):
+    files = extended / "parquet" / "slips.parquet", extended / "arrow" / "slips.arrow"
+    for schema in (pq.read_schema(files[0]), pa.ipc.open_file(files[1]).schema):
+        units = {name: schema.field(name).metadata[b"unit"] for name in ("interval", "Kd", "frequency", "periods")}
+        assert units == {"interval": b"s", "Kd": b"N/m", "frequency": b"Hz", "periods": b""}
+
+
+def test_a_spreadsheet_takes_the_csv(extended):
+    for table in TABLES:
+        text = (extended / "csv" / f"{table}.csv").read_bytes().decode("ascii")
+        header, *lines = csv.reader(text.splitlines(), strict=True)
+        assert header == list(expected(extended / "results", table)) and {len(line) for line in lines} == {len(header)}
+        assert not {"nan", "inf", "null", "none"} & {field.lower() for line in lines for field in line}
