@@ -159,7 +159,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ("verify results/usal", &["results/usal: there is no such directory", "such as results/fig3"]),
         (
             "status good.toml",
-            &["good.toml: is no results directory (it has no run/manifest.json); name one that a run"],
+            &["good.toml: is no results directory (it has no run/extension-000.json); name one that a run"],
         ),
         ("status theirs", &["theirs: is no results directory", "such as results/"]),
         ("verify plain.txt", &["plain.txt: is no results directory", "such as results/"]),
