@@ -23,7 +23,7 @@ pub(crate) fn assert_table_documented(page: &str, heading: &str, fields: &[(Desc
 }
 
 /// Asserts that the first table below a heading of a page is this one.
-pub(crate) fn assert_rows_documented(page: &str, heading: &str, table: &str) {
+fn assert_rows_documented(page: &str, heading: &str, table: &str) {
     let text = std::fs::read_to_string(file(page)).unwrap();
     let start = text.find(&format!("\n{heading}\n")).unwrap();
     let start = start + text[start..].find("\n|").unwrap() + 1;

@@ -26,57 +26,12 @@ use crate::observe::Regime;
 use crate::table::value::Shortest;
 use std::cell::Cell;
 
-/// Keys with their meanings and allowed values, of messages and the documentation.
-type Keys = [(&'static str, &'static str, &'static str)];
-
-pub(super) const PRECISION: &Keys = &[
-    (
-        "of",
-        "Statistic of a set with a confidence interval, or a list of them",
-        "columns of the reduced [`sets`](reduced-tables.md#sets) that have `_low` and `_high`",
-    ),
-    ("relative", "Largest half-width of the 95 % interval, as a share of the statistic; not for an angle", "> 0, < 1"),
-    ("absolute", "The same in the unit of the statistic, in place of `relative`", "> 0"),
-    (
-        "seeds",
-        "Seeds of a set, 0, 1, ...: `from` at first, `to` at most",
-        "`{ from = 24, to = 256 }`; whole, 2 <= from <= to",
-    ),
-];
-
-pub(super) const REFINE: &Keys = &[
-    (
-        "axes",
-        "Axes along which cells are divided",
-        "names of ranges (`linear` or `log`) in [axes], not of whole numbers",
-    ),
-    (
-        "by",
-        "Column of the reduced [`sets`](reduced-tables.md#sets): a cell is divided where it differs",
-        "`locked`; `regime` or `periods`, also with `value`; a number with `threshold` or `step`",
-    ),
-    (
-        "value",
-        "Of `regime` or `periods`: sets differ if some have this value and some have not",
-        "`stick-slip`, `mixed` or `sliding`; a whole number",
-    ),
-    ("threshold", "Of a number: sets differ if some are above this value and some are not", "a finite number"),
-    ("step", "Of a number: sets differ if it varies by more than this", "> 0"),
-    (
-        "to",
-        "Largest distance of neighbours on each axis: in its unit if it is linear, as a share of the value if it is `log`",
-        "> 0, less than on the axis",
-    ),
-    ("sets", "Largest number of sets of the sweep", "whole, up to 100000; at least those of the axes as they stand"),
-];
-
-fn keys(table: &Keys) -> Vec<&'static str> {
-    table.iter().map(|(key, ..)| *key).collect()
-}
+const PRECISION: &[&str] = &["of", "relative", "absolute", "seeds"];
+const REFINE: &[&str] = &["axes", "by", "value", "threshold", "step", "to", "sets"];
 
 /// Reads `[precision]`, and the axis of seeds that it makes.
 pub(super) fn read_precision(section: &Section<'_>, places: &mut Places<'_>) -> Result<(Precision, Axis), Refused> {
-    section.only(&keys(PRECISION)).ok();
+    section.only(PRECISION).ok();
     let of = section.required("of", "the statistic that is to be precise, such as of = \"tau_mean\"");
     let statistics = of.and_then(|of| {
         let entries = of.list().unwrap_or_else(|| vec![of]);
@@ -163,7 +118,7 @@ pub(super) struct WantedAxis<'a> {
 
 /// Reads `[refine]` as far as it goes without the axes.
 pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, Refused> {
-    section.only(&keys(REFINE)).ok();
+    section.only(REFINE).ok();
     let axes = read_refined_axes(section);
     let by = section
         .required("by", "what tells sets apart, such as by = \"locked\"")
