@@ -54,7 +54,7 @@ def test_three_hosts_that_know_a_directory_extend_it_at_once(guest, program, ver
     half = whole.replace("count = 64", "count = 32")
     assert half != whole
     (guest.folder / "half.toml").write_text(half)
-    # Each host remembers the manifest with one sweep, and that there was no other.
+    # Each host remembers that there was one extension, and no other.
     for host in HOSTS:
         guest.run(host, f"/run/sandbox/stickslip run /run/sandbox/half.toml --out /mnt/{version}/{name} --no-reduce")
     try:
