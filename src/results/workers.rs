@@ -11,7 +11,7 @@
 
 use crate::results::commit::{Commit, own_number};
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
+use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::events::host;
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
@@ -20,7 +20,7 @@ use crate::table::shown::shown_text;
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -146,8 +146,18 @@ pub fn join<'a, T, E: From<ResultsError>>(
         // Without beats, workers of other hosts take this one for dead: double work.
         let _ = thread.spawn_scoped(scope, beats);
         let _end = end;
-        let ended = Results::open(member, sweep).map_err(E::from).and_then(|results| body(member, &results));
-        if ended.is_err() && member.is_buried() { Err(member.burial().into()) } else { ended }
+        let opened = Results::open(member, sweep);
+        let ended = opened.clone().map_err(E::from).and_then(|results| body(member, &results));
+        if ended.is_ok() {
+            return ended;
+        }
+        // That the directory was moved, or that others have taken over, says more than what was not found in it.
+        if let Some(moved) = opened.ok().and_then(|results| results.check_place().err())
+            && moved.kind == ErrorKind::Refused
+        {
+            return Err(moved.into());
+        }
+        if member.is_buried() { Err(member.burial().into()) } else { ended }
     })
 }
 
@@ -162,7 +172,7 @@ impl Layout<'_> {
             }
             let read = || Ok::<_, StorageError>((self.storage.read(&path)?, self.storage.modified(&path)?));
             // A beat may have replaced it while it was read.
-            let is_stale = |error: &StorageError| error.kind() == ErrorKind::StaleNetworkFileHandle;
+            let is_stale = |error: &StorageError| error.kind() == io::ErrorKind::StaleNetworkFileHandle;
             let (text, beat) = match read().or_else(|error| if is_stale(&error) { read() } else { Err(error) }) {
                 // One that ends at this moment.
                 Err(error) if error.is_missing() || error.is_no_file() => continue,
@@ -233,7 +243,7 @@ impl<'a> Member<'a> {
         let write = || storage.create(&new)?.write(text.as_bytes()).and_then(|()| storage.rename(&new, &self.file()));
         match write() {
             // Somebody who tidies up took it for a dead one's.
-            Err(error) if error.kind() == ErrorKind::NotFound => write(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => write(),
             written => written,
         }
     }
@@ -296,7 +306,7 @@ impl<'a> Member<'a> {
     pub fn tidy(&self) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
         let gone_is_fine = |removed: Result<(), StorageError>| match removed {
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             removed => removed,
         };
         // In this order: whoever comes later is not in these lists, and whoever came before is among the living.
@@ -458,7 +468,7 @@ pub(crate) mod tests {
             Ok(late?)
         });
         let error = suspended.unwrap_err();
-        assert!(error.kind == crate::results::ErrorKind::Stopped && error.to_string().contains("suspended"), "{error}");
+        assert!(error.kind == ErrorKind::Stopped && error.to_string().contains("suspended"), "{error}");
         assert!(!target.exists());
     }
 

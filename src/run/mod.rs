@@ -110,15 +110,7 @@ pub fn join<T, E: From<ResultsError>>(
         results.refuse_strangers(&all)?;
         let parts: Vec<Outline> = options.shard.parts(all.into_iter()).collect();
         layout.ensure_folder(&layout.tables()).map_err(ResultsError::from)?;
-        let ended = body(&Joined { results, parts: &parts, member, begin, threads, options });
-        // That the directory was moved says more than what was not found in it.
-        if ended.is_err()
-            && let Err(moved) = results.check_place()
-            && moved.kind == ErrorKind::Refused
-        {
-            return Err(moved.into());
-        }
-        let ended = ended?;
+        let ended = body(&Joined { results, parts: &parts, member, begin, threads, options })?;
         member.tidy().map_err(ResultsError::from)?;
         Ok(ended)
     })

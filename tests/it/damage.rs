@@ -1,7 +1,7 @@
 //! A corpus of damage to results directories: each kind is found and named, nothing is changed by looking, and the commands
 //! that are printed make the tables what they were.
 
-use crate::program::Folder;
+use crate::program::{Ended, Folder};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -259,8 +259,8 @@ fn damage_and_repair(folder: &Folder, whole: &str, damage: &Damage) {
     copy_all(&folder.path(whole), &directory);
     to(&directory);
     let before = folder.contents("r");
-    let text = folder.ends(4, "verify r").stdout;
-    assert!(text.contains(&format!("r/{file}")), "{name}: {text}");
+    let Ended { code, stdout: text, stderr } = folder.run("verify r");
+    assert!(code == Some(4) && text.contains(&format!("r/{file}")), "{name}: {code:?} {text}{stderr}");
     let report = json(&folder.ends(4, "verify r --json").stdout);
     assert!(folder.contents("r") == before, "{name}: looking changed something");
     let problems = report["problems"].as_array().unwrap();

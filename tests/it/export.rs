@@ -92,6 +92,9 @@ fn a_folder_that_is_not_empty_is_refused_and_what_is_missing_is_said() {
     let folder = Folder::new();
     folder.write("cheap.toml", &sweep(SEEDS));
     folder.ends(0, "run cheap.toml --out r --shard 1/2 --no-reduce");
+    for made in ["full", "killed/.unfinished-0"] {
+        fs::create_dir_all(folder.path(made)).unwrap();
+    }
     folder.write("full/mine.txt", "mine");
     let refused = folder.ends(2, "export r -o full");
     assert!(refused.stderr.contains("full: is not empty"), "{}", refused.stderr);

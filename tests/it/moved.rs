@@ -37,7 +37,7 @@ fn a_run_whose_directory_is_moved_or_removed_ends_and_begins_no_other_at_its_pla
         assert!(stderr.contains("r: the results directory was moved, removed or replaced"), "{stderr}");
         assert!(!r.exists());
         if is_moved {
-            folder.ends(0, "verify moved");
+            folder.ends(3, "verify moved");
             folder.ends(0, "run dear.toml --out moved --no-reduce");
         }
     }
@@ -57,7 +57,7 @@ fn a_run_whose_directory_is_replaced_by_that_of_another_sweep_leaves_that_as_it_
     assert!(stderr.contains("r: the results directory was moved, removed or replaced"), "{stderr}");
     assert!(folder.contents("r/tables") == tables);
     folder.ends(0, "verify r");
-    folder.ends(0, "verify moved");
+    folder.ends(3, "verify moved");
 }
 
 #[test]

@@ -40,7 +40,7 @@ fn rounds_are_the_same_for_one_process_four_and_kills_whenever_they_come() {
         child.kill().unwrap();
         if wait(child).0.is_none() {
             kills += 1;
-            let is_there = |round: &usize| folder.path(&format!("killed/run/sweep-{round:03}.toml")).exists();
+            let is_there = |round: &usize| folder.path(&format!("killed/run/extension-{round:03}.json")).exists();
             let rounds = (0..100).take_while(is_there).count();
             rounds_at_kills.insert(rounds);
         } else {

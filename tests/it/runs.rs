@@ -69,8 +69,7 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
         "figures/phi-eta.png",
         "figures/tau-T.svg",
         "figures/tau-T.png",
-        "run/manifest.json",
-        "run/sweep-000.toml",
+        "run/extension-000.json",
     ] {
         assert!(there.contains(&file), "{file} is not in {there:?}");
     }
