@@ -34,7 +34,7 @@ use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
 use crate::results::workers::{self, Member};
-use crate::results::{ErrorKind, Results, ResultsError};
+use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
 use crate::run::take::{LOOK, Left, Share};
