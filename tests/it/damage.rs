@@ -173,7 +173,7 @@ const PARTS: &[Damage] = &[
     damage("a bit of an extension's texts", "run/extension-000.json", 0, |root| {
         let path = root.join("run/extension-000.json");
         let text = fs::read_to_string(&path).unwrap();
-        fs::write(path, text.replace("count = 3", "count = 4")).unwrap();
+        fs::write(path, text.replace("count = 2", "count = 4")).unwrap();
     }),
     damage("a missing first extension", "run/extension-000.json", 0, |root| {
         fs::remove_file(root.join("run/extension-000.json")).unwrap();
