@@ -160,9 +160,8 @@ class ContactLog:
 
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """The command line of a module of the package, with the log and an option for each parameter."""
-    parser = argparse.ArgumentParser(
-        prog=f"python -m {module}", description=description, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("log", type=Path, help="contact log (Parquet)")
     group = parser.add_argument_group("parameters", "SI units; they override those in the footer of the log")
     for field in dataclasses.fields(Parameters)[:-1]:

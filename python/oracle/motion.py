@@ -30,11 +30,8 @@ class Contacts:
         """Attaches the contact of a row of the log, unstressed at `anchor`, in m."""
         place = log.place(row)
         self.attached[place] = self.watched[place] = True
-        self.threshold[place], self.stiffness[place], self.anchor[place] = (
-            log.threshold[row],
-            log.stiffness[row],
-            anchor,
-        )
+        self.threshold[place], self.stiffness[place] = log.threshold[row], log.stiffness[row]
+        self.anchor[place] = anchor
 
     def detach(self, place: tuple[int, int]) -> None:
         self.attached[place] = self.watched[place] = False

@@ -27,11 +27,8 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="python -m stickslip.compare_sets",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = argparse.ArgumentParser(prog="python -m stickslip.compare_sets", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("results", type=Path, help="results directory of a sweep")
     parser.add_argument("set_id", nargs=2, help="ids of the two sets")
     options = parser.parse_args()

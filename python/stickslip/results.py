@@ -32,17 +32,13 @@ class Results:
     """
 
     def __init__(self, directory: str | PathLike[str]) -> None:
-        self._directory = Path(fspath(directory))
+        #: Where the results are.
+        self.directory = Path(fspath(directory))
         #: Name of the sweep, and its text as TOML.
-        self.name, self.sweep = _stickslip.sweep_of(self._directory)
-
-    @property
-    def directory(self) -> Path:
-        """Where the results are."""
-        return self._directory
+        self.name, self.sweep = _stickslip.sweep_of(self.directory)
 
     def __repr__(self) -> str:
-        return f"stickslip.open({str(self._directory)!r})"
+        return f"stickslip.open({str(self.directory)!r})"
 
     def slips(self, columns: Sequence[str] | None = None, *, join: bool = False) -> Table:
         """One row per slip past start-up: onset and interval (s), phase (rad), forces (N), and more.
@@ -88,7 +84,7 @@ class Results:
 
     def reduce(self) -> None:
         """Reduces the tables again, as far as they are there: for `sets` and the others that a stopped run does not make."""
-        _stickslip.reduce(self._directory)
+        _stickslip.reduce(self.directory)
 
     @cached_property
     def plot(self) -> "Plot":
@@ -99,4 +95,4 @@ class Results:
 
     def _table(self, name: str, columns: Sequence[str] | None, join: bool = False) -> Table:
         columns = None if columns is None else [columns] if isinstance(columns, str) else list(columns)
-        return _stickslip.read(self._directory, name, columns, join)
+        return _stickslip.read(self.directory, name, columns, join)

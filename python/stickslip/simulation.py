@@ -21,14 +21,11 @@ class Simulation:
     def __init__(self, job: dict[str, Any], sweep: str, tables: dict[str, Table]) -> None:
         #: The row that a sweep would have for it among its jobs: parameters, outcome, mean friction (N), counts.
         self.job = job
+        #: `done`, `time limit` or `no slips`.
+        self.outcome: str = job["outcome"]
         #: The text of the sweep with this one job, as TOML.
         self.sweep = sweep
         self._tables = tables
-
-    @property
-    def outcome(self) -> str:
-        """`done`, `time limit` or `no slips`."""
-        return self.job["outcome"]
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name}: {len(table)} rows" for name, table in self._tables.items())

@@ -258,9 +258,7 @@ def stress_drops(results: Path) -> Section:
         "Force grows at the rate K_d V0 between slips, so drops follow τ; the square of their correlation is"
         f" {', '.join(f'{found.text(3)} {where}' for where, found in of_tau.items())}."
     )
-    section.verdict = (
-        "restates statement 3", "drops follow τ; at given τ they vary more with modulation, not less"
-    )
+    section.verdict = ("restates statement 3", "drops follow τ; at given τ they vary more with modulation, not less")
     return section
 
 

@@ -9,20 +9,12 @@ from functools import cache
 import numpy
 import pandas
 from numpy.typing import ArrayLike
-from scipy import optimize
 
+from stickslip._stickslip import minimum_phase
 from stickslip.statistics import rayleigh_p_of, resultant_length
 
 #: A set is locked if its Rayleigh p is below the one and its resultant length above the other (docs/model.md).
 LOCKED_P, LOCKED_LENGTH = 0.001, 0.5
-
-
-def minimum_phase(eta: float) -> float:
-    """φ_min of Eq. 2 in rad, as an equality: the load equals its preceding maximum, on the rising branch. η > 1."""
-    top = math.asin(1 / eta)
-    maximum = top - 2 * math.pi + eta * math.cos(top)
-    # The load rises from its minimum at -π - Φ_max to its maximum at Φ_max.
-    return optimize.brentq(lambda phase: phase + eta * math.cos(phase) - maximum, -math.pi - top, top, xtol=1e-15)
 
 
 def load_window(eta: float) -> tuple[float, float]:

@@ -138,12 +138,8 @@ def test_a_power_cut_loses_nothing_that_was_committed(kind, tmp_path):
         image = tmp_path / "image"
         shutil.copyfile(first, image)
         with Disk(image, tmp_path / "mount") as folder:
-            processes = [
-                subprocess.Popen(
-                    [PROGRAM, *command.split()], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-                )
-                for command in commands
-            ]
+            options = {"cwd": folder, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            processes = [subprocess.Popen([PROGRAM, *command.split()], **options) for command in commands]
             time.sleep(0.002 * rounds)
             while len(images) < IMAGES and any(process.poll() is None for process in processes):
                 living = [process for process in processes if process.poll() is None]

@@ -60,11 +60,7 @@ def test_the_tutorial_runs_as_written(program, tmp_path):
     (tmp_path / "stickslip").symlink_to(program.resolve())
     environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
     duckdb = "import duckdb, sys; rows = duckdb.sql(sys.argv[1]).fetchall(); assert len(rows) == 3, rows"
-    shells = {
-        "sh": ["bash", "-euc"],
-        "python": [sys.executable, "-c"],
-        "sql": [sys.executable, "-c", duckdb],
-    }
+    shells = {"sh": ["bash", "-euc"], "python": [sys.executable, "-c"], "sql": [sys.executable, "-c", duckdb]}
     blocks = re.findall(r"^```(\w+)\n(.*?)^```", (ROOT / "docs" / "tutorial.md").read_text(), re.M | re.S)
     assert {language for language, _ in blocks} == {"toml", "text", *shells}
     printed = ""
@@ -137,7 +133,9 @@ def test_links_lead_somewhere(page):
 
 def test_pages_named_in_sources_exist():
     folders = ("src", "scripts", "sweeps", "python", "tests")
-    files = [file for folder in folders for file in (ROOT / folder).rglob("*") if file.suffix in ("", ".rs", ".py", ".toml")]
+    files = [
+        file for folder in folders for file in (ROOT / folder).rglob("*") if file.suffix in ("", ".rs", ".py", ".toml")
+    ]
     assert len(files) > 100
     for file in files:
         if file.is_file() and "__pycache__" not in file.parts:

@@ -42,11 +42,8 @@ def writer(program, tmp_path):
     sweep, results = tmp_path / "live.toml", tmp_path / "results"
     sweep.write_text(SWEEP)
     slips = results / "tables" / "slips"
-    run = subprocess.Popen(
-        [program, "run", sweep, "--out", results, "--threads", "1"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    command = [program, "run", sweep, "--out", results, "--threads", "1"]
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     begin = time.monotonic()
     while not list(slips.glob("*")):
         assert run.poll() is None and time.monotonic() < begin + 60, "no part is committed"

@@ -65,21 +65,3 @@ def test_every_table_folder_reads_without_options(results, table, rows):
     }
     assert len(shapes) == 1, shapes
     assert rows is None or shapes.pop()[0] == rows
-
-
-def test_parameters_are_columns_of_numbers(results):
-    jobs = pd.read_parquet(results / "tables" / "jobs")
-    assert jobs["job_id"].is_unique
-    assert set(jobs["outcome"]) == {"done"}
-    assert set(jobs["N"]) == {9}
-    assert set(jobs["seed"]) == {0, 1, 2, 3, 4}
-    assert jobs["T"].dropna().eq(1 / 29).all() and jobs["T"].isna().eq(jobs["Delta"] == 0).all()
-
-
-def test_tables_join_on_the_job(results):
-    rows = duckdb.sql(f"""
-        select jobs.slips, count(*) from '{results}/tables/slips/*.parquet' as slips
-        join '{results}/tables/jobs/*.parquet' as jobs using (job_id) group by job_id, jobs.slips
-    """).fetchall()
-    assert len(rows) == JOBS
-    assert all(in_jobs == counted for in_jobs, counted in rows)
