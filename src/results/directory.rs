@@ -172,52 +172,38 @@ impl<'a> Results<'a> {
         Err(ResultsError::refused(self.layout.root(), problem))
     }
 
-    /// Looks up which parts are done, and refuses names in the folders of the tables that no part can have.
+    /// The parts that have a file in a table. Names that no part of this directory can have are refused.
+    fn parts_of(&self, table: &str) -> Result<HashSet<PartName>, ResultsError> {
+        let folder = self.layout.table(table);
+        let mut parts = HashSet::new();
+        for name in self.layout.storage.list(&folder)? {
+            match PartName::of_path(name.as_ref()) {
+                Some(part) if part.extension < self.extensions.len() => _ = parts.insert(part),
+                // A run may have added an extension since the directory was opened.
+                Some(_) if self.layout.listed_extensions()?.len() > self.extensions.len() => (),
+                _ => return Err(ResultsError::refused(&folder.join(name), STRANGER)),
+            }
+        }
+        Ok(parts)
+    }
+
+    /// Looks up which parts are done.
     pub fn done_parts(&self) -> Result<DoneParts, ResultsError> {
-        if self.extensions.is_empty() {
-            return Ok(DoneParts::default());
-        }
-        let mut done: Option<DoneParts> = None;
+        let tables: Vec<&str> = if self.extensions.is_empty() { Vec::new() } else { self.tables().collect() };
         // The jobs first: whoever has its jobs there has had the rest there before.
-        for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
-            let folder = self.layout.table(table);
-            let mut parts = HashSet::new();
-            for name in self.layout.storage.list(&folder)? {
-                let path = folder.join(name);
-                match PartName::of_path(&path).filter(|part| part.extension < self.extensions.len()) {
-                    Some(part) => _ = parts.insert(part),
-                    None if PartName::of_path(&path).is_some() && self.has_grown()? => (),
-                    None => {
-                        return Err(ResultsError::refused(&path, STRANGER));
-                    }
-                }
-            }
-            match &mut done {
-                Some(done) => done.0.retain(|part| parts.contains(part)),
-                None => done = Some(DoneParts(parts)),
-            }
-        }
-        Ok(done.unwrap_or_default())
+        let parts = tables.into_iter().rev().map(|table| self.parts_of(table)).collect::<Result<Vec<_>, _>>()?;
+        Ok(DoneParts(parts.into_iter().reduce(|done, parts| &done & &parts).unwrap_or_default()))
     }
 
     /// Refuses files of parts that are none of these, which are all: their jobs would be there twice.
     pub fn refuse_strangers(&self, parts: &[Outline]) -> Result<(), ResultsError> {
         let planned: HashSet<PartName> = parts.iter().map(PartName::from).collect();
         for table in self.tables() {
-            let folder = self.layout.table(table);
-            let strangers = self.layout.parts_in(&folder)?.into_iter().filter(|part| !planned.contains(part));
-            if let Some(stranger) = strangers.min()
-                && !self.has_grown()?
-            {
-                return Err(ResultsError::refused(&folder.join(stranger.file()), STRANGER));
+            if let Some(stranger) = self.parts_of(table)?.difference(&planned).min() {
+                return Err(ResultsError::refused(&self.layout.table(table).join(stranger.file()), STRANGER));
             }
         }
         Ok(())
-    }
-
-    /// Whether a run has added an extension since the directory was opened.
-    fn has_grown(&self) -> Result<bool, StorageError> {
-        Ok(self.layout.listed_extensions()?.len() > self.extensions.len())
     }
 
     /// Removes what earlier runs have left of parts that are not done: files of some of their tables, and spilled jobs.

@@ -18,7 +18,7 @@ use crate::table::shown::serialize_path;
 use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Staging folder of a repair.
 const WRITER: &str = "repair";
@@ -260,12 +260,13 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
             found.jobs_missing += part.jobs.len() as u64;
         }
         // The first problem stands for the part. Jobs first: a part without them is not done.
-        let (mut jobs, mut files) = (ids(results, &part), tables_of(results, &part));
-        for (path, problem, remedy) in damage {
-            let (jobs, mut moved) = (std::mem::take(&mut jobs), std::mem::take(&mut files));
-            moved.retain(|_| remedy == Remedy::Part);
-            let part = Some(name.to_string());
-            found.problems.push(Problem { part, jobs, moved, ..Problem::new(path, problem, remedy) });
+        for (number, (path, problem, remedy)) in damage.into_iter().enumerate() {
+            let mut of_part = Problem { part: Some(name.to_string()), ..Problem::new(path, problem, remedy) };
+            if number == 0 {
+                of_part.jobs = ids(results, &part).collect();
+                of_part.moved = if remedy == Remedy::Part { files_of(results, &part) } else { Vec::new() };
+            }
+            found.problems.push(of_part);
         }
     }
     found.problems.extend(strangers(results, &planned)?);
@@ -273,12 +274,12 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
 }
 
 /// The ids of the jobs of a part, in order.
-fn ids(results: &Results<'_>, part: &Part) -> Vec<String> {
-    (0..part.jobs.len()).map(|position| results.job_id(part, position)).collect()
+fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
+    (0..part.jobs.len()).map(|position| results.job_id(part, position))
 }
 
 /// The files of a part, that of its jobs first.
-fn tables_of(results: &Results<'_>, part: &Part) -> Vec<PathBuf> {
+fn files_of(results: &Results<'_>, part: &Part) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = results.tables().map(|table| results.part_file(table, part)).collect();
     files.reverse();
     files
@@ -360,37 +361,46 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
     let path = results.part_file(tables::JOBS, part);
     let jobs = dataset(tables::JOBS).rows::<JobCounts>().collect::<Result<Vec<_>, _>>()?;
     let jobs: Vec<JobCounts> = jobs.into_iter().flatten().collect();
-    let planned = ids(results, part);
-    for (position, expected) in planned.iter().enumerate() {
-        match jobs.get(position) {
-            Some(job) if job.job_id == *expected => (),
-            Some(job) => {
-                let problem = format!("it has job {} where the plan has {expected}", job.job_id);
-                return Err(DatasetError::damaged(&path)(problem));
-            }
-            None => return Err(DatasetError::damaged(&path)(format!("it ends where the plan has job {expected}"))),
+    let mut planned = 0;
+    for (expected, job) in ids(results, part).zip(&jobs) {
+        if job.job_id != expected {
+            return damaged(&path, format!("it has job {} where the plan has {expected}", job.job_id));
         }
+        planned += 1;
     }
-    if let Some(job) = jobs.get(planned.len()) {
-        return Err(DatasetError::damaged(&path)(format!("it has job {}, which its part has not", job.job_id)));
+    if jobs.len() != planned || part.jobs.len() != planned {
+        return damaged(&path, format!("it has {} jobs, and its part {}", jobs.len(), part.jobs.len()));
     }
     for table in results.tables().filter(|table| *table != tables::JOBS) {
         let path = results.part_file(table, part);
-        let mut rows: BTreeMap<String, u64> = BTreeMap::new();
+        let (mut rows, mut at) = (vec![0; jobs.len()], 0);
         for batch in dataset(table).rows::<RowOfJob>() {
-            batch?.into_iter().for_each(|row| *rows.entry(row.job_id).or_default() += 1);
+            for RowOfJob { job_id } in batch? {
+                // Rows stand in the order of the jobs.
+                at += jobs[at..].iter().take_while(|job| job.job_id != job_id).count();
+                match rows.get_mut(at) {
+                    Some(rows) => *rows += 1,
+                    None => {
+                        return damaged(
+                            &path,
+                            format!("it has rows of job {job_id} that are not its part's, or not there"),
+                        );
+                    }
+                }
+            }
         }
-        for JobCounts { job_id, outcome, slips, precursors } in &jobs {
+        for (JobCounts { job_id, outcome, slips, precursors }, rows) in jobs.iter().zip(rows) {
             let least = if table == tables::SLIPS { *slips } else { *precursors }.unwrap_or(0);
             let may_exceed = matches!(outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
-            let count = RowCount { least, may_exceed }.check(rows.remove(job_id.as_str()).unwrap_or(0));
-            count.map_err(|problem| DatasetError::damaged(&path)(format!("of job {job_id} {problem}")))?;
-        }
-        if let Some(job) = rows.keys().next() {
-            return Err(DatasetError::damaged(&path)(format!("it has rows of job {job}, which its part has not")));
+            let count = RowCount { least, may_exceed }.check(rows);
+            count.or_else(|problem| damaged(&path, format!("of job {job_id} {problem}")))?;
         }
     }
     Ok(())
+}
+
+fn damaged<T>(path: &Path, problem: String) -> Result<T, DatasetError> {
+    Err(DatasetError::damaged(path)(problem))
 }
 
 /// What lies in the folders of the tables and is no table or no part of the plan.

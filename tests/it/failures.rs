@@ -5,17 +5,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stickslip::sweep::Sweep;
 
-/// Each second job is poison: too stiff for the clock, too light for doubles, too many events.
+/// Each second job is poison: too stiff for the clock, too many events.
 const POISON: &str = "\
 name = \"poison\"
 [model]
 Ns = 4
 Delta = 1e-6
 [[axes.zip]]
-N = [3, 3, 3, 3, 30]
-K = [1e8, 1e30, 1e8, 1e8, 1e8]
-fs = [1.37, 1.37, 1.37, 1e308, 1.37]
-dfs = [6.9e-3, 6.9e-3, 6.8e-3, 1e308, 6.9e-3]
+N = [3, 3, 3, 30]
+K = [1e8, 1e30, 1e8, 1e8]
+dfs = [6.9e-3, 6.9e-3, 6.8e-3, 6.9e-3]
 [axes]
 eta = [3, 7]
 [record]
@@ -64,15 +63,15 @@ fn a_poison_job_is_reported_as_a_command_that_fails_in_the_same_way() {
     let ended = folder.ends(1, "run poison.toml --out r");
     let jobs = folder.table("r", "jobs");
     let outcomes = jobs.texts("outcome");
-    assert_eq!(outcomes.iter().filter(|outcome| **outcome == "failed").count(), 6, "{outcomes:?}");
+    assert_eq!(outcomes.iter().filter(|outcome| **outcome == "failed").count(), 4, "{outcomes:?}");
     let reasons: BTreeMap<&str, &str> = jobs.texts("job_id").into_iter().zip(jobs.texts("reason")).collect();
-    for part in ["is not finite", "is lost in the resolution", "400 contact events"] {
+    for part in ["is lost in the resolution", "400 contact events"] {
         assert!(reasons.values().any(|reason| reason.contains(part)), "{reasons:?}");
     }
 
     let failures = json(&folder.ends(1, "status r --json").stdout)["failures"].as_array().unwrap().clone();
     let status_report = folder.ends(1, "status r").stdout;
-    assert_eq!(failures.len(), 6);
+    assert_eq!(failures.len(), 4);
     for failure in &failures {
         let [job_id, reason, command] = ["job_id", "reason", "command"].map(|key| failure[key].as_str().unwrap());
         assert_eq!(reasons[job_id], reason);

@@ -43,7 +43,7 @@ fn a_file_name_that_suits_no_sweep_is_rejected_and_leaves_nothing() {
 #[test]
 fn every_command_has_a_manual_page() {
     let folder = Folder::new();
-    folder.ends(0, "man pages/man1");
+    folder.ends(0, "generate man pages/man1");
     for command in ["", "-run", "-simulate", "-init"] {
         let page = fs::read_to_string(folder.path(&format!("pages/man1/stickslip{command}.1"))).unwrap();
         assert!(page.contains(".SH DESCRIPTION") || page.contains(".SH OPTIONS"), "{command}: {page}");
