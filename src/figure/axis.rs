@@ -82,14 +82,8 @@ impl Axis {
         let is_scaled = is_small || (WRITTEN_OUT.end..LARGEST).contains(&largest);
         let power = if is_scaled { 3 * exponent(largest).div_euclid(3) } else { 0 };
         let axis = Self {
-            label: with_power(label, power),
-            short_label: None,
-            low,
-            high,
-            scale: Scale::Linear,
             finer: Finer::Steps(power),
-            ticks: Vec::new(),
-            minor: Vec::new(),
+            ..Self::fixed(&with_power(label, power), (low, high), Vec::new(), Vec::new())
         };
         axis.with_steps(nice_step((high - low) / max_ticks), power)
     }
@@ -144,18 +138,28 @@ impl Axis {
         Self::linear(label, (low / step).floor() * step, (high / step).ceil() * step)
     }
 
+    /// For data: logarithmic if the largest is more than `wide` times the least, else between round numbers, from `base` on
+    /// if no value is less; `None` without any.
+    pub(super) fn of_data(
+        label: &str,
+        values: impl Iterator<Item = f64> + Clone,
+        wide: f64,
+        base: f64,
+    ) -> Option<Self> {
+        let (low, high) = bounds(values.clone())?;
+        Some(match logarithmic_bounds(values) {
+            Some((start, end)) if low > 0.0 && high > wide * low => Self::logarithmic(label, start, end),
+            _ => Self::rounded(label, low.min(base), high),
+        })
+    }
+
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
         let axis = Self {
-            label: label.to_owned(),
-            short_label: None,
-            low,
-            high,
             scale: Scale::Logarithmic,
             finer: Finer::Mantissas,
-            ticks: Vec::new(),
-            minor: Vec::new(),
+            ..Self::fixed(label, (low, high), Vec::new(), Vec::new())
         };
         axis.with_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)])
     }

@@ -1,13 +1,12 @@
 //! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over locked sets.
 
 use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
-use super::frame::{Frame, Layout, RIGHT};
+use super::colour_bar::{COLOUR_BAR, ColourBar};
+use super::frame::{Cell, Layout, RIGHT};
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Dot, Picture, Sheet, Stroke};
-use super::scatter::Scatter;
+use super::picture::{Dot, Picture, Stroke};
 use super::sets::{ETA, Grid};
-use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
+use super::style::{BAR_WIDTH, BLACK, BLUE, GREY, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetSummary};
 use std::collections::BTreeMap;
@@ -15,6 +14,9 @@ use std::f64::consts::PI;
 
 const WIDTH: f64 = 580.0;
 const HEIGHTS: &[f64] = &[390.0];
+/// Slips one by one, those of locked sets over the others.
+const OTHER: Dot = Dot { ink: GREY, radius: 1.6, opacity: 0.45 };
+const LOCKED: Dot = Dot { ink: BLACK, ..OTHER };
 const AVERAGE: Dot = dot(BLUE);
 /// Around it, so that it is seen on dark cells.
 const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
@@ -34,14 +36,19 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
 pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummary], look: &Look) -> Option<Picture> {
-    let slips = Scatter::new(points, 1.6, 0.45, |point| Some((point.eta, point.phase?)));
-    let density = (slips.xs().count() >= MIN_SLIPS).then(|| Density::of(&slips));
+    let placed: Vec<(&Point, Place)> =
+        points.iter().filter_map(|point| Some((point, (point.eta, point.phase?)))).collect();
+    let slips: Vec<Place> = placed.iter().map(|slip| slip.1).collect();
+    let density = (slips.len() >= MIN_SLIPS).then(|| Density::of(&slips));
     let (low, high) = match &density {
         Some(density) => bounds(density.cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?,
-        None => logarithmic_bounds(slips.xs())?,
+        None => logarithmic_bounds(slips.iter().map(|slip| slip.0))?,
     };
     let averages = averages(bins, sets);
-    let mut entries: Vec<Entry> = if density.is_some() { Vec::new() } else { slips.legend().to_vec() };
+    let mut entries: Vec<Entry> = Vec::new();
+    if density.is_none() {
+        entries.extend([entry(Mark::Dot(LOCKED), "slips of locked sets"), entry(Mark::Dot(OTHER), "other slips")]);
+    }
     entries.extend([
         entry(Mark::Bar(AVERAGE), "mean of locked sets, 95 %"),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
@@ -51,13 +58,20 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummar
     let right = if density.is_some() { COLOUR_BAR } else { RIGHT };
     let (page, mut sheet) = Layout::column(WIDTH, HEIGHTS, 0.0, right).page("phi-eta", look, &entries);
     let x = Axis::logarithmic(ETA, low, high);
-    let (low, high) = angle_bounds(slips.ys());
+    let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let frame = page.frame(0, 0, x, Axis::angle("Phase φ (rad)", low, high));
 
     frame.clipped(&mut sheet, |sheet| {
         match &density {
-            Some(density) => density.draw(sheet, &frame),
-            None => slips.draw(sheet, &frame),
+            Some(Density { shades, cells }) => {
+                frame.cells(sheet, cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density)))));
+            }
+            None => {
+                for (is_locked, dot) in [(false, OTHER), (true, LOCKED)] {
+                    let slips = placed.iter().filter(|slip| slip.0.is_locked == is_locked);
+                    frame.points(sheet, slips.map(|slip| slip.1), dot);
+                }
+            }
         }
         frame.upright(sheet, 1.0, REFERENCE);
         let modulated = || frame.x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
@@ -94,8 +108,8 @@ fn averages(bins: &[BackboneBin], sets: &[SetSummary]) -> Vec<Average> {
     bins.iter().filter_map(average).collect()
 }
 
-/// A cell of the density: its ends along η and along φ.
-type Cell = ((f64, f64), (f64, f64));
+/// η and φ of a slip.
+type Place = (f64, f64);
 
 /// How slips at each η are spread over the phase.
 struct Density {
@@ -105,11 +119,11 @@ struct Density {
 }
 
 impl Density {
-    fn of(slips: &Scatter) -> Self {
-        let columns = columns(slips.xs());
+    fn of(slips: &[Place]) -> Self {
+        let columns = columns(slips.iter().map(|slip| slip.0));
         let height = PI / ROWS;
         let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
-        for (eta, phase) in slips.xs().zip(slips.ys()) {
+        for &(eta, phase) in slips {
             let column = columns.partition_point(|column| column.1 <= eta).min(columns.len() - 1);
             #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
             let row = (phase / height).floor() as i64;
@@ -128,13 +142,6 @@ impl Density {
             .collect();
         let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
         Self { shades: Axis::logarithmic("", FAINTEST, most), cells }
-    }
-
-    fn draw(&self, sheet: &mut Sheet, frame: &Frame) {
-        sheet.rectangles(self.cells.iter().map(|&((x, y), density)| {
-            let [left, top, width, height] = frame.box_of(x, y);
-            ([left, top, width + OVERLAP, height + OVERLAP], shade(self.shades.place(density)))
-        }));
     }
 }
 
@@ -175,8 +182,7 @@ mod tests {
     #[test]
     fn the_density_of_a_column_integrates_to_one() {
         let point = |step: u32| (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5);
-        let slips = Scatter::of((0..3000).map(point));
-        let density = Density::of(&slips);
+        let density = Density::of(&(0..3000).map(point).collect::<Vec<_>>());
         for eta in [2.0, 8.0] {
             let column = density.cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));
             let integral: f64 = column.map(|((_, y), density)| density * (y.1 - y.0)).sum();

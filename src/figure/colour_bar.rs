@@ -1,7 +1,7 @@
 //! Colour bars: what the colours of a map mean, beside its frame.
 
 use super::axis::Axis;
-use super::frame::{Frame, fitting};
+use super::frame::{Frame, OVERLAP, fitting};
 use super::picture::{Anchor, Sheet};
 use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT, shade};
 use kuva::render::color::Color;
@@ -12,8 +12,6 @@ const GAP: f64 = 18.0;
 const WIDTH: f64 = 18.0;
 /// Between the label's end and that of the bar's space.
 const INSET: f64 = 14.0;
-/// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
-pub(super) const OVERLAP: f64 = 0.5;
 
 pub(super) struct ColourBar<'a> {
     pub(super) label: &'a str,

@@ -1,7 +1,7 @@
 //! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line
 //! for each modulation.
 
-use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::axis::{Axis, bounds};
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
 use super::picture::{Picture, Sheet};
@@ -88,16 +88,11 @@ impl Quantity {
     /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
     fn axis(&self, sets: &[SetSummary]) -> Option<Axis> {
         let ends = || sets.iter().filter_map(self.value).flat_map(Statistic::ends);
-        let (low, high) = bounds(ends())?;
-        if self.is_share {
-            return Some(Axis::linear(self.label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0));
+        if !self.is_share {
+            return Axis::of_data(self.label, ends().map(|end| end.max(0.0)), WIDE, 0.0);
         }
-        match logarithmic_bounds(ends()) {
-            Some((low_end, high_end)) if low > 0.0 && high > WIDE * low => {
-                Some(Axis::logarithmic(self.label, low_end, high_end))
-            }
-            _ => Some(Axis::rounded(self.label, 0.0, high)),
-        }
+        let (low, _) = bounds(ends())?;
+        Some(Axis::linear(self.label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
     }
 }
 

@@ -5,7 +5,9 @@ use super::axis::Axis;
 use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Dot, Fill, Sheet, Stroke, snapped};
-use super::style::{AXIS, BAR_WIDTH, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, TICK_TEXT, WHITE};
+use super::style::{
+    AXIS, BAR_WIDTH, DARK_GREY, HALF_DIGIT, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, TICK_TEXT, WHITE, ink_on,
+};
 use crate::reduce::Statistic;
 use kuva::render::color::Color;
 
@@ -39,6 +41,8 @@ const LEGEND_ROW: f64 = 24.0;
 const NOTE_ROW: f64 = 16.0;
 /// Of the label of the y axis over the frame or its heading.
 const Y_LABEL_RISE: f64 = 13.0;
+/// By how much a cell reaches under a neighbour that is drawn later: viewers that scale would show a seam.
+pub(super) const OVERLAP: f64 = 0.5;
 /// Shortest side of a frame; a sheet that is asked to be smaller becomes larger.
 const SHORTEST: f64 = 60.0;
 
@@ -167,6 +171,9 @@ impl Page {
     }
 }
 
+/// A rectangle of data: its ends along x and along y.
+pub(super) type Cell = ((f64, f64), (f64, f64));
+
 /// A rectangle with two axes.
 pub(super) struct Frame {
     pub(super) left: f64,
@@ -211,6 +218,21 @@ impl Frame {
         let [left, right] = [x.0, x.1].map(|value| snapped(self.x_of(value)));
         let [top, bottom] = [y.1, y.0].map(|value| snapped(self.y_of(value)));
         [left, top, right - left, bottom - top]
+    }
+
+    /// Cells of data, each in its own colour.
+    pub(super) fn cells(&self, sheet: &mut Sheet, cells: impl IntoIterator<Item = (Cell, Color)>) {
+        sheet.rectangles(cells.into_iter().map(|((x, y), colour)| {
+            let [left, top, width, height] = self.box_of(x, y);
+            ([left, top, width + OVERLAP, height + OVERLAP], colour)
+        }));
+    }
+
+    /// A short text in the middle of a cell of this shade.
+    pub(super) fn name_cell(&self, sheet: &mut Sheet, (x, y): Cell, text: &str, share: f64) {
+        let (x, y) = self.place((self.x.middle(x.0, x.1), self.y.middle(y.0, y.1)));
+        let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
+        sheet.coloured_text(place, text, LEGEND_TEXT, Anchor::Middle, Some(ink_on(share)));
     }
 
     /// Shows what `draw` draws inside the frame only.

@@ -1,9 +1,8 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
 use super::axis::{Axis, bounds};
-use super::colour_bar::OVERLAP;
 use super::font;
-use super::frame::{Frame, Layout, RIGHT};
+use super::frame::{Frame, Layout, OVERLAP, RIGHT};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
 use super::sets::{modulation, setting, swept, thousands};

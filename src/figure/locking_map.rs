@@ -2,13 +2,13 @@
 //! modulation.
 
 use super::axis::Axis;
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
-use super::frame::{Frame, Layout, ROW_GAP};
+use super::colour_bar::{COLOUR_BAR, ColourBar};
+use super::frame::{Layout, ROW_GAP};
 use super::legend::{Mark, entry};
-use super::picture::{Anchor, Fill, Ink, Picture, Sheet, Stroke};
+use super::picture::{Fill, Ink, Picture, Stroke};
 use super::regions::middles;
 use super::sets::{Grid, MICROMETRES, Modulations, Periods, is_modulated};
-use super::style::{BLACK, HALF_DIGIT, LEGEND_TEXT, Look, WHITE, ink_on, shade};
+use super::style::{BLACK, Look, WHITE, shade};
 use crate::reduce::SetSummary;
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
@@ -59,12 +59,9 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
             let period = periods.grid.index_of(periods.place(set.parameters.modulation_period?));
             Some((period, amplitudes.index_of(MICROMETRES * set.parameters.modulation_amplitude)))
         };
+        let ends = |(column, row)| (periods.grid.cell(column), amplitudes.cell(row));
         frame.clipped(&mut sheet, |sheet| {
-            sheet.rectangles(modulated.iter().filter_map(|set| {
-                let (column, row) = cell(set)?;
-                let [left, top, width, height] = frame.box_of(periods.grid.cell(column), amplitudes.cell(row));
-                Some(([left, top, width + OVERLAP, height + OVERLAP], cell_colour(set)?))
-            }));
+            frame.cells(sheet, modulated.iter().filter_map(|set| Some((ends(cell(set)?), cell_colour(set)?))));
             for stroke in [CASING, LINE] {
                 let places = frame.x.evenly_placed(200);
                 frame.curve(sheet, places.map(|place| (place, critical_amplitude(place))), stroke);
@@ -73,10 +70,8 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
         if panel == 0 {
             let locked = modulated.iter().filter(|set| set.is_locked);
             let locked = locked.filter_map(|set| Some((cell(set)?, whole_periods(set)?))).collect();
-            for ((column, row), n) in middles(&locked) {
-                let middle = |(low, high): (f64, f64), axis: &Axis| axis.middle(low, high);
-                let place = (middle(periods.grid.cell(column), &frame.x), middle(amplitudes.cell(row), &frame.y));
-                print_number(&mut sheet, &frame, place, n, numbers.share(n));
+            for (cell, n) in middles(&locked) {
+                frame.name_cell(&mut sheet, ends(cell), &n.to_string(), numbers.share(n));
             }
         }
         frame.axes(&mut sheet);
@@ -123,12 +118,6 @@ impl Numbers {
             ticks: all.map(|n| (((n - self.first) as f64 + 0.5) / count, number(n))).collect(),
         }
     }
-}
-
-fn print_number(sheet: &mut Sheet, frame: &Frame, place: (f64, f64), n: usize, share: f64) {
-    let (x, y) = frame.place(place);
-    let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-    sheet.coloured_text(place, &n.to_string(), LEGEND_TEXT, Anchor::Middle, Some(ink_on(share)));
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! ```text
 //! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
 //! own.rs  -> any column of the sets against any other
-//!            scatter.rs, sets.rs     slips as dots; in what sets differ, and the grid on which they lie
+//!            sets.rs                 in what sets differ, and the grid on which they lie
 //!            frame.rs, axis.rs       panels on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
 //!            style.rs                sizes, strokes and colours of all figures
 //!            picture.rs, pdf.rs      lines, discs, text -> SVG, PNG, PDF
@@ -29,7 +29,6 @@ mod picture;
 mod refined;
 mod regimes;
 mod regions;
-mod scatter;
 mod sets;
 mod simulation;
 mod staircase;

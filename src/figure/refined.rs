@@ -1,7 +1,7 @@
 //! Refined grids: a map of cells of different size with the edge between two kinds of sets; and, along one axis, the edge
 //! against another parameter, each with the band in which it lies.
 
-use super::axis::Axis;
+use super::axis::{Axis, bounds};
 use super::dependence::{label, number};
 use super::frame::{Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
@@ -69,11 +69,6 @@ type Ends = (f64, f64);
 /// A quantity of a set.
 type Quantity = Box<dyn Fn(&SetSummary) -> Option<f64>>;
 
-/// The least and the largest value.
-fn range(values: impl Iterator<Item = f64>) -> Ends {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-}
-
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let first = cells.first()?;
     let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(&first.x), axis_of(first.y.as_deref()?));
@@ -89,8 +84,8 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     if boxes.values().any(|&count| count > 1) {
         return None;
     }
-    let (x_low, x_high) = range(placed.iter().flat_map(|(x, ..)| [x.0, x.1]));
-    let (y_low, y_high) = range(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]));
+    let (x_low, x_high) = bounds(placed.iter().flat_map(|(x, ..)| [x.0, x.1]))?;
+    let (y_low, y_high) = bounds(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]))?;
     let [yes, no] = words(&first.by);
     let patch = |ink| Mark::Patch(Fill { ink, opacity: 1.0 });
     let legend = [entry(patch(YES), yes), entry(patch(NO), no), entry(patch(EDGE), "the edge lies here")];
@@ -137,8 +132,8 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
         .iter()
         .filter_map(|(cell, set)| Some((x_factor * of(set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
         .collect();
-    let (x_low, x_high) = range(points.iter().map(|point| point.0));
-    let (y_low, y_high) = range(points.iter().flat_map(|point| [point.1, point.2]));
+    let (x_low, x_high) = bounds(points.iter().map(|point| point.0))?;
+    let (y_low, y_high) = bounds(points.iter().flat_map(|point| [point.1, point.2]))?;
     let [yes, _] = words(&cells[0].by);
     let edge = if yes == "locked" { "locking" } else { &yes };
     let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];

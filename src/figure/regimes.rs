@@ -1,14 +1,14 @@
 //! Regimes: share of time within slips, mean friction and mean interval, along one parameter or over two.
 
-use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
+use super::axis::Axis;
+use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::dependence::{label, lines, number};
-use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::frame::{Cell, Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
-use super::picture::{Anchor, Dot, Picture, Sheet, Stroke};
+use super::picture::{Dot, Picture, Sheet, Stroke};
 use super::regions::middles;
 use super::sets::{Grid, distinct, modulation, swept};
-use super::style::{BLACK, HALF_DIGIT, INKS, LEGEND_TEXT, Look, RADIUS, REFERENCE, WHITE, curve, dot, ink_on, shade};
+use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, WHITE, curve, dot, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetSummary, Statistic};
@@ -53,7 +53,7 @@ pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     for (row, (y_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
         let y = match row {
             0 => Axis::linear(y_label, -0.03, 1.03),
-            _ => scale(y_label, sets.iter().filter_map(statistic).flat_map(Statistic::ends))?,
+            _ => Axis::of_data(y_label, sets.iter().filter_map(statistic).flat_map(Statistic::ends), LOGARITHMIC, 0.0)?,
         };
         let frame = page.frame(row, 0, x.clone(), y);
         if row == 0 {
@@ -62,22 +62,14 @@ pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
             }
         }
         for (line, ink) in lines.iter().zip(INKS) {
-            let known = |set: &&&SetSummary| statistic(set).is_some();
             let point = |set: &&SetSummary| Some((number(&set.parameters, symbol)?, statistic(set)?));
-            let points: Vec<(f64, Statistic)> = line.iter().filter_map(point).collect();
-            frame.statistics(&mut sheet, &points, curve(ink), RADIUS);
-            let sliding = line.iter().filter(known).filter(|set| set.regime == Some(Regime::Sliding));
-            let centres: Vec<(f64, f64)> = sliding.filter_map(point_value(symbol, statistic)).collect();
-            frame.points(&mut sheet, centres, Dot::solid(WHITE, RADIUS - 1.6));
+            frame.statistics(&mut sheet, &line.iter().filter_map(point).collect::<Vec<_>>(), curve(ink), RADIUS);
+            let sliding = line.iter().filter(|set| set.regime == Some(Regime::Sliding)).filter_map(point);
+            frame.points(&mut sheet, sliding.map(|(x, y)| (x, y.value)), Dot::solid(WHITE, RADIUS - 1.6));
         }
         frame.axes(&mut sheet);
     }
     Some(sheet.finish())
-}
-
-/// Where a set lies in a panel.
-fn point_value(symbol: Symbol, statistic: Getter) -> impl Fn(&&SetSummary) -> Option<(f64, f64)> {
-    move |set| Some((number(&set.parameters, symbol)?, statistic(set)?.value))
 }
 
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
@@ -100,9 +92,11 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     }
     let [columns, rows] = grids.map(Grid::of);
     let cell = |set: &SetSummary| {
-        let place = |symbol, grid: &Grid| Some(grid.cell_of(number(&set.parameters, symbol)?));
+        let place = |symbol, grid: &Grid| Some(grid.index_of(number(&set.parameters, symbol)?));
         Some((place(horizontal, &columns)?, place(vertical, &rows)?))
     };
+    let ends = |(column, row)| (columns.cell(column), rows.cell(row));
+    let cells: Vec<(&SetSummary, Cell)> = sets.iter().filter_map(|set| Some((set, ends(cell(set)?)))).collect();
     let (page, mut sheet) = MAP.page(
         "regime-map",
         look,
@@ -110,19 +104,24 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     );
     for (row, (bar_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
         let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
-        let shades = if row == 0 { Axis::linear(bar_label, 0.0, 1.0) } else { scale(bar_label, values)? };
+        let shades = if row == 0 {
+            Axis::linear(bar_label, 0.0, 1.0)
+        } else {
+            Axis::of_data(bar_label, values, LOGARITHMIC, 0.0)?
+        };
         let frame = page.frame(row, 0, columns.axis(&label(horizontal)), rows.axis(&label(vertical)));
         frame.clipped(&mut sheet, |sheet| {
-            sheet.rectangles(sets.iter().filter_map(|set| {
-                let (x, y) = cell(set)?;
-                let [left, top, width, height] = frame.box_of(x, y);
-                let colour = shade(shades.place(statistic(set)?.value));
-                Some(([left, top, width + OVERLAP, height + OVERLAP], colour))
-            }));
-            borders(sheet, &frame, sets, cell);
+            let colour = |set| Some(shade(shades.place(statistic(set)?.value)));
+            frame.cells(sheet, cells.iter().filter_map(|&(set, cell)| Some((cell, colour(set)?))));
+            borders(sheet, &frame, &cells);
         });
         if row == 0 {
-            names(&mut sheet, &frame, sets, [&columns, &rows], [horizontal, vertical]);
+            let regime = |set: &SetSummary| REGIMES.iter().position(|regime| set.regime == Some(*regime));
+            let numbers = sets.iter().filter_map(|set| Some((cell(set)?, regime(set)?))).collect();
+            for (middle, index) in middles(&numbers) {
+                let share = if REGIMES[index] == Regime::StickSlip { 0.0 } else { 1.0 };
+                frame.name_cell(&mut sheet, ends(middle), REGIMES[index].word(), share);
+            }
         }
         frame.axes(&mut sheet);
         ColourBar::of_axis(bar_label, &shades).draw(&mut sheet, &frame);
@@ -130,30 +129,10 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     Some(sheet.finish())
 }
 
-/// Prints the name of each regime into its region.
-fn names(sheet: &mut Sheet, frame: &Frame, sets: &[SetSummary], [columns, rows]: [&Grid; 2], symbols: [Symbol; 2]) {
-    let index = |set: &SetSummary, symbol, grid: &Grid| Some(grid.index_of(number(&set.parameters, symbol)?));
-    let regime = |set: &SetSummary| {
-        let cell = (index(set, symbols[0], columns)?, index(set, symbols[1], rows)?);
-        Some((cell, REGIMES.iter().position(|regime| set.regime == Some(*regime))?))
-    };
-    for ((column, row), index) in middles(&sets.iter().filter_map(regime).collect()) {
-        let (x, y) = (columns.cell(column), rows.cell(row));
-        let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
-        let ink = ink_on(if REGIMES[index] == Regime::StickSlip { 0.0 } else { 1.0 });
-        let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-        sheet.coloured_text(place, REGIMES[index].word(), LEGEND_TEXT, Anchor::Middle, Some(ink));
-    }
-}
-
-/// A cell as its ends along x and along y.
-type Cell = ((f64, f64), (f64, f64));
-
 /// Lines between neighbouring cells of different regimes.
-fn borders(sheet: &mut Sheet, frame: &Frame, sets: &[SetSummary], cell: impl Fn(&SetSummary) -> Option<Cell>) {
-    let cells: Vec<(Cell, Option<Regime>)> = sets.iter().filter_map(|set| Some((cell(set)?, set.regime))).collect();
-    for (index, &((x, y), regime)) in cells.iter().enumerate() {
-        for &((other_x, other_y), _) in cells[index + 1..].iter().filter(|(_, other)| *other != regime) {
+fn borders(sheet: &mut Sheet, frame: &Frame, cells: &[(&SetSummary, Cell)]) {
+    for (index, &(set, (x, y))) in cells.iter().enumerate() {
+        for &(_, (other_x, other_y)) in cells[index + 1..].iter().filter(|(other, _)| other.regime != set.regime) {
             let meets = |a: (f64, f64), b: (f64, f64)| {
                 [(a.1, b.0), (b.1, a.0)].into_iter().find(|(end, start)| (end / start - 1.0).abs() < 1e-9)
             };
@@ -168,17 +147,6 @@ fn borders(sheet: &mut Sheet, frame: &Frame, sets: &[SetSummary], cell: impl Fn(
             }
         }
     }
-}
-
-/// A scale for data: logarithmic if they span much; `None` without any.
-fn scale(label: &str, values: impl Iterator<Item = f64>) -> Option<Axis> {
-    let values: Vec<f64> = values.collect();
-    let (low, high) = bounds(values.iter().copied())?;
-    if low > 0.0 && high / low > LOGARITHMIC {
-        let (low, high) = logarithmic_bounds(values.into_iter())?;
-        return Some(Axis::logarithmic(label, low, high));
-    }
-    Some(Axis::rounded(label, low.min(0.0), high))
 }
 
 #[cfg(test)]

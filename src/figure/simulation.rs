@@ -2,8 +2,8 @@
 //! contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar, OVERLAP};
-use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::colour_bar::{COLOUR_BAR, ColourBar};
+use super::frame::{Frame, Layout, OVERLAP, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
 use super::picture::{Picture, Sheet, Stroke, snapped};
 use super::sets::{MICROMETRES, common};

@@ -1,7 +1,7 @@
 //! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and
 //! the locking index under it.
 
-use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::axis::Axis;
 use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Fill, Ink, Picture, Sheet, Stroke};
@@ -31,7 +31,8 @@ pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let free = sets.free.and_then(|set| set.tau_mean).map(|tau| tau.value);
     let periods = Periods::of(&sets.periods, free);
     let x = periods.grid.axis(periods.label);
-    let y = intervals_axis(sets.modulated.iter().filter_map(|set| quartiles(set)).flatten())?;
+    let ratios = sets.modulated.iter().filter_map(|set| quartiles(set)).flatten();
+    let y = Axis::of_data("Slip interval τ / T, median", ratios, WIDE, f64::INFINITY)?;
     let mut entries: Vec<Entry> =
         sets.amplitudes.iter().zip(INKS).map(|(&height, ink)| entry(Mark::Dot(dot(ink)), amplitude(height))).collect();
     entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
@@ -58,16 +59,6 @@ pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
         frame.axes(&mut sheet);
     }
     Some(sheet.finish())
-}
-
-fn intervals_axis(ratios: impl Iterator<Item = f64> + Clone) -> Option<Axis> {
-    let label = "Slip interval τ / T, median";
-    let (low, high) = bounds(ratios.clone())?;
-    if high <= WIDE * low {
-        return Some(Axis::rounded(label, low, high));
-    }
-    let (low, high) = logarithmic_bounds(ratios)?;
-    Some(Axis::logarithmic(label, low, high))
 }
 
 /// One amplitude: sets at their places.

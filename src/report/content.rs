@@ -2,18 +2,19 @@
 
 use super::ADVICE;
 use super::slips::Slips;
-use super::tables::{Census, Columns, Sets, backbone};
+use super::tables::{Census, Sets, backbone};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
+use crate::model::{Description, MODEL_VERSION, RNG_SCHEME, Symbol};
 use crate::reduce::advise;
 use crate::results::Results;
-use crate::run::{RunEvent, Status, status_with};
+use crate::run::{RunEvent, status_with};
 use crate::sweep::PLAN_VERSION;
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
 use anyhow::Result;
 use serde::Serialize;
+use serde_json::{Value as Json, json};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Failed jobs that are listed.
@@ -25,50 +26,6 @@ const MAX_RUNS: usize = 50;
 /// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
-
-/// Serialised, it is what the scripts of the page read.
-#[derive(Debug, Serialize)]
-pub(super) struct Content {
-    program: &'static str,
-    model_version: u32,
-    rng_scheme: &'static str,
-    plan_version: u32,
-    directory: String,
-    /// Set while a run goes on.
-    live: Option<Live>,
-    status: Status,
-    /// Keys that each axis moves, and its number of values.
-    axes: Vec<(String, u64)>,
-    /// Texts of the sweep files, in order.
-    sweeps: Vec<String>,
-    parameters: Vec<Parameter>,
-    census: Census,
-    sets_every: u64,
-    sets: Sets,
-    slips: Slips,
-    backbone: Columns,
-    /// η, φ_min and its asymptote.
-    curves: Vec<[Option<f64>; 3]>,
-    cost: Cost,
-    runs: Vec<Run>,
-}
-
-/// A page that is written again while a run goes on. Times in s.
-#[derive(Debug, Serialize)]
-struct Live {
-    /// Time after which it is worth while to load the page again.
-    refresh: f64,
-    /// When it was written, since 1970 UTC.
-    written: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct Parameter {
-    key: &'static str,
-    symbol: &'static str,
-    unit: &'static str,
-    meaning: &'static str,
-}
 
 /// Predicted and measured CPU time, in s, as the logs say.
 #[derive(Debug, Default, Serialize)]
@@ -91,61 +48,48 @@ struct Run {
     ended: Option<(u64, f64)>,
 }
 
-impl Content {
-    /// Reads a directory with reduced data.
-    pub(super) fn read(results: &Results<'_>, refresh: Option<Duration>) -> Result<(Self, Vec<u8>)> {
-        let layout = results.layout();
-        let sweep = results.sweep();
-        let (cost, runs) = logs(results)?;
-        let damaged = advise(ADVICE);
-        let census = Census::read(layout).map_err(&damaged)?;
-        let sets_every = census.spacing();
-        let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
-        let slips_every = census.slips.div_ceil(sets_every);
-        let slips = Slips::read(results, &sets.places, slips_every).map_err(&damaged)?;
-        let live = refresh.map(|refresh| Live {
-            refresh: refresh.as_secs_f64(),
-            written: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64()),
-        });
-        let bytes = slips.bytes();
-        let content = Self {
-            program: PROGRAM,
-            model_version: MODEL_VERSION,
-            rng_scheme: RNG_SCHEME,
-            plan_version: PLAN_VERSION,
-            directory: shown(layout.root()).to_string(),
-            live,
-            status: status_with(results, MAX_FAILURES)?,
-            axes: sweep.axes().collect(),
-            sweeps: results.extensions().iter().map(|extension| extension.sweep.text().to_owned()).collect(),
-            parameters: parameters(),
-            census,
-            sets_every,
-            sets,
-            slips,
-            backbone: backbone(layout).map_err(&damaged)?,
-            curves: curves(),
-            cost,
-            runs,
-        };
-        Ok((content, bytes))
-    }
+/// What the scripts of the page read of a directory with reduced data, and the bytes of its slips. With `refresh`, the
+/// page is loaded again after about this time.
+pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<(Json, Vec<u8>)> {
+    let layout = results.layout();
+    let sweep = results.sweep();
+    let (cost, runs) = logs(results)?;
+    let damaged = advise(ADVICE);
+    let census = Census::read(layout).map_err(&damaged)?;
+    let sets_every = census.spacing();
+    let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
+    let slips = Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
+    let written = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64());
+    let parameters = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed).map(|symbol| {
+        let Description { key, symbol, unit, meaning, .. } = symbol.description();
+        json!({ "key": key, "symbol": symbol, "unit": unit, "meaning": meaning })
+    });
+    let content = json!({
+        "program": PROGRAM,
+        "model_version": MODEL_VERSION,
+        "rng_scheme": RNG_SCHEME,
+        "plan_version": PLAN_VERSION,
+        "directory": shown(layout.root()).to_string(),
+        // Set while a run goes on; times in s, `written` since 1970 UTC.
+        "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
+        "status": status_with(results, MAX_FAILURES)?,
+        // Keys that each axis moves, and its number of values.
+        "axes": sweep.axes().collect::<Vec<_>>(),
+        "sweeps": results.extensions().iter().map(|extension| extension.sweep.text()).collect::<Vec<_>>(),
+        "parameters": parameters.collect::<Vec<_>>(),
+        "census": census,
+        "sets_every": sets_every,
+        "sets": sets,
+        "slips": slips,
+        "backbone": backbone(layout).map_err(&damaged)?,
+        "curves": curves(),
+        "cost": cost,
+        "runs": runs,
+    });
+    Ok((content, slips.bytes()))
 }
 
-/// The parameters of a set.
-fn parameters() -> Vec<Parameter> {
-    let parameter = |symbol: Symbol| {
-        let description = symbol.description();
-        Parameter {
-            key: description.key,
-            symbol: description.symbol,
-            unit: description.unit,
-            meaning: description.meaning,
-        }
-    };
-    Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed).map(parameter).collect()
-}
-
+/// η, φ_min and its asymptote.
 fn curves() -> Vec<[Option<f64>; 3]> {
     (0..=CURVE_STEPS)
         .map(|step| libm::exp10(f64::from(step) / CURVE_STEPS_PER_DECADE))

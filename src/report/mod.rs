@@ -36,7 +36,7 @@ pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> 
     if !is_reduced(results.layout())? {
         reduce(results)?;
     }
-    let (content, slips) = content::Content::read(results, refresh)?;
+    let (content, slips) = content::content(results, refresh)?;
     page::html(&content, &slips).context("the report cannot be encoded")
 }
 

@@ -1,11 +1,11 @@
 //! The page: its files put together, with the content compressed, so that no text of it can be taken for HTML.
 
-use super::content::Content;
 use anyhow::Result;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 use std::io::{self, Write};
 
@@ -25,8 +25,8 @@ const SCRIPTS: [&str; 9] = [
 ];
 
 /// The page of this content and these bytes of its slips.
-pub(super) fn html(content: &Content, slips: &[u8]) -> Result<String> {
-    let data = data(&serde_json::to_vec(content)?, slips)?;
+pub(super) fn html(content: &Json, slips: &[u8]) -> Result<String> {
+    let data = data(&content.to_string().into_bytes(), slips)?;
     let script = format!("\"use strict\";\n{}", SCRIPTS.concat());
     // Scripts and styles other than these do not count, and nothing is loaded.
     let policy = format!(

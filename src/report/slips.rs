@@ -1,6 +1,6 @@
 //! Slips for the charts, or a sample of them: columns of numbers of 24 bits, byte by byte, so that they compress well.
 
-use super::tables::Described;
+use super::tables::described;
 use crate::observe::Slip;
 use crate::results::Results;
 use crate::results::parts::committed_files;
@@ -8,6 +8,7 @@ use crate::results::tables::{JOBS, SLIPS};
 use crate::table::columns::{Row, Value, columns};
 use crate::table::file::DatasetError;
 use serde::Serialize;
+use serde_json::Value as Json;
 use std::collections::HashMap;
 
 /// Slips up to which all are shown; of more, every k-th in table order. Each takes some 30 bytes of the page.
@@ -47,7 +48,7 @@ pub(super) struct Slips {
     /// Every so many slips one is shown.
     every: u64,
     rows: usize,
-    columns: Vec<Described>,
+    columns: Vec<Json>,
     /// Of each job with a slip that is shown: the place of its set, and its seed.
     jobs: Vec<(usize, u64)>,
     /// The number of the job of each slip, then the columns.
@@ -63,19 +64,19 @@ impl Slips {
         total: u64,
     ) -> Result<Self, DatasetError> {
         let layout = results.layout();
-        let described = Slip::columns();
-        let place_of = |name: &&str| described.iter().position(|column| column.name == **name);
+        let all = Slip::columns();
+        let place_of = |name: &&str| all.iter().position(|column| column.name == **name);
         let shown: Vec<usize> = COLUMNS.iter().filter_map(place_of).collect();
         let mut slips = Self {
             every: total.div_ceil(MAX_SLIPS).max(1),
             rows: 0,
-            columns: shown.iter().map(|&place| described[place].clone().into()).collect(),
+            columns: shown.iter().map(|&place| described(&all[place])).collect(),
             jobs: Vec::new(),
             values: vec![Vec::new(); 1 + shown.len()],
         };
         let mut number = 0_u64;
         let mut last: Option<JobOfSlip> = None;
-        let mut cells = Vec::with_capacity(described.len());
+        let mut cells = Vec::with_capacity(all.len());
         for batch in committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Slip)>() {
             for (job, slip) in batch? {
                 let Some(&place) = places.get(&job.set_id) else { continue };

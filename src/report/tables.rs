@@ -9,7 +9,6 @@ use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::{Dataset, DatasetError};
 use serde::Serialize;
 use serde_json::{Value as Json, json};
-use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 /// Sets up to which all are shown; of more, every k-th. Each takes some 300 bytes of the page.
@@ -18,29 +17,19 @@ const MAX_SETS: u64 = 5_000;
 const DECIMALS: usize = 5;
 
 /// A column as the page describes it.
-#[derive(Debug, Serialize)]
-pub(super) struct Described {
-    name: Cow<'static, str>,
-    unit: &'static str,
-    meaning: &'static str,
-    kind: &'static str,
-}
-
-impl From<Column> for Described {
-    fn from(Column { name, unit, meaning, kind, .. }: Column) -> Self {
-        Self { name, unit, meaning, kind: kind.word() }
-    }
+pub(super) fn described(Column { name, unit, meaning, kind, .. }: &Column) -> Json {
+    json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
 }
 
 #[derive(Debug, Serialize)]
 pub(super) struct Columns {
-    columns: Vec<Described>,
+    columns: Vec<Json>,
     values: Vec<Vec<Json>>,
 }
 
 impl Columns {
     fn new<R: Row>() -> Self {
-        let columns: Vec<Described> = R::columns().into_iter().map(Described::from).collect();
+        let columns: Vec<Json> = R::columns().iter().map(described).collect();
         let values = columns.iter().map(|_| Vec::new()).collect();
         Self { columns, values }
     }
@@ -88,10 +77,8 @@ columns! {
 
 impl Census {
     pub(super) fn read(layout: &Layout<'_>) -> Result<Self, DatasetError> {
-        let mut census = Self::default();
-        for regime in Regime::ALL {
-            census.regimes.insert(regime.word(), 0);
-        }
+        let regimes = Regime::ALL.map(|regime| (regime.word(), 0)).into();
+        let mut census = Self { regimes, ..Self::default() };
         for batch in sets_file(layout).rows::<Counted>() {
             for set in batch? {
                 census.sets += 1;
@@ -104,9 +91,8 @@ impl Census {
     }
 
     /// Of so many sets one is shown.
-    pub(super) const fn spacing(&self) -> u64 {
-        let spacing = self.sets.div_ceil(MAX_SETS);
-        if spacing == 0 { 1 } else { spacing }
+    pub(super) fn spacing(&self) -> u64 {
+        self.sets.div_ceil(MAX_SETS).max(1)
     }
 }
 
@@ -139,13 +125,10 @@ impl Sets {
             histograms: Vec::new(),
             places: HashMap::new(),
         };
-        let mut number = 0_u64;
+        let mut number = 0_u64..;
         for batch in sets_file(layout).rows::<SetRow>() {
-            for row in batch? {
-                if number.is_multiple_of(spacing) {
-                    sets.push(sweep, row);
-                }
-                number += 1;
+            for (row, _) in batch?.into_iter().zip(&mut number).filter(|(_, number)| number.is_multiple_of(spacing)) {
+                sets.push(sweep, row);
             }
         }
         let bins = Dataset::new(layout.storage, vec![layout.reduced_file(HistogramBin::NAME)]);
