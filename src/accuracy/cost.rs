@@ -1,6 +1,5 @@
 //! Costs in CPU time, and the processor.
 
-use crate::solver::Summary;
 use crate::table::columns::columns;
 
 columns! {
@@ -18,22 +17,6 @@ columns! {
 }
 
 impl Cost {
-    /// The cost of a run with these slips. Without any, that per slip is infinite.
-    pub fn of(cpu_seconds: f64, run: &Summary, slips: u64) -> Self {
-        Self {
-            per_simulated_second: cpu_seconds / run.end_time,
-            per_slip: cpu_seconds / slips as f64,
-            steps_per_slip: run.steps as f64 / slips as f64,
-            per_step: cpu_seconds / run.steps as f64,
-            timed_slips: slips,
-        }
-    }
-
-    /// The same if a slip takes this number of steps.
-    pub fn extrapolated(self, steps_per_slip: f64) -> Self {
-        Self { per_slip: self.per_step * steps_per_slip, steps_per_slip, ..self }
-    }
-
     /// Whether the cost per slip follows from that of a step.
     pub const fn is_extrapolated(&self) -> bool {
         self.timed_slips == 0

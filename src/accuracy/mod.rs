@@ -23,13 +23,9 @@ pub use report::{Report, stability_report, study_report};
 pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
 
 use crate::model::{Parameters, Symbol, Value};
-use crate::observe::{Measurements, Recording, measure};
-use crate::run::cpu;
-use crate::solver::{Ledger, Limits, Observer, Resolve, Solver, simulate, simulate_audited};
+use crate::solver::{Resolve, Solver};
 use crate::table::columns::columns;
-use anyhow::{Context, Result};
 use std::fmt;
-use std::sync::atomic::AtomicBool;
 
 const FIXED_STEP: &str = "fixed-step";
 
@@ -86,44 +82,9 @@ pub fn set_in_words(parameters: &Parameters) -> String {
 
 /// Keys and values of what differs from the defaults, but for the drive and the seed.
 fn other_settings(parameters: &Parameters) -> impl Iterator<Item = (&'static str, Value)> {
-    let of_drive = |symbol: &Symbol| matches!(symbol, Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed);
     let defaults = Parameters::default();
-    let settings = Symbol::ALL.into_iter().filter(move |symbol| !of_drive(symbol)).map(move |symbol| {
-        let value = parameters.get(symbol);
-        (value != defaults.get(symbol)).then(|| (symbol.key(), value))
-    });
-    settings.flatten()
-}
-
-/// One realisation of a study with one solver.
-struct Realisation<'a> {
-    parameters: &'a Parameters,
-    solver: Solver,
-}
-
-impl Realisation<'_> {
-    /// Observers end these simulations; none comes near this number of events.
-    const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
-
-    fn simulate(&self, observer: &mut dyn Observer) -> Result<()> {
-        simulate(self.parameters, self.solver, Self::LIMITS, observer).with_context(|| self.name())?;
-        Ok(())
-    }
-
-    fn audit(&self, observer: &mut dyn Observer) -> Result<Ledger> {
-        let audited = simulate_audited(self.parameters, self.solver, Self::LIMITS, observer);
-        Ok(audited.with_context(|| self.name())?.1)
-    }
-
-    /// CPU time in s, and what a sweep would measure.
-    fn measure(&self, recording: &Recording) -> Result<(f64, Measurements)> {
-        let never = AtomicBool::new(false);
-        let (cpu_seconds, measured) = cpu::timed(|| measure(self.parameters, recording, self.solver, &never));
-        Ok((cpu_seconds, measured.with_context(|| self.name())?))
-    }
-
-    fn name(&self) -> String {
-        let Self { parameters, solver } = *self;
-        format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, Method::from(solver))
-    }
+    let others = |symbol: &Symbol| !matches!(symbol, Symbol::V0 | Symbol::Delta | Symbol::T | Symbol::Seed);
+    let settings = Symbol::ALL.into_iter().filter(others).map(|symbol| (symbol, parameters.get(symbol)));
+    let settings = settings.filter(move |(symbol, value)| *value != defaults.get(*symbol));
+    settings.map(|(symbol, value)| (symbol.key(), value))
 }

@@ -51,7 +51,7 @@ type TableFile<'a> = Box<dyn Fn(StoredFile, &Footer) -> Result<(), DatasetError>
 pub struct Report<'a> {
     /// Name of the file of the JSON.
     name: &'static str,
-    json: Value,
+    pub json: Value,
     tables: Vec<(&'static str, TableFile<'a>)>,
     pictures: Vec<(String, Picture)>,
 }
@@ -75,10 +75,6 @@ impl<'a> Report<'a> {
         };
         self.tables.push((R::NAME, Box::new(write)));
         self
-    }
-
-    pub fn json(&self) -> &Value {
-        &self.json
     }
 
     /// Writes everything into a folder, over what an earlier command left there; returns the files.
@@ -265,7 +261,7 @@ mod tests {
             [("accuracy", study_report(&study, &findings).unwrap()), ("accuracy --hard-cases", stability_report(&[]))];
         for (command, report) in reports {
             let row = page.lines().find(|line| line.starts_with(&format!("| `{command}` |"))).unwrap();
-            for field in report.json().as_object().unwrap().keys() {
+            for field in report.json.as_object().unwrap().keys() {
                 assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
             }
         }

@@ -10,15 +10,17 @@
 use super::breaks::{BreakErrors, Comparison, Reference};
 use super::cost::Cost;
 use super::distance::{Distances, deviation, distances, mean};
-use super::{Method, Realisation, set_in_words};
+use super::{Method, set_in_words};
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Recording, Slip, SlipObserver};
-use crate::solver::{Resolve, Solver, Summary, TOLERANCES};
+use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
+use crate::run::cpu;
+use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited};
 use crate::table::columns::{Table, columns};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::AtomicBool;
 
 /// Amplitude and frequency of the modulated drive, in m and Hz: those of Fig. 2f.
 const MODULATION: (f64, f64) = (1e-6, 58.0);
@@ -235,11 +237,15 @@ impl Ensemble {
         let mut per_step = self.per_step.clone();
         per_step.sort_by(f64::total_cmp);
         let last = per_step.len() - 1;
-        let summary = Summary { end_time: self.end_time, steps: self.steps, ..Summary::default() };
-        let steps_per_slip = mean_interval * self.steps as f64 / self.end_time;
-        [0, last / 2, last].map(|place| {
-            let cost = Cost::of(per_step[place] * self.steps as f64, &summary, self.slips_seen);
-            if self.slips_seen > 0 { cost } else { cost.extrapolated(steps_per_slip) }
+        let (steps, slips) = (self.steps as f64, self.slips_seen as f64);
+        let is_sample = self.slips_seen > 0;
+        let steps_per_slip = if is_sample { steps / slips } else { mean_interval * steps / self.end_time };
+        [0, last / 2, last].map(|place| Cost {
+            per_simulated_second: per_step[place] * steps / self.end_time,
+            per_slip: per_step[place] * steps_per_slip,
+            per_step: per_step[place],
+            steps_per_slip,
+            timed_slips: self.slips_seen,
         })
     }
 }
@@ -252,11 +258,11 @@ impl Study {
             report(&format!("{}: first breaks and energy ledgers", set_in_words(parameters)));
             let mut first_breaks = Reference::new(parameters, self.followed_breaks);
             let tightest = taylor(*TOLERANCES.start());
-            Realisation { parameters, solver: tightest }.simulate(&mut first_breaks)?;
+            simulated(parameters, tightest, &mut first_breaks)?;
             let mut checks = Vec::new();
             for &solver in &self.solvers {
-                let realisation = Realisation { parameters, solver };
-                checks.push((self.break_times(&realisation, &first_breaks)?, self.ledger_residual(&realisation)?));
+                let break_times = self.break_times(parameters, solver, &first_breaks)?;
+                checks.push((break_times, self.ledger_residual(parameters, solver)?));
             }
             report("timed ensembles");
             let mut ensembles = self.ensembles(parameters)?;
@@ -310,28 +316,29 @@ impl Study {
     fn slips_of(&self, parameters: &Parameters, solver: Solver, seeds: Range<u64>) -> Result<Vec<Slip>> {
         let slips = |seed: u64| {
             let parameters = Parameters { seed, ..parameters.clone() };
-            Ok(Realisation { parameters: &parameters, solver }.measure(&self.recording())?.1.slips)
+            Ok(measured(&parameters, solver, &self.recording())?.1.slips)
         };
         Ok(seeds.into_par_iter().map(slips).collect::<Result<Vec<_>>>()?.concat())
     }
 
-    fn break_times(&self, realisation: &Realisation<'_>, reference: &Reference) -> Result<BreakErrors> {
-        let takes_too_long = realisation.parameters.drive_velocity < self.fixed_step_breaks_from;
-        if takes_too_long && matches!(realisation.solver, Solver::FixedStep { .. }) {
+    fn break_times(&self, parameters: &Parameters, solver: Solver, reference: &Reference) -> Result<BreakErrors> {
+        let takes_too_long = parameters.drive_velocity < self.fixed_step_breaks_from;
+        if takes_too_long && matches!(solver, Solver::FixedStep { .. }) {
             return Ok(BreakErrors::default());
         }
         let mut comparison = Comparison::new(reference, self.breaks);
-        realisation.simulate(&mut comparison)?;
+        simulated(parameters, solver, &mut comparison)?;
         Ok(comparison.errors())
     }
 
-    fn ledger_residual(&self, realisation: &Realisation<'_>) -> Result<Option<f64>> {
-        let is_on_grid = matches!(realisation.solver, Solver::EventDriven { resolve: Resolve::Grid, .. });
-        if is_on_grid || self.is_stretch_only(realisation.parameters, realisation.solver) {
+    fn ledger_residual(&self, parameters: &Parameters, solver: Solver) -> Result<Option<f64>> {
+        let is_on_grid = matches!(solver, Solver::EventDriven { resolve: Resolve::Grid, .. });
+        if is_on_grid || self.is_stretch_only(parameters, solver) {
             return Ok(None);
         }
         let recording = Recording { slips: AUDITED_SLIPS, discard: 0, ..Recording::default() };
-        let ledger = realisation.audit(&mut SlipObserver::new(realisation.parameters, &recording))?;
+        let audited = simulate_audited(parameters, solver, LIMITS, &mut SlipObserver::new(parameters, &recording));
+        let (_, ledger) = audited.with_context(|| in_words(parameters, solver))?;
         Ok(Some(ledger.residual()))
     }
 
@@ -351,7 +358,7 @@ impl Study {
                 if is_stretch && let Solver::FixedStep { time_step } = solver {
                     recording.max_time = Some(time_step * self.timed_steps as f64);
                 }
-                let (cpu_seconds, measured) = Realisation { parameters: &parameters, solver }.measure(&recording)?;
+                let (cpu_seconds, measured) = measured(&parameters, solver, &recording)?;
                 // The few slips of a stretch are no sample.
                 let slips = if is_stretch { Vec::new() } else { measured.slips };
                 ensemble.add(cpu_seconds, &measured.summary, slips);
@@ -359,6 +366,23 @@ impl Study {
         }
         Ok(ensembles)
     }
+}
+
+/// Observers end these simulations; none comes near this number of events.
+const LIMITS: Limits<'static> = Limits { end_time: f64::INFINITY, events: 1_000_000_000, interrupt: None };
+
+fn simulated(parameters: &Parameters, solver: Solver, observer: &mut dyn Observer) -> Result<Summary> {
+    simulate(parameters, solver, LIMITS, observer).with_context(|| in_words(parameters, solver))
+}
+
+/// CPU time in s, and what a sweep would measure.
+fn measured(parameters: &Parameters, solver: Solver, recording: &Recording) -> Result<(f64, Measurements)> {
+    let (cpu_seconds, measured) = cpu::timed(|| measure(parameters, recording, solver, &AtomicBool::new(false)));
+    Ok((cpu_seconds, measured.with_context(|| in_words(parameters, solver))?))
+}
+
+fn in_words(parameters: &Parameters, solver: Solver) -> String {
+    format!("{}, seed {}, {}", set_in_words(parameters), parameters.seed, Method::from(solver))
 }
 
 /// The distributions of one ensemble against those of the reference, of all quantities that there are.

@@ -123,7 +123,7 @@ fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
 fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Result<()> {
     let files = report.write(&arguments.out)?;
     if arguments.json {
-        return output::plain_json(report.json());
+        return output::plain_json(&report.json);
     }
     output::print(text)?;
     files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))
