@@ -13,7 +13,6 @@ use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
 use anyhow::Result;
-use serde::Serialize;
 use serde_json::{Value as Json, json};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -26,27 +25,6 @@ const MAX_RUNS: usize = 50;
 /// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
-
-/// Predicted and measured CPU time, in s, as the logs say.
-#[derive(Debug, Default, Serialize)]
-struct Cost {
-    jobs: u64,
-    parts: u64,
-    predicted: f64,
-    measured: f64,
-    /// Of single parts: name, jobs, predicted and measured.
-    shown: Vec<(String, usize, f64, f64)>,
-}
-
-#[derive(Debug, Serialize)]
-struct Run {
-    program: String,
-    host: String,
-    threads: usize,
-    jobs: u64,
-    /// Jobs that it ran and its wall time in s; null if it was killed, or is at work.
-    ended: Option<(u64, f64)>,
-}
 
 /// What the scripts of the page read of a directory with reduced data, and the bytes of its slips. With `refresh`, the
 /// page is loaded again after about this time.
@@ -97,30 +75,34 @@ fn curves() -> Vec<[Option<f64>; 3]> {
         .collect()
 }
 
-/// What the logs say of cost and of runs.
-fn logs(results: &Results<'_>) -> Result<(Cost, Vec<Run>), StorageError> {
-    let (mut cost, mut runs) = (Cost::default(), Vec::new());
+/// What the logs say of cost, in s of CPU time, and of runs.
+fn logs(results: &Results<'_>) -> Result<(Json, Vec<Json>), StorageError> {
+    let (mut parts, mut runs) = (Vec::new(), Vec::<Json>::new());
     results.events(|event| match event {
         RunEvent::PartCommitted { part, jobs, predicted_cost, measured_cost, .. } => {
-            cost.jobs += jobs as u64;
-            cost.parts += 1;
-            cost.predicted += predicted_cost;
-            cost.measured += measured_cost;
-            cost.shown.push((part, jobs, predicted_cost, measured_cost));
+            parts.push((part, jobs, predicted_cost, measured_cost));
         }
         RunEvent::Started { host, program, threads, jobs, .. } => {
-            runs.push(Run { program, host, threads, jobs, ended: None });
+            // Not ended if it was killed, or is at work.
+            runs.push(json!({ "program": program, "host": host, "threads": threads, "jobs": jobs, "ended": null }));
         }
         // A log holds one run, and logs are gone through one after the other.
         RunEvent::Finished(report) => {
             if let Some(run) = runs.last_mut() {
-                run.ended = Some((report.jobs_run, report.wall));
+                // Jobs that it ran, and its wall time in s.
+                run["ended"] = json!([report.jobs_run, report.wall]);
             }
         }
         _ => (),
     })?;
-    let every = cost.shown.len().div_ceil(MAX_PARTS).max(1);
-    cost.shown = cost.shown.into_iter().step_by(every).collect();
+    let every = parts.len().div_ceil(MAX_PARTS).max(1);
+    let cost = json!({
+        "jobs": parts.iter().map(|part| part.1).sum::<usize>(),
+        "parts": parts.len(),
+        "predicted": parts.iter().fold(0.0, |sum, part| sum + part.2),
+        "measured": parts.iter().fold(0.0, |sum, part| sum + part.3),
+        "shown": parts.iter().step_by(every).collect::<Vec<_>>(),
+    });
     let first = runs.len().saturating_sub(MAX_RUNS);
     runs.drain(..first);
     Ok((cost, runs))
