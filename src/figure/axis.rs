@@ -69,11 +69,6 @@ impl Axis {
         Self::linear_with(label, low, high, 0.5 * MAX_TICKS)
     }
 
-    /// Linear from `low` to `high` with about three ticks, for strips.
-    pub(super) fn few(label: &str, low: f64, high: f64) -> Self {
-        Self { minor: Vec::new(), ..Self::sparse(label, low, high) }
-    }
-
     fn linear_with(label: &str, low: f64, high: f64, max_ticks: f64) -> Self {
         let high = above(low, high);
         let largest = low.abs().max(high.abs());
@@ -234,6 +229,18 @@ impl Axis {
     /// Whether a value lies on the axis.
     pub(super) fn contains(&self, value: f64) -> bool {
         value >= self.low && value <= self.high
+    }
+
+    /// The multiples of a period on it; none if the axis is longer than so many periods.
+    pub(super) fn multiples_of(&self, period: f64, most: f64) -> Vec<f64> {
+        if (self.high - self.low) / period > most {
+            return Vec::new();
+        }
+        let first = (self.low / period).ceil();
+        (0..=u32::MAX)
+            .map(|step| (first + f64::from(step)) * period)
+            .take_while(|&multiple| multiple <= self.high)
+            .collect()
     }
 
     /// `count` >= 2 values from end to end, evenly placed.
@@ -403,7 +410,7 @@ mod tests {
         assert_eq!(labels(&enough(Axis::logarithmic("", 0.012, 0.05))), ["0.015", "0.02", "0.03", "0.04"]);
         assert_eq!(labels(&enough(Axis::logarithmic("", 0.3, 60.0))), ["0.5", "1", "2", "5", "10", "20", "50"]);
         assert_eq!(labels(&enough(Axis::sparse("", 0.0, 78.0))), ["0", "20", "40", "60"]);
-        assert!(enough(Axis::few("", 0.0, 78.0)).minor.is_empty());
+        assert!(enough(Axis { minor: Vec::new(), ..Axis::sparse("", 0.0, 78.0) }).minor.is_empty());
         assert_eq!(labels(&enough(Axis::logarithmic("", 1.0, 1e5))).len(), 6, "it has enough");
         assert_eq!(labels(&enough(Axis::categories("", &["one", "two"]))), ["one", "two"]);
         for exponent in -12..12 {

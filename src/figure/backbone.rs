@@ -153,8 +153,7 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     values.sort_by(f64::total_cmp);
     values.dedup_by(|next, value| *next <= *value * SAME);
     if values.len() <= MAX_COLUMNS {
-        let grid = Grid::logarithmic(values);
-        return grid.cells().collect();
+        return Grid::logarithmic_cells(values);
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]

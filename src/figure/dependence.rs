@@ -24,49 +24,38 @@ const MILLISECONDS: f64 = 1e3;
 
 type Getter = fn(&SetSummary) -> Option<Statistic>;
 
-/// A quantity of a panel.
-#[derive(Clone, Copy)]
-struct Quantity {
-    label: &'static str,
-    value: Getter,
-    /// Whether it lies between 0 and 1.
-    is_share: bool,
-}
+/// A quantity of a panel: its label, its value, and whether it lies between 0 and 1.
+type Quantity = (&'static str, Getter, bool);
 
 const QUANTITIES: [Quantity; 4] = [
-    Quantity {
-        label: "Mean interval τ (ms)",
-        value: |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS)),
-        is_share: false,
-    },
-    Quantity {
-        label: "Standard deviation of τ (ms)",
-        value: |set| {
+    ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS)), false),
+    (
+        "Standard deviation of τ (ms)",
+        |set| {
             let deviation = set.tau_deviation.filter(|deviation| *deviation > 0.0);
             deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
         },
-        is_share: false,
-    },
-    Quantity { label: "Locking index", value: |set| set.locking_index, is_share: true },
-    Quantity { label: "Resultant length of φ", value: |set| set.resultant_length, is_share: true },
+        false,
+    ),
+    ("Locking index", |set| set.locking_index, true),
+    ("Resultant length of φ", |set| set.resultant_length, true),
 ];
 
 /// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
 /// modulations; `None` for others. Quantities that no set has get no panel.
 pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
-    let all: Vec<&SetSummary> = sets.iter().collect();
-    let [symbol] = swept(&all)[..] else { return None };
+    let [symbol] = swept(&sets.iter())[..] else { return None };
     let min_values = if symbol == Symbol::BreakOn { 2 } else { MIN_VALUES };
-    let lines = lines(all.iter().copied())?;
+    let lines = lines(sets.iter())?;
     if lines.iter().any(|line| line.len() < min_values) {
         return None;
     }
     let x = match symbol {
         Symbol::BreakOn => Axis::categories("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
-        _ => Grid::of(distinct(&all, |parameters| number(parameters, symbol))).wider_axis(&label(symbol)),
+        _ => Grid::of(distinct(sets.iter(), |parameters| number(parameters, symbol))).wider_axis(&label(symbol)),
     };
     let present: Vec<Quantity> =
-        QUANTITIES.into_iter().filter(|quantity| sets.iter().any(|set| (quantity.value)(set).is_some())).collect();
+        QUANTITIES.into_iter().filter(|quantity| sets.iter().any(|set| quantity.1(set).is_some())).collect();
     if present.is_empty() {
         return None;
     }
@@ -76,24 +65,22 @@ pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let heights = HEIGHTS.get(..present.len().div_ceil(2))?;
     let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, heights, ROW_GAP, RIGHT) };
     let (page, mut sheet) = layout.page("dependence", look, &entries);
-    for (index, quantity) in present.iter().enumerate() {
-        let frame = page.frame(index / columns, index % columns, x.clone(), quantity.axis(sets)?);
-        draw(&mut sheet, &frame, &lines, symbol, quantity.value);
+    for (index, quantity) in present.into_iter().enumerate() {
+        let frame = page.frame(index / columns, index % columns, x.clone(), y_axis(quantity, sets)?);
+        draw(&mut sheet, &frame, &lines, symbol, quantity.1);
         frame.axes(&mut sheet);
     }
     Some(sheet.finish())
 }
 
-impl Quantity {
-    /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
-    fn axis(&self, sets: &[SetSummary]) -> Option<Axis> {
-        let ends = || sets.iter().filter_map(self.value).flat_map(Statistic::ends);
-        if !self.is_share {
-            return Axis::of_data(self.label, ends().map(|end| end.max(0.0)), WIDE, 0.0);
-        }
-        let (low, _) = bounds(ends())?;
-        Some(Axis::linear(self.label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
+/// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
+fn y_axis((label, value, is_share): Quantity, sets: &[SetSummary]) -> Option<Axis> {
+    let ends = sets.iter().filter_map(value).flat_map(Statistic::ends);
+    if !is_share {
+        return Axis::of_data(label, ends.map(|end| end.max(0.0)), WIDE, 0.0);
     }
+    let (low, _) = bounds(ends)?;
+    Some(Axis::linear(label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
 }
 
 fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetSummary>], symbol: Symbol, value: Getter) {

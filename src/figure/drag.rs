@@ -73,10 +73,6 @@ const fn slip_dot(ink: Ink) -> Dot {
     Dot { ink, radius: 2.0, opacity: 0.45 }
 }
 
-const fn quartiles(ink: Ink) -> Stroke {
-    Stroke::solid(ink, 2.0)
-}
-
 /// Slips over the lines τ = nT, which are curves in T and level in Δ.
 fn draw_intervals(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f64], is_period: bool) {
     let period = slips.first().map_or(0.0, |slip| slip.period);
@@ -125,7 +121,7 @@ fn draw_medians(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f
                 };
                 if ratios.len() >= MIN_INTERVALS {
                     let x = start + (0.5 + OFFSETS[stage]) * width;
-                    frame.curve(sheet, [(x, first), (x, third)], quartiles(ink));
+                    frame.curve(sheet, [(x, first), (x, third)], Stroke::solid(ink, 2.0));
                     frame.points(sheet, [(x, median)], Dot::solid(ink, 4.5));
                 }
             }

@@ -68,7 +68,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The frames on a sheet of the size that is asked for, under this legend.
-    pub(super) fn page(&self, name: &str, look: &Look, legend: &[Entry]) -> (Page, Sheet) {
+    pub(super) fn page(&self, name: &str, look: &Look, legend: &[Entry]) -> (Page<'a>, Sheet) {
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -99,16 +99,7 @@ impl<'a> Layout<'a> {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
             sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(Color::from(DARK_GREY)));
         }
-        let page = Page {
-            columns: self.columns,
-            width,
-            column_gap: self.column_gap,
-            heights,
-            row_gap: self.row_gap,
-            top,
-            heading,
-            end: right,
-        };
+        let page = Page { layout: Layout { width, ..*self }, heights, top, heading, end: right };
         (page, sheet)
     }
 }
@@ -129,33 +120,32 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
 }
 
 /// Where frames lie on a sheet.
-pub(super) struct Page {
-    columns: usize,
-    width: f64,
-    column_gap: f64,
-    heights: Vec<f64>,
-    row_gap: f64,
+pub(super) struct Page<'a> {
+    /// With the width that the frames have.
+    layout: Layout<'a>,
+    pub(super) heights: Vec<f64>,
     top: f64,
     heading: f64,
     end: f64,
 }
 
-impl Page {
+impl Page<'_> {
     /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
-        let above: f64 = self.heights[..row].iter().map(|height| height + self.row_gap + self.heading).sum();
-        let is_alone = self.columns * self.heights.len() == 1;
-        let letter = u8::try_from(row * self.columns + column).ok().and_then(|index| b'a'.checked_add(index));
-        let start = |column: usize| MARGIN + column as f64 * (self.width + self.column_gap);
+        let Layout { columns, width, column_gap, row_gap: gap, .. } = self.layout;
+        let above: f64 = self.heights[..row].iter().map(|height| height + gap + self.heading).sum();
+        let is_alone = columns * self.heights.len() == 1;
+        let letter = u8::try_from(row * columns + column).ok().and_then(|index| b'a'.checked_add(index));
+        let start = |column: usize| MARGIN + column as f64 * (width + column_gap);
         // The same in all columns, so that they are labelled alike.
-        let end = if self.columns > 1 { self.end.min(start(column + 1) - LABEL_GAP) } else { self.end };
+        let end = if columns > 1 { self.end.min(start(column + 1) - LABEL_GAP) } else { self.end };
         Frame {
             left: start(column) - MARGIN + LEFT,
             room: (start(column), end),
             // Over headings there is one for a row.
             y_label_end: if self.heading > 0.0 { self.end } else { end },
             top: self.top + above + self.heading,
-            width: self.width,
+            width,
             height: self.heights[row],
             x,
             y,
@@ -163,11 +153,6 @@ impl Page {
             letter: letter.filter(|_| !is_alone).map(char::from),
             is_lowest: row + 1 == self.heights.len(),
         }
-    }
-
-    /// Height of the frames of a row.
-    pub(super) fn frame_height(&self, row: usize) -> f64 {
-        self.heights[row]
     }
 }
 

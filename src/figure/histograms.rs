@@ -60,12 +60,12 @@ pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin], look: &Look
     let margin = 0.04 * (high - low);
     for (row, panel) in panels.iter().enumerate() {
         let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
-        let multiples = multiples(panel.period, &x);
+        let multiples = panel.period.map_or_else(Vec::new, |period| x.multiples_of(period, MAX_MULTIPLES));
         let y_label = if row == 0 { "Probability density (1/s)" } else { "" };
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         // The numbers cover no bar.
-        let free = page.frame_height(row) - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
-        let frame = page.frame(row, 0, x, Axis::sparse(y_label, 0.0, highest * page.frame_height(row) / free));
+        let free = page.heights[row] - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
+        let frame = page.frame(row, 0, x, Axis::sparse(y_label, 0.0, highest * page.heights[row] / free));
         draw(&mut sheet, &frame, panel, &multiples);
         frame.axes(&mut sheet);
         frame.heading(&mut sheet, &panel.title, &panel.amount());
@@ -88,7 +88,7 @@ fn panels<'a>(sets: &[SetSummary], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     shown.sort_by(|left, right| {
         left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
     });
-    let swept = swept(&shown);
+    let swept = swept(&shown.iter().copied());
     let panel = |set: &SetSummary| {
         let settings = swept.iter().map(|&symbol| setting(&set.parameters, symbol));
         let twin = identical.iter().find(|twin| !is_identical(&set) && is_twin(twin, set));
@@ -100,16 +100,6 @@ fn panels<'a>(sets: &[SetSummary], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
         }
     };
     shown.into_iter().map(panel).collect()
-}
-
-/// The multiples of a period on an axis, unless they are too many.
-fn multiples(period: Option<f64>, axis: &Axis) -> Vec<f64> {
-    let Some(period) = period.filter(|period| (axis.high - axis.low) / period <= MAX_MULTIPLES) else {
-        return Vec::new();
-    };
-    let first = (axis.low / period).ceil();
-    let multiples = (0..).map(|step| (first + f64::from(step)) * period);
-    multiples.take_while(|&multiple| multiple <= axis.high).collect()
 }
 
 fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
@@ -212,10 +202,10 @@ mod tests {
     #[test]
     fn multiples_of_the_period_are_marked_unless_they_would_fill_the_panel() {
         let axis = Axis::linear("", 0.09, 0.21);
-        let marked = multiples(Some(0.05), &axis);
+        let marked = axis.multiples_of(0.05, MAX_MULTIPLES);
         assert_eq!(marked.len(), 3);
         assert!((marked[0] - 0.1).abs() < 1e-15 && (marked[2] - 0.2).abs() < 1e-15);
-        assert!(multiples(Some(0.001), &axis).is_empty() && multiples(None, &axis).is_empty());
+        assert!(axis.multiples_of(0.001, MAX_MULTIPLES).is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::RIGHT;
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
+use super::sets::ascending;
 use super::style::{INKS, SCALE};
 use kuva::render::color::Color;
 
@@ -12,11 +13,7 @@ use kuva::render::color::Color;
 const WIDE: f64 = 20.0;
 
 /// How the values of a quantity become colours.
-pub(super) struct Hues {
-    kind: Kind,
-}
-
-enum Kind {
+pub(super) enum Hues {
     /// Each value and what it is called, in the order of inks.
     Inks(Vec<(f64, String)>),
     Scale(Axis),
@@ -25,25 +22,22 @@ enum Kind {
 impl Hues {
     /// For these values of a quantity with this label, each called as `word` says.
     pub(super) fn of(label: &str, values: impl Iterator<Item = f64>, word: impl Fn(f64) -> String) -> Self {
-        let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        let kind = if values.len() <= INKS.len() {
-            Kind::Inks(values.into_iter().map(|value| (value, word(value))).collect())
+        let values = ascending(values.filter(|value| value.is_finite()));
+        if values.len() <= INKS.len() {
+            Self::Inks(values.into_iter().map(|value| (value, word(value))).collect())
         } else {
-            Kind::Scale(scale(label, &values))
-        };
-        Self { kind }
+            Self::Scale(scale(label, &values))
+        }
     }
 
     /// The ink of a value.
     pub(super) fn ink(&self, value: f64) -> Ink {
-        match &self.kind {
-            Kind::Inks(values) => {
+        match self {
+            Self::Inks(values) => {
                 let index = values.iter().position(|(known, _)| *known == value).unwrap_or(0);
                 INKS[index % INKS.len()]
             }
-            Kind::Scale(axis) => {
+            Self::Scale(axis) => {
                 let steps = SCALE.len() as f64;
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
                 let step = (axis.place(value).clamp(0.0, 1.0) * steps).min(steps - 1.0) as usize;
@@ -54,20 +48,19 @@ impl Hues {
 
     /// Entries of the legend, with dots of this radius.
     pub(super) fn entries(&self, radius: f64) -> Vec<Entry> {
-        let Kind::Inks(values) = &self.kind else { return Vec::new() };
+        let Self::Inks(values) = self else { return Vec::new() };
         values.iter().map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name)).collect()
     }
 
     /// The colour bar, if there is a scale.
     pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
-        let Kind::Scale(axis) = &self.kind else { return None };
-        let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
-        Some(ColourBar { label: &axis.label, colours: SCALE.map(Color::from).to_vec(), ticks })
+        let Self::Scale(axis) = self else { return None };
+        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis) })
     }
 
     /// Space that they need right of the frames.
     pub(super) fn right(&self) -> f64 {
-        if matches!(self.kind, Kind::Scale(_)) { COLOUR_BAR } else { RIGHT }
+        if matches!(self, Self::Scale(_)) { COLOUR_BAR } else { RIGHT }
     }
 }
 

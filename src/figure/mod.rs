@@ -39,7 +39,7 @@ mod work_precision;
 pub use draw::{draw_all, draw_own, write_own};
 pub use own::{OwnFigure, columns};
 pub use picture::{Format, Picture};
-pub use simulation::{AttachedMap, Simulation, simulation};
+pub use simulation::simulation;
 pub use style::{Look, Size, Style};
 pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
 

@@ -19,7 +19,7 @@ const HEIGHT: f64 = 400.0;
 const MAX_COLUMNS: usize = 3;
 const MAX_PANELS: usize = 9;
 const PANEL_WIDTH: f64 = 260.0;
-const PANEL_HEIGHTS: [f64; MAX_COLUMNS] = [220.0; MAX_COLUMNS];
+const PANEL_HEIGHTS: &[f64] = &[220.0; MAX_PANELS / MAX_COLUMNS];
 const MAX_WORDS: usize = 12;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
@@ -56,7 +56,6 @@ pub struct OwnFigure {
 /// An axis as it is asked for.
 struct Asked<'a> {
     option: &'static str,
-    limits_option: &'static str,
     values: &'a Values,
     is_log: bool,
     limits: (Option<f64>, Option<f64>),
@@ -69,24 +68,9 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     let (x, y) = (x?, y?);
     let colour = figure.colour.as_ref().map(|name| Values::of(rows, "colour", name)).transpose()?;
     let panels = figure.panels.as_ref().map(|name| Values::of(rows, "panels", name)).transpose()?;
-    let [asked_x, asked_y] = [
-        Asked {
-            option: "x",
-            limits_option: "xlim",
-            values: &x,
-            is_log: figure.is_log_x,
-            limits: figure.x_limits,
-            label: &figure.x_label,
-        },
-        Asked {
-            option: "y",
-            limits_option: "ylim",
-            values: &y,
-            is_log: figure.is_log_y,
-            limits: figure.y_limits,
-            label: &figure.y_label,
-        },
-    ];
+    let asked = |option, values, is_log, limits, label| Asked { option, values, is_log, limits, label };
+    let asked_x = asked("x", &x, figure.is_log_x, figure.x_limits, &figure.x_label);
+    let asked_y = asked("y", &y, figure.is_log_y, figure.y_limits, &figure.y_label);
     let sets: Vec<usize> = (0..rows.len()).filter(|&set| asked_x.has(set) && asked_y.has(set)).collect();
     if sets.is_empty() {
         let kind = if figure.is_log_x || figure.is_log_y { "no set has a value > 0" } else { "no set has a value" };
@@ -151,7 +135,7 @@ impl Asked<'_> {
     fn refuse_limits(&self, problem: &str) -> BadOption {
         let end = |end: Option<f64>| end.map_or_else(String::new, |end| end.to_string());
         let value = format!("{}:{}", end(self.limits.0), end(self.limits.1));
-        BadOption::new(self.limits_option, &value, problem)
+        BadOption::new(&format!("{}lim", self.option), &value, problem)
     }
 
     /// Whether a set has a place on the axis.
@@ -179,7 +163,8 @@ impl Asked<'_> {
                 );
             }
             let short_label = self.label.is_none().then(|| self.values.short_label());
-            return Ok(self.values.categories(&label).with_short_label(short_label));
+            let words: Vec<&str> = self.values.words.iter().map(String::as_str).collect();
+            return Ok(Axis::categories(&label, &words).with_short_label(short_label));
         }
         if self.is_log && [self.limits.0, self.limits.1].into_iter().flatten().any(|end| end <= 0.0) {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
@@ -247,11 +232,7 @@ fn layout(panels: usize, right: f64) -> Layout<'static> {
         return Layout::column(WIDTH, ONE, 0.0, right);
     }
     let columns = if panels == 4 { 2 } else { panels.min(MAX_COLUMNS) };
-    let heights: &'static [f64] = match panels.div_ceil(columns) {
-        1 => &[PANEL_HEIGHTS[0]],
-        2 => &[PANEL_HEIGHTS[0]; 2],
-        _ => &[PANEL_HEIGHTS[0]; 3],
-    };
+    let heights = &PANEL_HEIGHTS[..panels.div_ceil(columns)];
     Layout { columns, column_gap: LEFT, has_headings: true, ..Layout::column(PANEL_WIDTH, heights, 26.0, right) }
 }
 
@@ -297,25 +278,21 @@ impl Drawn<'_> {
                     frame.curve(sheet, pair.iter().filter_map(|&set| self.place(set)), stroke);
                 }
             }
+            // Confidence intervals, along both axes.
             for &set in sets {
-                self.bars(sheet, frame, set);
+                let Some((x, y)) = self.place(set) else { continue };
+                let stroke = Stroke::solid((self.ink)(set), BAR_WIDTH);
+                if let Some(ends) = self.y.intervals[set] {
+                    frame.error_bar(sheet, x, ends, stroke);
+                }
+                if let Some((low, high)) = self.x.intervals[set] {
+                    let left = if frame.x.place(low).is_finite() { low } else { frame.x.low };
+                    frame.curve(sheet, [(left, y), (high, y)], stroke);
+                }
             }
         });
         for &set in sets {
             frame.points(sheet, self.place(set), Dot { opacity: 0.9, ..Dot::solid((self.ink)(set), self.radius) });
-        }
-    }
-
-    /// The confidence intervals of a set, along both axes.
-    fn bars(&self, sheet: &mut Sheet, frame: &Frame, set: usize) {
-        let Some((x, y)) = self.place(set) else { return };
-        let stroke = Stroke::solid((self.ink)(set), BAR_WIDTH);
-        if let Some(ends) = self.y.intervals[set] {
-            frame.error_bar(sheet, x, ends, stroke);
-        }
-        if let Some((low, high)) = self.x.intervals[set] {
-            let left = if frame.x.place(low).is_finite() { low } else { frame.x.low };
-            frame.curve(sheet, [(left, y), (high, y)], stroke);
         }
     }
 }

@@ -124,10 +124,7 @@ impl Picture {
 
 /// A sheet to draw on. Lengths are units of the SVG, from the upper left corner.
 pub(super) struct Sheet {
-    name: String,
-    style: Style,
-    note: String,
-    scene: Scene,
+    picture: Picture,
     clips: usize,
 }
 
@@ -181,15 +178,16 @@ impl Sheet {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
         scene.text_color = Some(BLACK.to_owned());
-        Self { name: name.to_owned(), style: look.style, note: look.note.clone(), scene, clips: 0 }
+        let picture = Picture { name: name.to_owned(), style: look.style, note: look.note.clone(), scene };
+        Self { picture, clips: 0 }
     }
 
     pub(super) const fn style(&self) -> Style {
-        self.style
+        self.picture.style
     }
 
     pub(super) const fn width(&self) -> f64 {
-        self.scene.width
+        self.picture.scene.width
     }
 
     /// Where each text starts and ends, and what it says.
@@ -205,11 +203,11 @@ impl Sheet {
             };
             Some((start, start + width, content.clone()))
         };
-        self.scene.elements.iter().filter_map(text).collect()
+        self.picture.scene.elements.iter().filter_map(text).collect()
     }
 
     pub(super) fn finish(self) -> Picture {
-        Picture { name: self.name, style: self.style, note: self.note, scene: self.scene }
+        self.picture
     }
 
     pub(super) fn line(&mut self, points: Vec<(f64, f64)>, stroke: Stroke) {
@@ -219,7 +217,7 @@ impl Sheet {
             None => vec![points],
         };
         for points in lines {
-            self.scene.add(Primitive::PolyLine {
+            self.picture.scene.add(Primitive::PolyLine {
                 points,
                 stroke: Color::from(stroke.ink),
                 stroke_width: stroke.width,
@@ -230,7 +228,7 @@ impl Sheet {
 
     /// A rectangle from its upper left corner.
     pub(super) fn rectangle(&mut self, [x, y, width, height]: [f64; 4], fill: Fill) {
-        self.scene.add(Primitive::Rect {
+        self.picture.scene.add(Primitive::Rect {
             x,
             y,
             width,
@@ -252,11 +250,11 @@ impl Sheet {
             h.push(height);
             fills.push(fill);
         }
-        self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
+        self.picture.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
 
     pub(super) fn dot(&mut self, (cx, cy): (f64, f64), radius: f64, fill: Color) {
-        self.scene.add(Primitive::Circle {
+        self.picture.scene.add(Primitive::Circle {
             cx,
             cy,
             r: radius,
@@ -269,7 +267,7 @@ impl Sheet {
 
     pub(super) fn discs(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
         let (cx, cy) = centres.into_iter().unzip();
-        self.scene.add(Primitive::CircleBatch {
+        self.picture.scene.add(Primitive::CircleBatch {
             cx,
             cy,
             r: dot.radius,
@@ -295,7 +293,7 @@ impl Sheet {
     ) {
         // An SVG may hold no control characters.
         let content = shown_text(text).to_string();
-        self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
+        self.picture.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
     }
 
     /// A text with the middle of its digits at this height.
@@ -307,12 +305,12 @@ impl Sheet {
     pub(super) fn clipped(&mut self, [x, y, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
-        self.scene.defs.push(format!(
+        self.picture.scene.defs.push(format!(
             r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath>"#
         ));
-        self.scene.add(Primitive::ClipStart { x, y, width, height, id });
+        self.picture.scene.add(Primitive::ClipStart { x, y, width, height, id });
         draw(self);
-        self.scene.add(Primitive::ClipEnd);
+        self.picture.scene.add(Primitive::ClipEnd);
     }
 }
 

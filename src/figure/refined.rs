@@ -23,6 +23,7 @@ const YES: Ink = "#7fa8cf";
 const NO: Ink = "#f2f2f0";
 /// Cells in which sets differ.
 const EDGE: Ink = INKS[1];
+const MARGINS: Ends = (0.8, 1.25);
 const OUTLINE: Stroke = Stroke::solid(LIGHT_GREY, 0.5);
 
 /// Draws the cells of a grid that was refined along two axes and has no third, or the edges along one; `None` for others.
@@ -41,14 +42,6 @@ fn axis_of(key: &str) -> (String, f64) {
     }
 }
 
-fn is_wide(low: f64, high: f64) -> bool {
-    low > 0.0 && high / low > LOGARITHMIC
-}
-
-fn scale(label: &str, low: f64, high: f64) -> Axis {
-    if is_wide(low, high) { Axis::logarithmic(label, low, high) } else { Axis::linear(label, low, high) }
-}
-
 /// What the sets of a cell without an edge are, on either side of it; by the condition of the table.
 fn words(by: &str) -> [String; 2] {
     match by.split_once(" = ") {
@@ -59,9 +52,10 @@ fn words(by: &str) -> [String; 2] {
     }
 }
 
-/// A logarithmic axis with margins for values over decades, else another.
-fn wide(label: &str, (low, high): Ends, narrow: impl FnOnce() -> Axis) -> Axis {
-    if is_wide(low, high) { Axis::logarithmic(label, 0.8 * low, 1.25 * high) } else { narrow() }
+/// A logarithmic axis with these margins, as factors, for values over decades, else another.
+fn scale(label: &str, (low, high): Ends, margins: Ends, narrow: impl FnOnce() -> Axis) -> Axis {
+    let is_wide = low > 0.0 && high / low > LOGARITHMIC;
+    if is_wide { Axis::logarithmic(label, margins.0 * low, margins.1 * high) } else { narrow() }
 }
 
 /// Ends of a cell along an axis.
@@ -84,13 +78,14 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     if boxes.values().any(|&count| count > 1) {
         return None;
     }
-    let (x_low, x_high) = bounds(placed.iter().flat_map(|(x, ..)| [x.0, x.1]))?;
-    let (y_low, y_high) = bounds(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]))?;
+    let x_ends = bounds(placed.iter().flat_map(|(x, ..)| [x.0, x.1]))?;
+    let y_ends = bounds(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]))?;
     let [yes, no] = words(&first.by);
     let patch = |ink| Mark::Patch(Fill { ink, opacity: 1.0 });
     let legend = [entry(patch(YES), yes), entry(patch(NO), no), entry(patch(EDGE), "the edge lies here")];
     let (page, mut sheet) = MAP.page("refined-map", look, &legend);
-    let frame = page.frame(0, 0, scale(&x_label, x_low, x_high), scale(&y_label, y_low, y_high));
+    let exact = |label: &str, ends: Ends| scale(label, ends, (1.0, 1.0), || Axis::linear(label, ends.0, ends.1));
+    let frame = page.frame(0, 0, exact(&x_label, x_ends), exact(&y_label, y_ends));
     frame.clipped(&mut sheet, |sheet| {
         let colour = |cell: &CellRow| match cell.share {
             _ if cell.differs => EDGE,
@@ -139,8 +134,8 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
     let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
     let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
     let margin = 0.05 * (x_high - x_low);
-    let x = wide(&x_label, (x_low, x_high), || Axis::linear(&x_label, x_low - margin, x_high + margin));
-    let y = wide(&y_label, (y_low, y_high), || Axis::rounded(&y_label, y_low, y_high));
+    let x = scale(&x_label, (x_low, x_high), MARGINS, || Axis::linear(&x_label, x_low - margin, x_high + margin));
+    let y = scale(&y_label, (y_low, y_high), MARGINS, || Axis::rounded(&y_label, y_low, y_high));
     let frame = page.frame(0, 0, x, y);
     for &(x, low, high) in &points {
         frame.error_bar(&mut sheet, x, (low, high), Stroke::solid(INKS[0], BAR_WIDTH));

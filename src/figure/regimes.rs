@@ -20,8 +20,6 @@ const MIN_VALUES: usize = 4;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
-/// The regimes as numbers of a map.
-const REGIMES: [Regime; 3] = [Regime::StickSlip, Regime::Mixed, Regime::Sliding];
 
 type Getter = fn(&SetSummary) -> Option<Statistic>;
 
@@ -33,14 +31,13 @@ const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| set.tau_mean);
 /// Draws sets in which, besides the modulation, only V0 or the reattachment delay differs, or any one parameter if not
 /// all sets are stick-slip; `None` for others.
 pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
-    let all: Vec<&SetSummary> = sets.iter().collect();
-    let [symbol] = swept(&all)[..] else { return None };
+    let [symbol] = swept(&sets.iter())[..] else { return None };
     let is_plain = sets.iter().all(|set| set.regime == Some(Regime::StickSlip));
-    let values = distinct(&all, |parameters| number(parameters, symbol));
+    let values = distinct(sets.iter(), |parameters| number(parameters, symbol));
     if values.len() < MIN_VALUES || (is_plain && !matches!(symbol, Symbol::V0 | Symbol::TauR)) {
         return None;
     }
-    let lines = lines(all.iter().copied())?;
+    let lines = lines(sets.iter())?;
     let x = Grid::of(values).wider_axis(&label(symbol));
     let names = lines.iter().map(|line| modulation(&line[0].parameters));
     let mut entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
@@ -75,18 +72,17 @@ pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
 /// 4 values or more; `None` for others.
 pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
-    let all: Vec<&SetSummary> = sets.iter().collect();
-    let swept = swept(&all);
+    let swept = swept(&sets.iter());
     // The drive velocity is the x axis wherever it is one.
     let [horizontal, vertical] = match swept[..] {
         [first, Symbol::V0] => [Symbol::V0, first],
         [first, second] => [first, second],
         _ => return None,
     };
-    let grids = [horizontal, vertical].map(|symbol| distinct(&all, |parameters| number(parameters, symbol)));
+    let grids = [horizontal, vertical].map(|symbol| distinct(sets.iter(), |parameters| number(parameters, symbol)));
     let is_grid = grids.iter().all(|values| values.len() >= MIN_VALUES)
         && 2 * sets.len() >= grids[0].len() * grids[1].len()
-        && lines(all.iter().copied()).is_some_and(|lines| lines.len() == 1);
+        && lines(sets.iter()).is_some_and(|lines| lines.len() == 1);
     if !is_grid {
         return None;
     }
@@ -116,11 +112,11 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
             borders(sheet, &frame, &cells);
         });
         if row == 0 {
-            let regime = |set: &SetSummary| REGIMES.iter().position(|regime| set.regime == Some(*regime));
+            let regime = |set: &SetSummary| Regime::ALL.iter().position(|regime| set.regime == Some(*regime));
             let numbers = sets.iter().filter_map(|set| Some((cell(set)?, regime(set)?))).collect();
             for (middle, index) in middles(&numbers) {
-                let share = if REGIMES[index] == Regime::StickSlip { 0.0 } else { 1.0 };
-                frame.name_cell(&mut sheet, ends(middle), REGIMES[index].word(), share);
+                let share = if Regime::ALL[index] == Regime::StickSlip { 0.0 } else { 1.0 };
+                frame.name_cell(&mut sheet, ends(middle), Regime::ALL[index].word(), share);
             }
         }
         frame.axes(&mut sheet);

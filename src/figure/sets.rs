@@ -13,10 +13,11 @@ pub(super) const FREQUENCY: &str = "Modulation frequency 1/T (Hz)";
 pub(super) const ETA: &str = "η = 2πΔ / (T V₀)";
 
 /// Parameters other than those of the modulation in which sets differ.
-pub(super) fn swept(sets: &[&SetSummary]) -> Vec<Symbol> {
+pub(super) fn swept<'a>(sets: &(impl Iterator<Item = &'a SetSummary> + Clone)) -> Vec<Symbol> {
     let is_swept = |symbol: &Symbol| {
-        !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed)
-            && sets.iter().any(|set| set.parameters.get(*symbol) != sets[0].parameters.get(*symbol))
+        let mut values = sets.clone().map(|set| set.parameters.get(*symbol));
+        let first = values.next();
+        !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed) && values.any(|value| Some(value) != first)
     };
     Symbol::ALL.into_iter().filter(is_swept).collect()
 }
@@ -33,15 +34,13 @@ pub(super) struct Modulations<'a> {
 
 impl<'a> Modulations<'a> {
     /// `None` if another parameter differs.
-    pub(super) fn of(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Self> {
-        let sets: Vec<&SetSummary> = sets.collect();
+    pub(super) fn of(sets: impl Iterator<Item = &'a SetSummary> + Clone) -> Option<Self> {
         if !swept(&sets).is_empty() {
             return None;
         }
-        let (modulated, free): (Vec<&SetSummary>, Vec<&SetSummary>) =
-            sets.into_iter().partition(|set| is_modulated(set));
-        let amplitudes = distinct(&modulated, |parameters| Some(parameters.modulation_amplitude));
-        let periods = distinct(&modulated, |parameters| parameters.modulation_period);
+        let (modulated, free): (Vec<&SetSummary>, Vec<&SetSummary>) = sets.partition(|set| is_modulated(set));
+        let amplitudes = distinct(modulated.iter().copied(), |parameters| Some(parameters.modulation_amplitude));
+        let periods = distinct(modulated.iter().copied(), |parameters| parameters.modulation_period);
         Some(Self { modulated, free: free.first().copied(), amplitudes, periods })
     }
 }
@@ -51,8 +50,16 @@ pub(super) fn is_modulated(set: &SetSummary) -> bool {
 }
 
 /// The distinct values of a quantity, ascending.
-pub(super) fn distinct(sets: &[&SetSummary], quantity: impl Fn(&Parameters) -> Option<f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = sets.iter().filter_map(|set| quantity(&set.parameters)).collect();
+pub(super) fn distinct<'a>(
+    sets: impl Iterator<Item = &'a SetSummary>,
+    quantity: impl Fn(&Parameters) -> Option<f64>,
+) -> Vec<f64> {
+    ascending(sets.filter_map(|set| quantity(&set.parameters)))
+}
+
+/// Each value once, in their order.
+pub(super) fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
     values
@@ -161,13 +168,10 @@ impl Grid {
         Self { values, is_linear }
     }
 
-    /// Spaced logarithmically. `values` > 0 ascend.
-    pub(super) const fn logarithmic(values: Vec<f64>) -> Self {
-        Self { values, is_linear: false }
-    }
-
-    pub(super) fn cells(&self) -> impl Iterator<Item = (f64, f64)> {
-        (0..self.values.len()).map(|index| self.cell(index))
+    /// The cells around `values` > 0 that ascend, spaced logarithmically.
+    pub(super) fn logarithmic_cells(values: Vec<f64>) -> Vec<(f64, f64)> {
+        let grid = Self { values, is_linear: false };
+        (0..grid.values.len()).map(|index| grid.cell(index)).collect()
     }
 
     /// An axis for cells: it ends half a step beyond the values.

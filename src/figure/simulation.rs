@@ -9,6 +9,7 @@ use super::picture::{Picture, Sheet, Stroke, snapped};
 use super::sets::{MICROMETRES, common};
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
+use crate::observe::MapRow;
 use anyhow::{Result, anyhow};
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
@@ -30,40 +31,23 @@ const MAX_PEAKS: f64 = 25.0;
 const MAX_PERIODS: f64 = 200.0;
 const POINTS_PER_PERIOD: f64 = 40.0;
 
-/// Fractions of attached contacts over time and blocks.
-#[derive(Clone, Copy, Debug)]
-pub struct AttachedMap<'a> {
-    /// Instants in s, evenly spaced, ascending.
-    pub times: &'a [f64],
-    pub blocks: usize,
-    /// Attached contacts over contacts, for every block at the first instant, then at the second, ...
-    pub fractions: &'a [f64],
-    /// Length of the slider, in m.
-    pub length: f64,
-}
-
-/// What is shown of a simulation.
-#[derive(Clone, Copy, Debug)]
-pub struct Simulation<'a> {
-    pub parameters: &'a Parameters,
-    /// Shear force in N against time in s, if it is shown.
-    pub trace: Option<&'a [(f64, f64)]>,
-    /// The map, if it is shown.
-    pub map: Option<AttachedMap<'a>>,
-    /// Onsets of slips, in s.
-    pub onsets: &'a [f64],
-}
-
-/// Draws what is given: the shear force against time, the map, or the map under the force; above them the modulation.
-pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
-    let Simulation { parameters, trace, map, onsets } = *shown;
-    let look = &look.with_note(&format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed));
+/// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the force;
+/// above them the modulation. Onsets of slips are marked in the map.
+pub fn simulation(
+    parameters: &Parameters,
+    trace: Option<&[(f64, f64)]>,
+    map: Option<&[MapRow]>,
+    onsets: &[f64],
+) -> Result<Picture> {
+    let note = format!("{}, seed {}", common(std::iter::once(parameters)), parameters.seed);
+    let look = &Look { note, ..Look::default() };
     let empty = |what| anyhow!("figure {NAME}: there are no {what} to draw");
-    if map.is_some_and(|map| map.times.len() < 2 || map.fractions.len() != map.times.len() * map.blocks) {
+    let blocks = parameters.blocks;
+    if map.is_some_and(|map| map.len() < 2 * blocks || !map.len().is_multiple_of(blocks)) {
         return Err(empty("fractions for every instant and block"));
     }
     let instants = trace.into_iter().flatten().map(|sample| sample.0);
-    let instants = instants.chain(map.iter().flat_map(|map| map.times).copied());
+    let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) =
         bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
     let x = || Axis::linear("Time t (s)", first, last);
@@ -73,7 +57,7 @@ pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
     let rows = [period.map(|_| MODULATION_HEIGHT), trace.map(|_| TRACE_HEIGHT), map.map(|_| MAP_HEIGHT)];
     let heights: Vec<f64> = rows.into_iter().flatten().collect();
     let right = if map.is_some() { COLOUR_BAR } else { RIGHT };
-    let peaks = peaks(period, first, last);
+    let peaks = period.map_or_else(Vec::new, |period| x().multiples_of(period, MAX_PEAKS));
     let legend = [
         map.filter(|_| !onsets.is_empty()).map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
         (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
@@ -84,7 +68,8 @@ pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
     let mut next_row = || row.next().unwrap_or(0);
     if let Some(period) = period {
         let amplitude = MICROMETRES * parameters.modulation_amplitude;
-        let y = Axis::few("Modulation Δ cos(2πt/T) (µm)", -1.2 * amplitude, 1.2 * amplitude);
+        let mut y = Axis::sparse("Modulation Δ cos(2πt/T) (µm)", -1.2 * amplitude, 1.2 * amplitude);
+        y.minor.clear();
         let frame = page.frame(next_row(), 0, x(), y);
         frame.clipped(&mut sheet, |sheet| {
             frame.level(sheet, 0.0, GRID);
@@ -106,10 +91,10 @@ pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
         frame.axes(&mut sheet);
     }
     if let Some(map) = map {
-        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, map.length * MILLIMETRES);
+        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, parameters.slider_length * MILLIMETRES);
         let frame = page.frame(next_row(), 0, x(), y);
         frame.clipped(&mut sheet, |sheet| {
-            sheet.rectangles(cells(&frame, &map));
+            sheet.rectangles(cells(&frame, map, blocks));
             marks(sheet, &frame, &peaks, REFERENCE);
             marks(sheet, &frame, &onsets, ONSET);
         });
@@ -125,14 +110,6 @@ pub fn simulation(shown: &Simulation<'_>, look: &Look) -> Result<Picture> {
 /// The period in s of a modulation that can be drawn over a time in s: one that is not ramped, nor too fast.
 fn period(parameters: &Parameters, time: f64) -> Option<f64> {
     parameters.modulation_period.filter(|period| parameters.ramp_time == 0.0 && time / period <= MAX_PERIODS)
-}
-
-/// The instants at which the modulation pulls most, if they are few.
-fn peaks(period: Option<f64>, first: f64, last: f64) -> Vec<f64> {
-    let Some(period) = period.filter(|period| (last - first) / period <= MAX_PEAKS) else { return Vec::new() };
-    let start = (first / period).ceil();
-    let peaks = (0..=u32::MAX).map(|step| (start + f64::from(step)) * period);
-    peaks.take_while(|&peak| peak <= last).collect()
 }
 
 fn marks(sheet: &mut Sheet, frame: &Frame, instants: &[f64], stroke: Stroke) {
@@ -160,24 +137,24 @@ fn thinned(trace: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
 }
 
 /// Rectangles of the map: averages over the instants of a column one unit wide, equal neighbours joined.
-fn cells(frame: &Frame, map: &AttachedMap<'_>) -> Vec<([f64; 4], Color)> {
+fn cells(frame: &Frame, map: &[MapRow], blocks: usize) -> Vec<([f64; 4], Color)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
-    let columns = (frame.width as usize).min(map.times.len());
-    let instants = map.times.len();
+    let columns = (frame.width as usize).min(map.len() / blocks);
+    let (instants, time) = (map.len() / blocks, |instant: usize| map[instant * blocks].time);
     // Half a spacing on both sides of an instant belongs to it.
-    let spacing = (map.times[instants - 1] - map.times[0]) / (instants - 1) as f64;
+    let spacing = (time(instants - 1) - time(0)) / (instants - 1) as f64;
     let start_of = |column: usize| column * instants / columns;
     let left_of =
-        |column: usize| snapped(frame.x_of(map.times[0] + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
-    let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / map.blocks as f64));
+        |column: usize| snapped(frame.x_of(time(0) + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
+    let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / blocks as f64));
     let level = |block: usize, column: usize| {
         let span = start_of(column)..start_of(column + 1);
         let count = span.len() as f64;
-        let sum: f64 = span.map(|instant| map.fractions[instant * map.blocks + block]).sum();
+        let sum: f64 = span.map(|instant| map[instant * blocks + block].attached_fraction).sum();
         (sum / count * LEVELS).round()
     };
     let mut cells = Vec::new();
-    for block in 0..map.blocks {
+    for block in 0..blocks {
         let levels: Vec<f64> = (0..columns).map(|column| level(block, column)).collect();
         let (top, bottom) = (top_of(block + 1), top_of(block));
         let mut column = 0;
@@ -205,21 +182,30 @@ mod tests {
         assert!(thin.windows(2).all(|pair| pair[0].0 <= pair[1].0));
     }
 
-    const MAP: AttachedMap = AttachedMap { times: &[0.0, 1.0], blocks: 3, fractions: &[1.0; 6], length: 0.15 };
+    /// Of three blocks at two instants.
+    fn map() -> Vec<MapRow> {
+        let cell =
+            |cell: u32| MapRow { time: f64::from(cell / 3), block: u64::from(cell % 3) + 1, attached_fraction: 1.0 };
+        (0..6).map(cell).collect()
+    }
+
     const FORCE: &[(f64, f64)] = &[(0.0, 1.0), (1.0, 2.0)];
 
-    fn drawn(trace: Option<&[(f64, f64)]>, map: Option<AttachedMap<'_>>, period: Option<f64>) -> Option<String> {
+    fn drawn(trace: Option<&[(f64, f64)]>, map: Option<&[MapRow]>, period: Option<f64>) -> Option<String> {
         let amplitude = if period.is_some() { 1e-6 } else { 0.0 };
-        let parameters =
-            Parameters { modulation_amplitude: amplitude, modulation_period: period, ..Parameters::default() };
-        let shown = Simulation { parameters: &parameters, trace, map, onsets: &[0.5, 2.0] };
-        Some(simulation(&shown, &Look::default()).ok()?.svg())
+        let parameters = Parameters {
+            blocks: 3,
+            modulation_amplitude: amplitude,
+            modulation_period: period,
+            ..Parameters::default()
+        };
+        Some(simulation(&parameters, trace, map, &[0.5, 2.0]).ok()?.svg())
     }
 
     #[test]
     fn a_map_of_the_wrong_size_is_refused() {
-        assert!(drawn(Some(FORCE), Some(AttachedMap { fractions: &[1.0; 5], ..MAP }), None).is_none());
-        assert!(drawn(Some(FORCE), Some(MAP), None).is_some());
+        assert!(drawn(Some(FORCE), Some(&map()[..5]), None).is_none());
+        assert!(drawn(Some(FORCE), Some(&map()), None).is_some());
         assert!(drawn(Some(&FORCE[..1]), None, None).is_none() && drawn(None, None, None).is_none());
     }
 
@@ -229,7 +215,7 @@ mod tests {
         let panels =
             [(true, false, vec![force]), (false, true, vec![position, bar]), (true, true, vec![force, position, bar])];
         for (has_trace, has_map, labels) in panels {
-            let svg = drawn(has_trace.then_some(FORCE), has_map.then_some(MAP), None).unwrap();
+            let svg = drawn(has_trace.then_some(FORCE), has_map.then_some(&map()[..]), None).unwrap();
             for label in [force, position, bar] {
                 assert_eq!(svg.matches(label).count(), usize::from(labels.contains(&label)), "{label}");
             }
@@ -239,12 +225,12 @@ mod tests {
 
     #[test]
     fn the_modulation_and_the_onsets_that_are_shown_are_drawn() {
-        let modulated = drawn(None, Some(MAP), Some(0.25)).unwrap();
+        let modulated = drawn(None, Some(&map()), Some(0.25)).unwrap();
         assert!(modulated.contains("Modulation Δ cos(2πt/T) (µm)") && modulated.contains("peaks of the modulation"));
-        let still = drawn(None, Some(MAP), None).unwrap();
+        let still = drawn(None, Some(&map()), None).unwrap();
         assert!(!still.contains("Modulation") && still.contains("onset of a slip"));
         assert!(!drawn(Some(FORCE), None, None).unwrap().contains("onset of a slip"), "onsets go with the map");
-        assert!(!drawn(None, Some(MAP), Some(1e-3)).unwrap().contains("Modulation"), "a thousand periods");
-        assert_eq!(peaks(Some(0.25), 0.3, 1.0), [0.5, 0.75, 1.0]);
+        assert!(!drawn(None, Some(&map()), Some(1e-3)).unwrap().contains("Modulation"), "a thousand periods");
+        assert_eq!(Axis::linear("", 0.3, 1.0).multiples_of(0.25, MAX_PEAKS), [0.5, 0.75, 1.0]);
     }
 }

@@ -2,8 +2,7 @@
 //! table there is the frequency, which follows from a parameter.
 
 use super::BadOption;
-use super::axis::Axis;
-use super::sets::{ETA, FREQUENCY, capitalised, parameter, symbol_of, three_digits};
+use super::sets::{ETA, FREQUENCY, ascending, capitalised, parameter, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
@@ -49,22 +48,32 @@ impl Values {
         let index = |name: &str| columns.iter().position(|column| column.name == name);
         let column = index(name).ok_or_else(|| unknown(option, name, &columns))?;
         let ends = index(&format!("{name}_low")).zip(index(&format!("{name}_high")));
-        let (mut cells, mut intervals) = (Vec::new(), Vec::new());
+        let (mut numbers, mut intervals, mut given) = (Vec::new(), Vec::new(), Vec::new());
         for row in rows {
-            let all = number_cells(row);
-            let number =
-                |index: usize| if let Some(Given::Number(number)) = &all[index] { Some(*number) } else { None };
-            intervals.push(ends.and_then(|(low, high)| number(low).zip(number(high))));
-            cells.push(all.into_iter().nth(column).flatten());
+            let frequency = row.parameters.modulation_period.map(|period| 1.0 / period);
+            let (mut all, mut word) = (Vec::new(), None);
+            (row, Derived { frequency }).cells(&mut |cell| {
+                match cell {
+                    Value::Flag(flag) if all.len() == column => word = Some(if flag { "yes" } else { "no" }.to_owned()),
+                    Value::Text(text) if all.len() == column => word = Some(text.to_owned()),
+                    _ => (),
+                }
+                all.push(match cell {
+                    Value::Real(real) => Some(real),
+                    Value::Count(count) => Some(count as f64),
+                    Value::Null | Value::Flag(_) | Value::Text(_) => None,
+                });
+            });
+            intervals.push(ends.and_then(|(low, high)| all[low].zip(all[high])));
+            numbers.push(all[column].filter(|number| number.is_finite()));
+            given.push(word);
         }
-        let mut words: Vec<String> = cells.iter().flatten().filter_map(Given::word).collect();
+        let mut words: Vec<String> = given.iter().flatten().cloned().collect();
         words.sort();
         words.dedup();
-        let number = |given: &Given| match given {
-            Given::Number(number) => Some(*number).filter(|number| number.is_finite()),
-            Given::Word(word) => words.binary_search(word).ok().map(|index| index as f64),
-        };
-        let numbers = cells.iter().map(|given| given.as_ref().and_then(number)).collect();
+        for (number, word) in numbers.iter_mut().zip(given) {
+            *number = number.or_else(|| words.binary_search(&word?).ok().map(|index| index as f64));
+        }
         Ok(Self { column: columns[column].clone(), numbers, intervals, words })
     }
 
@@ -116,45 +125,10 @@ impl Values {
         self.words.get(value as usize).cloned().unwrap_or_else(|| three_digits(value))
     }
 
-    /// An axis of its words.
-    pub(super) fn categories(&self, label: &str) -> Axis {
-        Axis::categories(label, &self.words.iter().map(String::as_str).collect::<Vec<_>>())
-    }
-
     /// The values that occur, ascending.
     pub(super) fn distinct(&self) -> Vec<f64> {
-        let mut values: Vec<f64> = self.numbers.iter().copied().flatten().collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values
+        ascending(self.numbers.iter().copied().flatten())
     }
-}
-
-/// A value of a cell.
-enum Given {
-    Number(f64),
-    Word(String),
-}
-
-impl Given {
-    fn word(&self) -> Option<String> {
-        if let Self::Word(word) = self { Some(word.clone()) } else { None }
-    }
-}
-
-fn number_cells(row: &SetRow) -> Vec<Option<Given>> {
-    let mut cells = Vec::new();
-    let frequency = row.parameters.modulation_period.map(|period| 1.0 / period);
-    (row, Derived { frequency }).cells(&mut |cell| {
-        cells.push(match cell {
-            Value::Null => None,
-            Value::Real(real) => Some(Given::Number(real)),
-            Value::Count(count) => Some(Given::Number(count as f64)),
-            Value::Flag(flag) => Some(Given::Word(if flag { "yes" } else { "no" }.to_owned())),
-            Value::Text(text) => Some(Given::Word(text.to_owned())),
-        });
-    });
-    cells
 }
 
 fn unknown(option: &'static str, name: &str, columns: &[Column]) -> BadOption {

@@ -15,15 +15,10 @@ const HEIGHTS: [f64; 1] = [340.0];
 /// Width of the bars of uncertainty.
 const UNCERTAINTY: f64 = 1.0;
 
-/// The look of a drive: its line, and whether its dots have a hole.
-#[derive(Clone, Copy)]
-struct Pattern {
-    dashes: Option<(f64, f64)>,
-    has_holes: bool,
-}
+/// The look of a drive: dashes and gaps of its line, and whether its dots have a hole.
+type Pattern = (Option<(f64, f64)>, bool);
 
-const PATTERNS: [Pattern; 2] =
-    [Pattern { dashes: None, has_holes: false }, Pattern { dashes: Some((5.0, 3.0)), has_holes: true }];
+const PATTERNS: [Pattern; 2] = [(None, false), (Some((5.0, 3.0)), true)];
 
 /// Error and cost of a method at one setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,8 +77,8 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let each = methods.iter().flat_map(|method| drives.iter().map(move |drive| (*method, *drive)));
     let known = each.filter(|(method, drive)| all().any(|line| (&*line.method, &*line.drive) == (method, drive)));
     let lines = known.map(|(method, drive)| {
-        let (ink, pattern) = look_of(method, drive);
-        let mark = if pattern.has_holes { Mark::Ring(ink, RADIUS) } else { Mark::Dot(Dot::solid(ink, RADIUS)) };
+        let (ink, (_, has_holes)) = look_of(method, drive);
+        let mark = if has_holes { Mark::Ring(ink, RADIUS) } else { Mark::Dot(Dot::solid(ink, RADIUS)) };
         entry(mark, format!("{method}, {drive}"))
     });
     let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
@@ -119,12 +114,18 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// A method's settings, with the uncertainty of their errors.
-fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], (ink, pattern): (Ink, Pattern), is_joined: bool) {
+fn draw(
+    sheet: &mut Sheet,
+    frame: &Frame,
+    points: &[WorkPrecision],
+    (ink, (dashes, has_holes)): (Ink, Pattern),
+    is_joined: bool,
+) {
     let points: Vec<&WorkPrecision> = points.iter().filter(|point| point.is_usable()).collect();
     let places = || points.iter().map(|point| (point.error, point.work));
     frame.clipped(sheet, |sheet| {
         if is_joined {
-            frame.curve(sheet, places(), Stroke { ink, width: 1.8, dashes: pattern.dashes });
+            frame.curve(sheet, places(), Stroke { ink, width: 1.8, dashes });
         }
         for point in &points {
             if let Some((low, high)) = point.uncertainty {
@@ -133,7 +134,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, points: &[WorkPrecision], (ink, patter
             }
         }
         frame.points(sheet, places(), Dot::solid(ink, RADIUS));
-        if pattern.has_holes {
+        if has_holes {
             frame.points(sheet, places(), Dot::solid(WHITE, RADIUS - 1.6));
         }
     });

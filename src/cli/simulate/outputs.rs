@@ -4,9 +4,9 @@ use super::super::exit::UsageError;
 use super::super::output::replace;
 use super::super::plot::format_of;
 use super::{Arguments, Panel};
-use crate::figure::{self, Look, Picture, Simulation};
+use crate::figure::{Picture, simulation};
 use crate::model::Parameters;
-use crate::observe::Slip;
+use crate::observe::{MapRow, Slip};
 use crate::simulate::Records;
 use crate::sweep::Sweep;
 use crate::table::columns::Table;
@@ -108,22 +108,9 @@ fn draw(arguments: &Arguments, parameters: &Parameters, recorded: &Records, slip
     let shown = arguments.plot.from - slack..=arguments.plot.until.unwrap_or(f64::INFINITY) + slack;
     let samples: Vec<(f64, f64)> =
         trace.iter().filter(|row| shown.contains(&row.time)).map(|row| (row.time, row.force)).collect();
-    let cells = || map.iter().filter(|row| shown.contains(&row.time));
-    let times: Vec<f64> = cells().step_by(parameters.blocks).map(|row| row.time).collect();
-    let fractions: Vec<f64> = cells().map(|row| row.attached_fraction).collect();
-    let map = figure::AttachedMap {
-        times: &times,
-        blocks: parameters.blocks,
-        fractions: &fractions,
-        length: parameters.slider_length,
-    };
+    let cells: Vec<MapRow> = map.iter().filter(|row| shown.contains(&row.time)).copied().collect();
     let onsets: Vec<f64> = slips.iter().map(|slip| slip.onset).collect();
-    let simulation = Simulation {
-        parameters,
-        trace: arguments.plot.draws(Panel::Force).then_some(samples.as_slice()),
-        map: arguments.plot.draws(Panel::Map).then_some(map),
-        onsets: &onsets,
-    };
-    figure::simulation(&simulation, &Look::default())
+    let trace = arguments.plot.draws(Panel::Force).then_some(&*samples);
+    simulation(parameters, trace, arguments.plot.draws(Panel::Map).then_some(&*cells), &onsets)
         .map_err(|error| anyhow!(UsageError(format!("--from {}: {error}", arguments.plot.from))))
 }
