@@ -24,8 +24,7 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let averages = observer.averages();
-        let (ruptures, has_given_up) = (observer.ruptures(), observer.has_given_up());
+        let (averages, ruptures, has_given_up) = (observer.averages(), observer.ruptures, observer.has_given_up);
         let (slips, precursors) = observer.into_rows();
         Self { slips, precursors, ruptures, averages, has_given_up, summary }
     }

@@ -190,8 +190,9 @@ pub struct SlipObserver {
     last_end: Option<Instant>,
     /// Halfway from the last slip to where the job gives up, and whether it has.
     settled: Option<Instant>,
-    has_given_up: bool,
-    ruptures: u64,
+    pub(super) has_given_up: bool,
+    /// Ruptures of any size that have ended.
+    pub(super) ruptures: u64,
     /// Drops, if they are recorded, and first and last break of every slip.
     drops: Option<DropDetector>,
     spans: Vec<(f64, f64)>,
@@ -274,16 +275,6 @@ impl SlipObserver {
             self.slips.iter_mut().zip(of_slips).for_each(|(slip, drops)| slip.drops = drops);
         }
         (self.slips, self.precursors)
-    }
-
-    /// Ruptures of any size that have ended.
-    pub fn ruptures(&self) -> u64 {
-        self.ruptures
-    }
-
-    /// Whether the job ends since no slip came for too long.
-    pub fn has_given_up(&self) -> bool {
-        self.has_given_up
     }
 
     /// Averages over time, from the end of start-up to that of the last slip. What follows belongs to it if no slip has come

@@ -8,9 +8,8 @@
 //! grid order, as long as the sweep has room for their sets.
 
 use super::set::SetRow;
-use super::statistic::StatisticValue;
 use crate::sweep::{Contrast, RefinedAxis, Refinement, Sweep};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{Table, Value, columns};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What is to be divided.
@@ -151,15 +150,13 @@ impl Seen {
 }
 
 /// The class of a value, and the number that may vary within it. A statistic without value is a class of its own.
-fn class(value: StatisticValue, contrast: &Contrast) -> (String, Option<f64>) {
-    match (value, contrast) {
-        (StatisticValue::Nothing, _) => (String::new(), None),
-        (StatisticValue::Class(class), Contrast::Value(value)) => ((class == *value).to_string(), None),
-        (StatisticValue::Number(number), Contrast::Value(value)) => ((number.to_string() == *value).to_string(), None),
-        (StatisticValue::Number(number), Contrast::Threshold(threshold)) => ((number > *threshold).to_string(), None),
-        (StatisticValue::Number(number), Contrast::Step(_)) => ("number".to_owned(), Some(number)),
-        (StatisticValue::Number(number), Contrast::Class) => (number.to_string(), None),
-        (StatisticValue::Class(class), _) => (class, None),
+fn class(value: Value<'_>, contrast: &Contrast) -> (String, Option<f64>) {
+    match (value.number(), contrast) {
+        _ if value == Value::Null => (String::new(), None),
+        (_, Contrast::Value(wanted)) => ((value.to_string() == *wanted).to_string(), None),
+        (Some(number), Contrast::Threshold(threshold)) => ((number > *threshold).to_string(), None),
+        (Some(number), Contrast::Step(_)) => ("number".to_owned(), Some(number)),
+        _ => (value.to_string(), None),
     }
 }
 
@@ -200,7 +197,8 @@ impl Cells<'_> {
             if row.finished_jobs == 0 {
                 continue;
             }
-            let (class, number) = class(row.statistic(self.refinement.by.key), &self.refinement.contrast);
+            let Refinement { by, contrast, .. } = self.refinement;
+            let (class, number) = row.column(by.key, |value| class(value, contrast)).unwrap_or_default();
             for cell in self.touching(rows) {
                 if let Some(seen) = seen.get_mut(&cell) {
                     seen.add(&class, number);

@@ -130,7 +130,7 @@ impl<'a> Results<'a> {
 
     /// The same with the next round of its sweep, all parts of the last being done.
     pub(super) fn in_next_round(&self, round: Round) -> Self {
-        self.followed_by(None, |earlier| Extension::next_round(self.sweep(), earlier, round))
+        self.followed_by(None, |earlier| Extension::in_round(self.sweep(), earlier, Some(round)))
     }
 
     fn followed_by(

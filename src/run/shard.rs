@@ -24,20 +24,15 @@ impl Default for Shard {
     }
 }
 
-/// A text that names no shard.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8")]
-pub struct ShardError(String);
-
 impl FromStr for Shard {
-    type Err = ShardError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, ShardError> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let parsed = text.split_once('/').and_then(|(number, count)| {
             let shard = Self { number: number.parse().ok()?, count: count.parse().ok()? };
             (1..=shard.count.get()).contains(&shard.number).then_some(shard)
         });
-        parsed.ok_or_else(|| ShardError(text.to_owned()))
+        parsed.ok_or_else(|| format!("{text:?}: must be K/N with whole numbers 1 <= K <= N, such as 2/8"))
     }
 }
 
@@ -112,7 +107,7 @@ mod tests {
     #[test]
     fn what_is_no_shard_is_refused() {
         for text in ["0/3", "4/3", "1/0", "1", "a/b", "-1/3", ""] {
-            assert!(text.parse::<Shard>().unwrap_err().to_string().contains("K/N"), "{text}");
+            assert!(text.parse::<Shard>().unwrap_err().contains("K/N"), "{text}");
         }
         assert_eq!("2/8".parse::<Shard>().unwrap().to_string(), "2/8");
     }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::time::SystemTime;
 
 /// Failed jobs that [`status`] lists one by one, at most.
-pub const MAX_FAILURES: usize = 10;
+const MAX_FAILURES: usize = 10;
 
 /// How far the parts of a share are. Costs are predicted CPU times, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -147,23 +147,6 @@ fn jobs_kept(share: &Share<'_>) -> u64 {
     jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
 }
 
-fn overview_and_failures(results: &Results<'_>, max_failures: usize) -> Result<(Overview, Vec<Failure>), ResultsError> {
-    let mut failures = Vec::new();
-    let parts: Vec<Outline> = results.plan().outlines().collect();
-    let share = Share::look_up(results, &parts, false)?;
-    let mut overview = share.overview(true, |part, position, reason| {
-        if failures.len() < max_failures {
-            failures.push(Failure {
-                job_id: results.job_id(part, position),
-                reason: reason.to_owned(),
-                command: results.sweep().command(&part.jobs[position]),
-            });
-        }
-    })?;
-    overview.jobs_kept = jobs_kept(&share);
-    Ok((overview, failures))
-}
-
 columns! {
     /// How a job ended.
     struct OutcomeAlone {
@@ -191,7 +174,19 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
 
 /// The same, with another number of failed jobs.
 pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
-    let (overview, failures) = overview_and_failures(results, max_failures)?;
+    let mut failures = Vec::new();
+    let parts: Vec<Outline> = results.plan().outlines().collect();
+    let share = Share::look_up(results, &parts, false)?;
+    let mut overview = share.overview(true, |part, position, reason| {
+        if failures.len() < max_failures {
+            failures.push(Failure {
+                job_id: results.job_id(part, position),
+                reason: reason.to_owned(),
+                command: results.sweep().command(&part.jobs[position]),
+            });
+        }
+    })?;
+    overview.jobs_kept = jobs_kept(&share);
     let mut last_threads = None;
     results.events(|event| {
         if let RunEvent::Started { threads, .. } = event {

@@ -100,11 +100,7 @@ impl Extension {
         Self::in_round(sweep, earlier, sweep.first_round())
     }
 
-    pub fn next_round(sweep: &Sweep, earlier: &[Self], round: Round) -> Self {
-        Self::in_round(sweep, earlier, Some(round))
-    }
-
-    fn in_round(sweep: &Sweep, earlier: &[Self], round: Option<Round>) -> Self {
+    pub fn in_round(sweep: &Sweep, earlier: &[Self], round: Option<Round>) -> Self {
         let mut own = Self { sweep: sweep.clone(), part_cost: 0.0, kept: None, round };
         let total: f64 = own_jobs(&own, earlier, &sweep.points()).map(|job| job.cost).sum();
         let least = if own.round.is_some() { ROUND_PART_COST } else { 0.0 };
