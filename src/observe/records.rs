@@ -48,10 +48,6 @@ struct Sampling {
 }
 
 impl Sampling {
-    fn new(spacing: f64) -> Self {
-        Self { spacing, next: 0 }
-    }
-
     /// The next instant, if it lies before the end of the segment.
     fn within(&mut self, segment: &Segment<'_>) -> Option<f64> {
         let time = self.next as f64 * self.spacing;
@@ -86,7 +82,7 @@ impl Trace {
     pub fn new(parameters: &Parameters, spacing: f64) -> Self {
         let contacts = (parameters.blocks * parameters.contacts_per_block) as f64;
         let drive = Drive::new(parameters);
-        Self { drive, contacts, attached: 0, sampling: Sampling::new(spacing), rows: Vec::new() }
+        Self { drive, contacts, attached: 0, sampling: Sampling { spacing, next: 0 }, rows: Vec::new() }
     }
 }
 
@@ -138,7 +134,7 @@ impl AttachedMap {
         Self {
             contacts_per_block: parameters.contacts_per_block as f64,
             attached: vec![0; parameters.blocks],
-            sampling: Sampling::new(spacing),
+            sampling: Sampling { spacing, next: 0 },
             rows: Vec::new(),
         }
     }

@@ -194,7 +194,12 @@ impl Gathered {
     }
 
     fn push(&mut self, slip: &Slip) {
-        self.slips.push_of(&self.jobs.parameters, slip, &self.limits);
+        let Parameters { ramp_time, drive_velocity, .. } = self.jobs.parameters;
+        if ramp_time > 0.0 {
+            self.slips.push(slip, &PhaseLimits::at(slip.modulation.eta(drive_velocity)));
+        } else {
+            self.slips.push(slip, &self.limits);
+        }
     }
 
     fn finish(mut self) -> (FinishedSet, Vec<(u64, Point)>) {

@@ -100,10 +100,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
     gathering.each_set(max_slips, spacing(total), |set, points| {
         let row = &set.row;
-        set_writer.push(row)?;
-        if refinement.is_some() {
-            refined_sets.extend(set_writer.chosen(row).map(|number| (number, row.clone())));
-        }
+        let chosen = set_writer.push(row)?.filter(|_| refinement.is_some());
+        refined_sets.extend(chosen.map(|number| (number, row.clone())));
         histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);
         summary.slips += row.slips;

@@ -3,7 +3,7 @@
 
 use super::set::SetRow;
 use crate::results::Results;
-use crate::sweep::Precision;
+use crate::sweep::{Precision, Sweep};
 use crate::table::columns::{Table, columns};
 use crate::table::file::{DatasetError, Footer, TableWriter};
 use crate::table::storage::StoredFile;
@@ -26,14 +26,8 @@ impl Table for RoundOfSet {
     const MEANING: &'static str = "Further columns of `sets`, if the sweep has `[precision]` or `[refine]`";
 }
 
-columns! {
-    /// A set of a sweep in rounds.
-    #[derive(Debug)]
-    pub struct SetInRounds {
-        set: SetRow;
-        round: RoundOfSet;
-    }
-}
+/// A set of a sweep in rounds.
+pub type SetInRounds = (SetRow, RoundOfSet);
 
 impl Table for SetInRounds {
     const NAME: &'static str = SetRow::NAME;
@@ -48,60 +42,47 @@ pub(super) enum SetWriter<'a> {
 
 /// What the rounds of a sweep have chosen.
 pub(super) struct Rounds<'a> {
-    results: &'a Results<'a>,
+    sweep: &'a Sweep,
     precision: Option<&'a Precision>,
-    /// First and last round of each set, and its seeds.
-    of_sets: HashMap<u64, (u64, u64, u64)>,
+    of_sets: HashMap<u64, RoundOfSet>,
 }
 
 impl<'a> SetWriter<'a> {
     pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
         let sweep = results.sweep();
         let Some(rounds) = sweep.rounds() else { return Ok(Self::Plain(TableWriter::new(file, footer)?)) };
-        let mut of_sets = HashMap::new();
+        let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
         for (round, extension) in (1..).zip(results.rounds()) {
             let points = extension.round.iter().flat_map(|round| round.points.iter().cloned().flatten());
             for set in points.map(|point| sweep.set_of(point)) {
-                let (_, last, seeds) = of_sets.entry(set).or_insert((round, round, 0));
-                (*last, *seeds) = (round, *seeds + 1);
+                let of_set = of_sets.entry(set).or_default();
+                of_set.first_round.get_or_insert(round);
+                of_set.last_round = Some(round);
+                *of_set.seeds.get_or_insert(0) += 1;
             }
         }
-        let rounds = Rounds { results, precision: rounds.precision.as_ref(), of_sets };
+        let rounds = Rounds { sweep, precision: rounds.precision.as_ref(), of_sets };
         Ok(Self::InRounds(TableWriter::new(file, footer)?, rounds))
     }
 
-    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), DatasetError> {
+    /// Writes a set, and returns its number if the rounds have chosen it.
+    pub(super) fn push(&mut self, row: &SetRow) -> Result<Option<u64>, DatasetError> {
         match self {
-            Self::Plain(writer) => writer.push(row),
-            Self::InRounds(writer, rounds) => writer.push(&SetInRounds { set: row.clone(), round: rounds.of(row) }),
+            Self::Plain(writer) => writer.push(row).map(|()| None),
+            Self::InRounds(writer, Rounds { sweep, precision, of_sets }) => {
+                let chosen = sweep.set_with(&row.parameters.parameters).filter(|set| of_sets.contains_key(set));
+                let error = precision.and_then(|precision| row.error_over_target(precision));
+                let round = chosen.map(|set| of_sets[&set].clone()).unwrap_or_default();
+                writer.push(&(row.clone(), RoundOfSet { target_met: error.map(|error| error <= 1.0), ..round }))?;
+                Ok(chosen)
+            }
         }
-    }
-
-    /// The number of a set that the rounds have chosen.
-    pub(super) fn chosen(&self, row: &SetRow) -> Option<u64> {
-        let Self::InRounds(_, rounds) = self else { return None };
-        let set = rounds.results.sweep().set_with(&row.parameters.parameters);
-        set.filter(|set| rounds.of_sets.contains_key(set))
     }
 
     pub(super) fn finish(self) -> Result<(), DatasetError> {
         match self {
             Self::Plain(writer) => writer.finish().map(drop),
             Self::InRounds(writer, _) => writer.finish().map(drop),
-        }
-    }
-}
-
-impl Rounds<'_> {
-    fn of(&self, row: &SetRow) -> RoundOfSet {
-        let set = self.results.sweep().set_with(&row.parameters.parameters);
-        let found = set.and_then(|set| self.of_sets.get(&set)).copied();
-        let error = self.precision.and_then(|precision| row.error_over_target(precision));
-        RoundOfSet {
-            first_round: found.map(|(first, ..)| first),
-            last_round: found.map(|(_, last, _)| last),
-            seeds: found.map(|(.., seeds)| seeds),
-            target_met: error.map(|error| error <= 1.0),
         }
     }
 }

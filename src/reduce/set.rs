@@ -128,28 +128,19 @@ impl SetSlips {
         self.slow_front_speed.extend(slip.slow_front_speed);
     }
 
-    /// A slip of a job with these parameters, whose modulation may be ramped; else its phases lie in `limits`.
-    pub(super) fn push_of(&mut self, parameters: &Parameters, slip: &Slip, limits: &PhaseLimits) {
-        if parameters.ramp_time > 0.0 {
-            self.push(slip, &PhaseLimits::at(slip.modulation.eta(parameters.drive_velocity)));
-        } else {
-            self.push(slip, limits);
-        }
-    }
-
     /// The statistics of the set.
     pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
         let by_job = self.by_job();
-        let intervals = estimate(&by_job, |slip| slip.interval().map(|interval| [interval]));
+        let intervals = estimate(&by_job, |slip| non_nan(slip.interval).map(|interval| [interval]));
         let drops = estimate(&by_job, |slip| Some([slip.drop]));
         // The whole turns go first: they would cost the sine its digits.
         let locking = estimate(&by_job, |slip| non_nan(slip.periods).map(|periods| unit(TAU * periods.fract())));
         let phases = estimate(&by_job, |slip| non_nan(slip.phase).map(unit));
         let loads = estimate(&by_job, |slip| non_nan(slip.load_phase).map(unit));
 
-        let mut sorted: Vec<f64> = self.slips.iter().filter_map(SlipStats::interval).collect();
+        let mut sorted: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.interval)).collect();
         let mut periods: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.periods)).collect();
         let (mut tau, mut mean_periods) = (Moments::default(), Moments::default());
         tau.extend(sorted.iter().copied());

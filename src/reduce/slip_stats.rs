@@ -6,6 +6,7 @@ use crate::observe::Slip;
 /// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlipStats {
+    /// Interval before it, in s.
     pub(super) interval: f64,
     /// The interval in periods of the modulation at its end.
     pub(super) periods: f64,
@@ -25,11 +26,6 @@ impl SlipStats {
             load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
             drop: slip.drop,
         }
-    }
-
-    /// Interval before it, in s.
-    pub(super) fn interval(&self) -> Option<f64> {
-        non_nan(self.interval)
     }
 }
 

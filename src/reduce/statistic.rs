@@ -17,6 +17,7 @@ impl SetRow {
         found
     }
 
+    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
     fn number(&self, column: &str) -> Option<f64> {
         self.column(column, |value| value.number()).flatten()
     }

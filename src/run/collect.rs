@@ -4,11 +4,10 @@
 use crate::results::ResultsError;
 use crate::results::layout::PartName;
 use crate::results::parts::Outcome;
-use crate::results::workers::Member;
 use crate::run::cpu;
 use crate::run::take::{PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
-use crate::run::{Events, Kernel, RunEvent, RunReport};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;
@@ -70,12 +69,9 @@ struct OpenPart {
 }
 
 pub(super) struct Collector<'a, 'e> {
+    joined: &'a Joined<'a>,
     share: &'a Share<'a>,
-    member: &'a Member<'a>,
     walltime: &'a Walltime,
-    threads: usize,
-    /// Set from outside when the run is to stop.
-    stop: &'a AtomicBool,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
     open: BTreeMap<(usize, u64), OpenPart>,
@@ -85,21 +81,19 @@ pub(super) struct Collector<'a, 'e> {
 
 impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
+        joined: &'a Joined<'a>,
         share: &'a Share<'a>,
-        member: &'a Member<'a>,
         walltime: &'a Walltime,
-        threads: usize,
-        stop: &'a AtomicBool,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { share, member, walltime, threads, stop, events, report, open: BTreeMap::new(), own: (0, 0.0) }
+        Self { joined, share, walltime, events, report, open: BTreeMap::new(), own: (0, 0.0) }
     }
 
     /// Runs jobs of the share until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
-        let threads = self.threads;
+        let threads = self.joined.threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
             ResultsError::refused(self.share.results.layout().root(), problem)
@@ -108,7 +102,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
-        let work = Work::new(self.share, self.member, self.walltime)?;
+        let work = Work::new(self.share, self.joined.member, self.walltime)?;
         let all_run = pool.in_place_scope(|workers| {
             let hand_out = |job: PartJob| {
                 let sender = sender.clone();
@@ -134,7 +128,7 @@ impl<'a, 'e> Collector<'a, 'e> {
             if *again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(self.member, part, &open.outcomes, spilled)?;
+                self.share.results.spill(self.joined.member, part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -152,7 +146,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         under_way: &AllUnderWay,
         interrupt: &AtomicBool,
     ) -> Result<bool, ResultsError> {
-        let threads = self.threads;
+        let threads = self.joined.threads;
         let (mut jobs_out, mut cost_out) = (0, 0.0);
         let mut is_out_of_time = false;
         let [mut last_tick, mut last_look] = [Instant::now(); 2];
@@ -169,7 +163,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 self.report_long_jobs(under_way)?;
                 self.events.send(&RunEvent::Tick)?;
             }
-            let must_end = self.stop.load(Ordering::Relaxed) || self.walltime.is_over();
+            let must_end = self.joined.options.stop.load(Ordering::Relaxed) || self.walltime.is_over();
             if must_end && !interrupt.swap(true, Ordering::Relaxed) {
                 self.events.send(&RunEvent::Stopping)?;
             }
@@ -221,7 +215,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn take(&mut self, of: &PartJob, outcome: Outcome, time: JobTime) -> Result<(), ResultsError> {
         let part = &of.of.part;
         let job = &part.jobs[of.position];
-        self.member.count_job();
+        self.joined.member.count_job();
         let predicted_cost = job.cost;
         let event = match &outcome {
             Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
@@ -257,7 +251,7 @@ impl<'a, 'e> Collector<'a, 'e> {
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
         let Taken { part, spilled, .. } = &*whole.of;
-        self.share.results.commit(self.member, part, &whole.outcomes, spilled)?;
+        self.share.results.commit(self.joined.member, part, &whole.outcomes, spilled)?;
         self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);

@@ -180,7 +180,7 @@ impl Joined<'_> {
                 let jobs_there = overview.jobs_done + overview.jobs_failed - jobs_again;
                 events.send(&RunEvent::started(shard, others, threads, jobs, jobs_there, predicted_cost))?;
             }
-            let mut collector = Collector::new(&share, member, &walltime, threads, options.stop, events, report);
+            let mut collector = Collector::new(self, &share, &walltime, events, report);
             let ended = loop {
                 match collector.run(kernel) {
                     Ok(true) => (),

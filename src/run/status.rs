@@ -79,63 +79,48 @@ impl Share<'_> {
     pub fn overview(&self, looks: bool, mut visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
         let looks = looks || self.may_run_again();
         let mut overview = Overview::default();
-        for part in self.parts {
-            if looks || !self.pending.done.has(part) {
-                overview.add(part, &self.pending.state(part)?, || self.part(part), &mut visit);
-            } else {
-                overview.add_done(part);
+        for outline in self.parts {
+            if self.pending.done.has(outline) {
+                overview.parts_done += 1;
+                overview.jobs_done += outline.job_count as u64;
+                overview.predicted_cost_done += outline.cost;
+                if !looks {
+                    continue;
+                }
             }
-        }
-        Ok(overview)
-    }
-}
-
-impl Overview {
-    fn add_done(&mut self, part: &Outline) {
-        self.parts_done += 1;
-        self.jobs_done += part.job_count as u64;
-        self.predicted_cost_done += part.cost;
-    }
-
-    /// Adds a part; `part` gives its jobs, if their costs are wanted.
-    fn add(
-        &mut self,
-        outline: &Outline,
-        state: &PartState,
-        part: impl FnOnce() -> Part,
-        visit: &mut impl FnMut(&Part, usize, &str),
-    ) {
-        match state {
-            PartState::Missing { spilled } => {
-                let jobs = if spilled.is_empty() { Vec::new() } else { part().jobs };
-                let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
-                self.parts_missing += 1;
-                self.jobs_missing += (outline.job_count - spilled.len()) as u64;
-                self.predicted_cost_missing += outline.cost - spilled_cost;
-                self.jobs_done += spilled.len() as u64;
-                self.predicted_cost_done += spilled_cost;
-            }
-            PartState::Done { again } => {
-                self.add_done(outline);
-                let part = if again.is_empty() { return } else { part() };
-                for (&position, why) in again {
-                    let cost = part.jobs[position].cost;
-                    self.jobs_done -= 1;
-                    match why {
-                        Again::Failed(reason) => {
-                            self.jobs_failed += 1;
-                            self.predicted_cost_failed += cost;
-                            visit(&part, position, reason);
-                        }
-                        Again::CutOff => {
-                            self.jobs_missing += 1;
-                            self.predicted_cost_missing += cost;
-                            self.predicted_cost_done -= cost;
+            match self.pending.state(outline)? {
+                PartState::Missing { spilled } => {
+                    let jobs = if spilled.is_empty() { Vec::new() } else { self.part(outline).jobs };
+                    let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
+                    overview.parts_missing += 1;
+                    overview.jobs_missing += (outline.job_count - spilled.len()) as u64;
+                    overview.predicted_cost_missing += outline.cost - spilled_cost;
+                    overview.jobs_done += spilled.len() as u64;
+                    overview.predicted_cost_done += spilled_cost;
+                }
+                PartState::Done { again } if again.is_empty() => {}
+                PartState::Done { again } => {
+                    let part = self.part(outline);
+                    for (position, why) in again {
+                        let cost = part.jobs[position].cost;
+                        overview.jobs_done -= 1;
+                        match why {
+                            Again::Failed(reason) => {
+                                overview.jobs_failed += 1;
+                                overview.predicted_cost_failed += cost;
+                                visit(&part, position, &reason);
+                            }
+                            Again::CutOff => {
+                                overview.jobs_missing += 1;
+                                overview.predicted_cost_missing += cost;
+                                overview.predicted_cost_done -= cost;
+                            }
                         }
                     }
                 }
             }
         }
+        Ok(overview)
     }
 }
 

@@ -5,7 +5,7 @@
 //! set is named by the number of its point with the first seed.
 
 use super::axes::Axis;
-use super::grid::Sweep;
+use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
 use super::rounds::{Bounds, Round, Rounds, Standing, merged};
 use crate::model::{Parameters, Symbol};
@@ -34,13 +34,9 @@ impl Sweep {
     }
 
     /// The rows of a point.
-    pub fn rows(&self, mut point: u64) -> Vec<u64> {
-        let mut rows: Vec<u64> = Vec::with_capacity(self.axes.len());
-        for axis in self.axes.iter().rev() {
-            rows.push(point % axis.len());
-            point /= axis.len();
-        }
-        rows.reverse();
+    pub fn rows(&self, point: u64) -> Vec<u64> {
+        let mut rows = vec![0; self.axes.len()];
+        find_rows(point, &self.row_counts(), &mut rows);
         rows
     }
 
@@ -95,26 +91,20 @@ impl Sweep {
 
     /// The sets of the first round, in order: all combinations of the rows that the sweep file has.
     pub(super) fn first_sets(&self) -> BTreeSet<u64> {
-        let spacing: Vec<u64> = (0..self.axes.len())
-            .map(|axis| match (&self.rounds, self.seed_axis()) {
-                (_, Some(seeds)) if seeds == axis => self.axes[axis].len(),
-                (Some(rounds), _) => rounds.spacing(axis),
-                (None, _) => 1,
-            })
-            .collect();
+        let spacing_of = |axis| self.rounds.as_ref().map_or(1, |rounds| rounds.spacing(axis));
+        let mut spacing: Vec<u64> = (0..self.axes.len()).map(spacing_of).collect();
+        if let Some(axis) = self.seed_axis() {
+            spacing[axis] = self.axes[axis].len();
+        }
         let counts: Vec<u64> =
-            self.axes.iter().zip(&spacing).map(|(axis, &spacing)| axis.len().div_ceil(spacing)).collect();
+            self.axes.iter().zip(&spacing).map(|(axis, spacing)| axis.len().div_ceil(*spacing)).collect();
         let mut rows = vec![0; counts.len()];
-        let points = 0..counts.iter().product();
-        points
-            .filter_map(|mut number: u64| {
-                for ((row, count), spacing) in rows.iter_mut().zip(&counts).zip(&spacing).rev() {
-                    *row = number % count * spacing;
-                    number /= count;
-                }
-                self.set_at(&rows)
-            })
-            .collect()
+        let set = |number| {
+            find_rows(number, &counts, &mut rows);
+            rows.iter_mut().zip(&spacing).for_each(|(row, spacing)| *row *= spacing);
+            self.set_at(&rows)
+        };
+        (0..counts.iter().product()).filter_map(set).collect()
     }
 
     /// What its rounds may add up to; `None` for a sweep without.

@@ -8,7 +8,7 @@
 use super::axes::Axis;
 use super::cost::predicted_cost;
 use super::filter::Condition;
-use super::job::{Identity, Job, JobId, SetId, settings};
+use super::job::{Id, Identity, Job, settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::{Parameters, Symbol};
@@ -118,12 +118,12 @@ impl Sweep {
     }
 
     /// The id of a job.
-    pub fn job_id(&self, parameters: &Parameters) -> JobId {
+    pub fn job_id(&self, parameters: &Parameters) -> Id {
         self.identity.job(parameters)
     }
 
     /// The id of the set of a job.
-    pub fn set_id(&self, parameters: &Parameters) -> SetId {
+    pub fn set_id(&self, parameters: &Parameters) -> Id {
         self.identity.set(parameters)
     }
 
@@ -162,13 +162,15 @@ impl Sweep {
 
     /// Those of these points that are jobs, with their numbers, in canonical form.
     pub(super) fn admitted(&self, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
-        self.walk(self.axes.iter().map(Axis::len).collect(), points).filter(|(_, point)| self.admits(point))
+        self.walk(self.row_counts(), points).filter(|(_, point)| self.admits(point))
     }
 
     /// The points of one seed that are jobs if the conditions hold, in canonical form.
     pub(super) fn points_of_one_seed(&self) -> impl Iterator<Item = Point> {
-        let is_seed = |axis: &Axis| axis.quantities() == [Quantity::Parameter(Symbol::Seed)];
-        let counts: Vec<u64> = self.axes.iter().map(|axis| if is_seed(axis) { 1 } else { axis.len() }).collect();
+        let mut counts = self.row_counts();
+        if let Some(axis) = self.seed_axis() {
+            counts[axis] = 1;
+        }
         let points = 0..counts.iter().product();
         self.walk(counts, points).map(|(_, point)| point)
     }
@@ -178,11 +180,7 @@ impl Sweep {
     fn walk(&self, counts: Vec<u64>, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         let mut rows = vec![0; counts.len()];
         points.filter_map(move |number| {
-            let mut rest = number;
-            for (row, count) in rows.iter_mut().zip(&counts).rev() {
-                *row = rest % count;
-                rest /= count;
-            }
+            find_rows(number, &counts, &mut rows);
             let point = self.point(&rows);
             let is_first = || self.axes.iter().zip(&rows).all(|(axis, &row)| axis.is_first(row));
             (point.is_modulated() || is_first()).then(|| (number, point.canonical()))
@@ -201,5 +199,13 @@ impl Sweep {
     /// Whether a canonical point fulfils the conditions.
     fn admits(&self, point: &Point) -> bool {
         self.conditions.iter().all(|condition| condition.holds(point))
+    }
+}
+
+/// Finds the rows of a point by its number, in a grid with this many rows of each axis.
+pub(super) fn find_rows(mut number: u64, counts: &[u64], rows: &mut [u64]) {
+    for (row, count) in rows.iter_mut().zip(counts).rev() {
+        *row = number % count;
+        number /= count;
     }
 }

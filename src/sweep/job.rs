@@ -24,35 +24,14 @@ pub struct Job {
 /// Bytes of an id: 128 bits, so that ten million jobs collide with a probability of about 1e-25.
 const ID_BYTES: usize = 16;
 
-macro_rules! id {
-    ($(#[$about:meta])* $Id:ident) => {
-        $(#[$about])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        pub struct $Id([u8; ID_BYTES]);
+/// Name of a job, or of the jobs that differ in the seed alone. Shown as 32 hexadecimal characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Id(pub [u8; ID_BYTES]);
 
-        impl $Id {
-            /// The 16 bytes.
-            pub const fn as_bytes(&self) -> &[u8; ID_BYTES] {
-                &self.0
-            }
-        }
-
-        impl fmt::Display for $Id {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-            }
-        }
-    };
-}
-
-id! {
-    /// Name of a job. Shown as 32 hexadecimal characters.
-    JobId
-}
-
-id! {
-    /// Name of the jobs that differ in the seed alone. Shown as 32 hexadecimal characters.
-    SetId
+impl fmt::Display for Id {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
 }
 
 /// Keys and values of the solver and the recording, as a sweep file writes them, but for the longest time and the budget of
@@ -93,16 +72,16 @@ impl Identity {
     }
 
     /// The id of a job with these canonical parameters.
-    pub fn job(&self, parameters: &Parameters) -> JobId {
-        JobId(self.hash(parameters, &Symbol::ALL))
+    pub fn job(&self, parameters: &Parameters) -> Id {
+        self.hash(parameters, &Symbol::ALL)
     }
 
     /// The id of the set that such a job belongs to.
-    pub fn set(&self, parameters: &Parameters) -> SetId {
-        SetId(self.hash(parameters, Symbol::ALL.split_last().map_or(&[], |(_, others)| others)))
+    pub fn set(&self, parameters: &Parameters) -> Id {
+        self.hash(parameters, Symbol::ALL.split_last().map_or(&[], |(_, others)| others))
     }
 
-    fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> [u8; ID_BYTES] {
+    fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> Id {
         let (mut hasher, defaults) = (self.shared.clone(), Parameters::default());
         for &symbol in symbols {
             let value = parameters.get(symbol);
@@ -118,7 +97,7 @@ impl Identity {
             }
         }
         let digest = hasher.finalize();
-        std::array::from_fn(|byte| digest[byte])
+        Id(std::array::from_fn(|byte| digest[byte]))
     }
 }
 

@@ -21,7 +21,7 @@ use super::rounds::{Contrast, MAX_SETS, Precision, RefinedAxis, Refinement, Targ
 use super::samples::Range;
 use super::set::{STATISTICS, Statistic, StatisticKind};
 use super::source::{Entry, Refused, Section, all, hint};
-use crate::model::{Symbol, Value};
+use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::table::value::Shortest;
 use std::cell::Cell;
@@ -77,8 +77,8 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
             Err(section.source.refuse(section.at, problem))
         }
         (Some(entry), None) => {
-            let share = entry.value().and_then(Value::number).filter(|share| *share > 0.0 && *share < 1.0);
-            let share = share.ok_or_else(|| entry.must_be("a number > 0 and < 1, as a share of the statistic"))?;
+            let allowed = "a number > 0 and < 1, as a share of the statistic";
+            let share = entry.number(allowed, |share| share > 0.0 && share < 1.0)?;
             match of.iter().find(|statistic| statistic.kind == StatisticKind::Angle) {
                 Some(Statistic { key, .. }) => {
                     Err(entry.refuse(format!("{key} is an angle and has no relative error; set absolute, in rad")))
@@ -160,8 +160,7 @@ fn read_refined_axes<'a>(section: &Section<'a>) -> Result<Vec<WantedAxis<'a>>, R
     to.only(&allowed)?;
     all(quantities.into_iter().map(|(quantity, entry)| {
         let fine = to.required(quantity.key(), form)?;
-        let step = fine.value().and_then(Value::number).filter(|step| *step > 0.0 && step.is_finite());
-        let step = step.ok_or_else(|| fine.must_be("a finite number > 0"))?;
+        let step = fine.number("a finite number > 0", |step| step > 0.0)?;
         Ok(WantedAxis { quantity, entry, to: (step, fine), levels: Cell::new(None) })
     }))
 }
@@ -189,14 +188,8 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Statistic, Contr
             return Err(entry.refuse(format!("{word} is no number, and has no {}; remove it", entry.key)));
         }
         (Some(_), Some(entry)) => return Err(entry.refuse("threshold is there too; keep one of them")),
-        (Some(entry), None) => {
-            let value = entry.value().and_then(Value::number).filter(|value| value.is_finite());
-            Contrast::Threshold(value.ok_or_else(|| entry.must_be("a finite number"))?)
-        }
-        (None, Some(entry)) => {
-            let value = entry.value().and_then(Value::number).filter(|value| *value > 0.0 && value.is_finite());
-            Contrast::Step(value.ok_or_else(|| entry.must_be("a finite number > 0"))?)
-        }
+        (Some(entry), None) => Contrast::Threshold(entry.number("a finite number", |_| true)?),
+        (None, Some(entry)) => Contrast::Step(entry.number("a finite number > 0", |step| step > 0.0)?),
     };
     Ok((statistic, contrast))
 }

@@ -254,10 +254,14 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A finite number > 0.
+    /// A finite number that `fits`, as the words `allowed` say.
+    pub fn number(&self, allowed: &str, fits: impl Fn(f64) -> bool) -> Result<f64, Refused> {
+        let number = self.value().and_then(Value::number).filter(|number| number.is_finite() && fits(*number));
+        number.ok_or_else(|| self.must_be(allowed))
+    }
+
     pub fn positive(&self, unit: &str) -> Result<f64, Refused> {
-        let number = self.value().and_then(Value::number).filter(|number| *number > 0.0 && number.is_finite());
-        number.ok_or_else(|| self.must_be(&format!("a finite number > 0, in {unit}")))
+        self.number(&format!("a finite number > 0, in {unit}"), |number| number > 0.0)
     }
 
     /// A whole number within bounds.
