@@ -1,16 +1,16 @@
 //! A results directory that fits this program: opened once, valid from then on.
 
 use crate::results::commit::Commit;
-use crate::results::error::ResultsError;
+use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
 use crate::results::tables;
-use crate::results::workers::Member;
+use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Outline, Part, Plan, Round, Sweep};
 use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::collections::HashSet;
-use std::io::ErrorKind;
+use std::io;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ const STRANGER: &str =
 impl<'a> Results<'a> {
     /// Opens the directory of a sweep for a worker: begins it, resumes it, or extends it.
     /// Nothing is written if the directory is refused.
-    pub fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
+    fn open(member: &Member<'a>, sweep: &Sweep) -> Result<Self, ResultsError> {
         let layout = member.layout();
         loop {
             let found = Self::look(layout, sweep)?;
@@ -49,9 +49,29 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Refuses a directory that a sweep cannot be run in; nothing is written.
-    pub fn check(layout: &Layout<'a>, sweep: &Sweep) -> Result<(), ResultsError> {
-        Self::look(layout, sweep)?.done_parts().map(drop)
+    /// Joins the workers on the directory of a sweep, opens it, and is one of them while `body` runs. Nothing is written if
+    /// the directory is refused.
+    pub fn join<T, E: From<ResultsError>>(
+        layout: &Layout<'a>,
+        sweep: &Sweep,
+        threads: usize,
+        body: impl FnOnce(&Member<'a>, &Self) -> Result<T, E>,
+    ) -> Result<T, E> {
+        Self::look(layout, sweep)?.done_parts()?;
+        layout.storage.ensure_folder(layout.root()).map_err(ResultsError::from)?;
+        workers::join(layout, sweep, threads, |member| {
+            let opened = Self::open(member, sweep);
+            let ended = opened.clone().map_err(E::from).and_then(|results| body(member, &results));
+            if ended.is_ok() {
+                return ended;
+            }
+            // That the directory was moved, or that others have taken over, says more than what was not found in it.
+            let moved = opened.ok().and_then(|results| results.check_place().err());
+            match moved.filter(|moved| moved.kind == ErrorKind::Refused).or_else(|| member.burial()) {
+                Some(reason) => Err(reason.into()),
+                None => ended,
+            }
+        })
     }
 
     /// The directory of a sweep as a run would find it; nothing is written.
@@ -286,7 +306,7 @@ impl<'a> Results<'a> {
         }
         for folder in self.layout.result_folders() {
             match self.layout.storage.sync_folder(&folder) {
-                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 synced => synced?,
             }
         }
@@ -300,7 +320,7 @@ pub(super) fn is_fresh(layout: &Layout<'_>) -> Result<bool, StorageError> {
     let ours = |name: &std::ffi::OsString| RUN_FOLDERS.iter().any(|folder| name == folder);
     match storage.list(layout.root()) {
         // A file at this place is somebody else's.
-        Err(error) if error.kind() == ErrorKind::NotADirectory => Ok(false),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => Ok(false),
         names => Ok(names?.iter().all(|name| name == RUN) && storage.list(&layout.run())?.iter().all(ours)),
     }
 }

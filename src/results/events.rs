@@ -7,7 +7,7 @@ use crate::results::commit::own_number;
 use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::rounds::RoundsSoFar;
-use crate::table::file::PROGRAM;
+use crate::results::workers::host;
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read};
@@ -118,26 +118,13 @@ pub struct RunReport {
 }
 
 impl RunEvent {
-    /// The event with which a run begins.
-    pub fn started(
-        shard: String,
-        others: usize,
-        threads: usize,
-        jobs: u64,
-        jobs_there: u64,
-        predicted_cost: f64,
-    ) -> Self {
-        let (program, process) = (PROGRAM.to_owned(), std::process::id());
-        Self::Started { host: host(), process, program, shard, others, threads, jobs, jobs_there, predicted_cost }
-    }
-
     /// Whether the log keeps it: a line for each job, or each second, would be millions.
     const fn is_logged(&self) -> bool {
         !matches!(self, Self::JobDone { .. } | Self::OthersDone { .. } | Self::Tick)
     }
 }
 
-/// Most bytes of a line: far more than the names of all compacted files.
+/// Most bytes of a line: far more than any reason of a failure has.
 const MAX_LINE: u64 = 1 << 24;
 
 /// A line of a log.
@@ -147,16 +134,6 @@ struct Line {
     time: f64,
     #[serde(flatten)]
     event: RunEvent,
-}
-
-pub(super) const UNKNOWN_HOST: &str = "unknown";
-
-/// Name of this host, or "unknown".
-pub fn host() -> String {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
-    let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
-    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
 }
 
 fn now() -> f64 {
@@ -250,7 +227,7 @@ mod tests {
         let results = open(&Layout::new(&Disk, root.path()), &sweep).unwrap();
         let mut log = results.begin_log().unwrap();
         let events = [
-            RunEvent::started("1/1".to_owned(), 1, 2, 3, 0, 4.0),
+            RunEvent::RoundBegun { jobs: 3, predicted_cost: 4.0, rounds: RoundsSoFar::default() },
             RunEvent::Finished(RunReport { jobs_run: 3, wall: 1.5, ..RunReport::default() }),
             RunEvent::Error { error: "disk full".to_owned() },
             RunEvent::Stopping,

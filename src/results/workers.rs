@@ -10,9 +10,7 @@
 //! other, and leaves.
 
 use crate::results::commit::{Commit, own_number};
-use crate::results::directory::Results;
-use crate::results::error::{ErrorKind, ResultsError};
-use crate::results::events::host;
+use crate::results::error::ResultsError;
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
 use crate::table::checksum;
@@ -83,6 +81,16 @@ impl Worker {
     }
 }
 
+const UNKNOWN_HOST: &str = "unknown";
+
+/// Name of this host, or "unknown".
+pub fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
+    let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
+}
+
 /// The boot of the kernel and the name space of processes.
 fn system() -> String {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
@@ -121,16 +129,13 @@ pub struct Member<'a> {
     jobs: AtomicU64,
 }
 
-/// Joins the workers on the directory of a sweep, opens it, and is one of them while `body` runs. Nothing is written if the
-/// directory is refused.
-pub fn join<'a, T, E: From<ResultsError>>(
+/// Joins the workers on a directory, which must be there, and is one of them while `body` runs.
+pub(super) fn join<'a, T, E: From<ResultsError>>(
     layout: &Layout<'a>,
     sweep: &Sweep,
     threads: usize,
-    body: impl FnOnce(&Member<'a>, &Results<'a>) -> Result<T, E>,
+    body: impl FnOnce(&Member<'a>) -> Result<T, E>,
 ) -> Result<T, E> {
-    Results::check(layout, sweep)?;
-    layout.storage.ensure_folder(layout.root()).map_err(ResultsError::from)?;
     let member = Member::join(layout, Worker::here(sweep, threads)).map_err(ResultsError::from)?;
     member.check_peace()?;
     std::thread::scope(|scope| {
@@ -146,18 +151,7 @@ pub fn join<'a, T, E: From<ResultsError>>(
         // Without beats, workers of other hosts take this one for dead: double work.
         let _ = thread.spawn_scoped(scope, beats);
         let _end = end;
-        let opened = Results::open(member, sweep);
-        let ended = opened.clone().map_err(E::from).and_then(|results| body(member, &results));
-        if ended.is_ok() {
-            return ended;
-        }
-        // That the directory was moved, or that others have taken over, says more than what was not found in it.
-        if let Some(moved) = opened.ok().and_then(|results| results.check_place().err())
-            && moved.kind == ErrorKind::Refused
-        {
-            return Err(moved.into());
-        }
-        if member.is_buried() { Err(member.burial().into()) } else { ended }
+        body(member)
     })
 }
 
@@ -272,21 +266,18 @@ impl<'a> Member<'a> {
         })
     }
 
-    /// Whether others took it for dead: the listing is true also on a network disk.
-    fn is_buried(&self) -> bool {
+    /// Why it can commit nothing any more, if others took it for dead: the listing is true also on a network disk.
+    pub(super) fn burial(&self) -> Option<ResultsError> {
         let is_listed = |folder: &Path, name: &str| {
             self.layout.storage.list(folder).map_or(true, |names| names.iter().any(|there| there == name))
         };
-        is_listed(&self.layout.run(), "staging") && !is_listed(&self.layout.staging(""), &self.name)
-    }
-
-    fn burial(&self) -> ResultsError {
+        let is_buried = is_listed(&self.layout.run(), "staging") && !is_listed(&self.layout.staging(""), &self.name);
         let problem = format!(
             "this worker gave no sign of life for over {} s, as on a machine that was suspended, so others have taken over \
              its work; nothing that was committed is lost, and the same command goes on",
             SILENCE.as_secs()
         );
-        ResultsError::stopped(self.layout.root(), problem)
+        is_buried.then(|| ResultsError::stopped(self.layout.root(), problem))
     }
 
     /// Begins to prepare files for their places.
@@ -344,14 +335,16 @@ impl Drop for Member<'_> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::results::ErrorKind;
     use crate::results::claims::{Claims, Standing};
+    use crate::results::directory::Results;
     use crate::sweep::Sweep;
     use crate::table::storage::Disk;
     use std::fs::{self, File};
 
     /// Opens a directory as a run does.
     pub fn open<'a>(layout: &Layout<'a>, sweep: &Sweep) -> Result<Results<'a>, ResultsError> {
-        super::join(layout, sweep, 1, |_, results| Ok(results.clone()))
+        Results::join(layout, sweep, 1, |_, results| Ok(results.clone()))
     }
 
     /// Lets the workers of a thread look dead, as if their machine had been suspended for long.
@@ -378,7 +371,7 @@ pub(crate) mod tests {
     }
 
     fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
-        super::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| Ok(body(member))).unwrap()
+        Results::join::<_, ResultsError>(results.layout(), &sweep(), 1, |member, _| Ok(body(member))).unwrap()
     }
 
     #[test]
@@ -458,7 +451,7 @@ pub(crate) mod tests {
         let results = results(root.path());
         let layout = results.layout();
         let target = layout.run().join("target");
-        let suspended = super::join::<(), ResultsError>(layout, &sweep(), 1, |first, _| {
+        let suspended = Results::join::<(), ResultsError>(layout, &sweep(), 1, |first, _| {
             let mut commit = first.commit();
             commit.stage_bytes(&target, b"late").unwrap();
             lose(std::thread::current().id());

@@ -32,7 +32,7 @@ use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
-use crate::results::workers::{self, Member};
+use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
@@ -40,6 +40,7 @@ use crate::run::take::{LOOK, Left, Share};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
+use crate::table::file::PROGRAM;
 use crate::table::storage::StorageError;
 use std::borrow::Cow;
 use std::num::NonZeroUsize;
@@ -104,7 +105,7 @@ pub fn join<T, E: From<ResultsError>>(
                        run it on a common disk, started as often as you like";
         return Err(ResultsError::refused(layout.root(), problem).into());
     }
-    workers::join(layout, sweep, threads, |member, results| {
+    Results::join(layout, sweep, threads, |member, results| {
         let all: Vec<Outline> = results.plan().outlines().collect();
         results.refuse_strangers(&all)?;
         let parts: Vec<Outline> = options.shard.parts(all.into_iter()).collect();
@@ -175,10 +176,17 @@ impl Joined<'_> {
                 events.send(&RunEvent::RoundBegun { jobs, predicted_cost, rounds })?;
             } else {
                 events.log = Some(results.begin_log()?);
-                let shard = options.shard.to_string();
-                let others = member.others()?.len();
-                let jobs_there = overview.jobs_done + overview.jobs_failed - jobs_again;
-                events.send(&RunEvent::started(shard, others, threads, jobs, jobs_there, predicted_cost))?;
+                events.send(&RunEvent::Started {
+                    host: host(),
+                    process: std::process::id(),
+                    program: PROGRAM.to_owned(),
+                    shard: options.shard.to_string(),
+                    others: member.others()?.len(),
+                    threads,
+                    jobs,
+                    jobs_there: overview.jobs_done + overview.jobs_failed - jobs_again,
+                    predicted_cost,
+                })?;
             }
             let mut collector = Collector::new(self, &share, &walltime, events, report);
             let ended = loop {
