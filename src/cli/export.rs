@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::table::file::Format;
+use crate::table::formats::Format;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;

@@ -11,10 +11,8 @@ use crate::table::columns::{FromRow, Row};
 pub use crate::table::error::DatasetError;
 use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
-use arrow_ipc::writer::FileWriter;
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_schema::{DataType, Field, Schema};
 use bytes::Bytes;
-use clap::ValueEnum;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
@@ -26,7 +24,6 @@ use parquet::schema::types::ColumnPath;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -73,7 +70,7 @@ impl Footer {
         self.0.get(key).map(String::as_str)
     }
 
-    fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
+    pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
         let (units, meaning) = (by_name(schema, UNIT), by_name(schema, DESCRIPTION));
         let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
@@ -171,106 +168,6 @@ impl<R: Row> TableWriter<R> {
         let footer = footer.map_err(DatasetError::unwritten(file.path()))?;
         file.write(&footer)?;
         Ok(file.sync()?)
-    }
-}
-
-/// How rows are written for other programs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    Parquet,
-    /// Plain text with a line of names; real numbers with as many digits as they have.
-    Csv,
-    /// The file format of Arrow.
-    Arrow,
-}
-
-impl Format {
-    pub const fn extension(self) -> &'static str {
-        match self {
-            Self::Parquet => FILE_EXTENSION,
-            Self::Csv => "csv",
-            Self::Arrow => "arrow",
-        }
-    }
-}
-
-/// Writes rows of any schema in any format.
-pub enum RowWriter {
-    Parquet(Box<ArrowWriter<Counted>>, PathBuf),
-    Csv(Box<csv::Writer<Counted>>, PathBuf),
-    Arrow(Box<FileWriter<Counted>>, PathBuf),
-}
-
-/// A file that counts its bytes.
-pub struct Counted {
-    file: StoredFile,
-    bytes: u64,
-}
-
-impl Write for Counted {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes).map_err(|error| error.source)?;
-        self.bytes += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl RowWriter {
-    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, DatasetError> {
-        let path = file.path().to_owned();
-        let file = Counted { file, bytes: 0 };
-        let writer = || -> Result<Self, ParquetError> {
-            Ok(match format {
-                Format::Parquet => {
-                    let properties = footer.properties(schema)?;
-                    let writer = ArrowWriter::try_new(file, Arc::clone(schema), Some(properties))?;
-                    Self::Parquet(Box::new(writer), path.clone())
-                }
-                Format::Csv => {
-                    let mut writer = csv::Writer::from_writer(file);
-                    let names = schema.fields().iter().map(|field| field.name());
-                    writer.write_record(names).map_err(|error| ParquetError::External(error.into()))?;
-                    Self::Csv(Box::new(writer), path.clone())
-                }
-                Format::Arrow => Self::Arrow(Box::new(FileWriter::try_new(file, schema)?), path.clone()),
-            })
-        };
-        writer().map_err(DatasetError::unwritten(&path))
-    }
-
-    pub fn write(&mut self, rows: &RecordBatch) -> Result<(), DatasetError> {
-        match self {
-            Self::Parquet(writer, path) => writer.write(rows).map_err(DatasetError::unwritten(path)),
-            Self::Csv(writer, path) => {
-                let written = arrow::texts(rows).try_for_each(|texts| writer.write_record(texts));
-                written.map_err(|error| DatasetError::unwritten(path)(ParquetError::External(error.into())))
-            }
-            Self::Arrow(writer, path) => {
-                writer.write(rows).map_err(|error| DatasetError::unwritten(path)(error.into()))
-            }
-        }
-    }
-
-    /// Writes what is left and brings the file to the disk; returns its number of bytes.
-    pub fn finish(self) -> Result<u64, DatasetError> {
-        let (counted, path) = match self {
-            Self::Parquet(writer, path) => (writer.into_inner(), path),
-            Self::Csv(writer, path) => {
-                let counted = writer.into_inner().map_err(|error| ParquetError::External(error.into_error().into()));
-                (counted, path)
-            }
-            Self::Arrow(mut writer, path) => {
-                let counted = writer.finish().and_then(|()| writer.into_inner());
-                (counted.map_err(ParquetError::from), path)
-            }
-        };
-        let Counted { mut file, bytes } = counted.map_err(DatasetError::unwritten(&path))?;
-        file.sync()?;
-        Ok(bytes)
     }
 }
 

@@ -5,6 +5,7 @@
 //! columns.rs     name, unit, meaning and value of each column -> row types
 //! arrow.rs       rows as record batches and as JSON
 //! file.rs        one table as a file: the same rows, the same bytes
+//! formats.rs     rows in the formats of other programs
 //! error.rs       why a file cannot be written or read
 //! checksum.rs    files that hold their own SHA-256
 //! shown.rs       paths and texts in messages
@@ -20,6 +21,8 @@ pub mod columns;
 pub mod error;
 #[cfg(feature = "sweeps")]
 pub mod file;
+#[cfg(feature = "sweeps")]
+pub mod formats;
 #[cfg(feature = "sweeps")]
 pub mod shown;
 #[cfg(feature = "sweeps")]

@@ -8,7 +8,7 @@ use crate::results::{ErrorKind, Results};
 use crate::run::{Kernel, Options, Shard, run};
 use crate::solver::{SimulationError, Summary};
 use crate::sweep::{Job, Sweep};
-use crate::table::file::Format;
+use crate::table::formats::Format;
 use crate::table::storage::over_disk::{Access, OverDisk};
 use crate::table::storage::{Disk, Sink, Storage};
 use std::collections::{BTreeMap, BTreeSet};

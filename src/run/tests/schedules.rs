@@ -11,7 +11,7 @@ use crate::reduce::{NoJobs, reduce};
 use crate::results::commit::tests::{KNOWN_NUMBER, own_number};
 use crate::results::tables::Names;
 use crate::results::verify::{Remedy, Verification};
-use crate::table::file::Format;
+use crate::table::formats::Format;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use std::panic::{AssertUnwindSafe, catch_unwind};

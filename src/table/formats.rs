@@ -1,0 +1,115 @@
+//! Rows of any schema, in the formats of other programs.
+
+use crate::table::arrow;
+use crate::table::error::DatasetError;
+use crate::table::file::{FILE_EXTENSION, Footer};
+use crate::table::storage::StoredFile;
+use arrow_array::RecordBatch;
+use arrow_ipc::writer::FileWriter;
+use arrow_schema::SchemaRef;
+use clap::ValueEnum;
+use parquet::arrow::ArrowWriter;
+use parquet::errors::ParquetError;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// How rows are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    Parquet,
+    /// Plain text with a line of names; real numbers with as many digits as they have.
+    Csv,
+    /// The file format of Arrow.
+    Arrow,
+}
+
+impl Format {
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Parquet => FILE_EXTENSION,
+            Self::Csv => "csv",
+            Self::Arrow => "arrow",
+        }
+    }
+}
+
+/// Writes one file.
+pub struct RowWriter {
+    path: PathBuf,
+    encoder: Encoder,
+}
+
+enum Encoder {
+    Parquet(Box<ArrowWriter<Counted>>),
+    Csv(Box<csv::Writer<Counted>>),
+    Arrow(Box<FileWriter<Counted>>),
+}
+
+/// A file that counts its bytes.
+struct Counted {
+    file: StoredFile,
+    bytes: u64,
+}
+
+impl Write for Counted {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes).map_err(|error| error.source)?;
+        self.bytes += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
+    ParquetError::External(error.into().into())
+}
+
+impl RowWriter {
+    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, DatasetError> {
+        let path = file.path().to_owned();
+        let file = Counted { file, bytes: 0 };
+        let encoder = || -> Result<Encoder, ParquetError> {
+            Ok(match format {
+                Format::Parquet => {
+                    let properties = footer.properties(schema)?;
+                    Encoder::Parquet(Box::new(ArrowWriter::try_new(file, Arc::clone(schema), Some(properties))?))
+                }
+                Format::Csv => {
+                    let mut writer = csv::Writer::from_writer(file);
+                    writer.write_record(schema.fields().iter().map(|field| field.name())).map_err(of_csv)?;
+                    Encoder::Csv(Box::new(writer))
+                }
+                Format::Arrow => Encoder::Arrow(Box::new(FileWriter::try_new(file, schema)?)),
+            })
+        };
+        let encoder = encoder().map_err(DatasetError::unwritten(&path))?;
+        Ok(Self { path, encoder })
+    }
+
+    pub fn write(&mut self, rows: &RecordBatch) -> Result<(), DatasetError> {
+        let written = match &mut self.encoder {
+            Encoder::Parquet(writer) => writer.write(rows),
+            Encoder::Csv(writer) => arrow::texts(rows).try_for_each(|texts| writer.write_record(texts)).map_err(of_csv),
+            Encoder::Arrow(writer) => writer.write(rows).map_err(ParquetError::from),
+        };
+        written.map_err(DatasetError::unwritten(&self.path))
+    }
+
+    /// Writes what is left and brings the file to the disk; returns its number of bytes.
+    pub fn finish(self) -> Result<u64, DatasetError> {
+        let counted = match self.encoder {
+            Encoder::Parquet(writer) => writer.into_inner(),
+            Encoder::Csv(writer) => writer.into_inner().map_err(|error| of_csv(error.into_error())),
+            Encoder::Arrow(mut writer) => {
+                writer.finish().and_then(|()| writer.into_inner()).map_err(ParquetError::from)
+            }
+        };
+        let Counted { mut file, bytes } = counted.map_err(DatasetError::unwritten(&self.path))?;
+        file.sync()?;
+        Ok(bytes)
+    }
+}
