@@ -366,8 +366,11 @@ pub(crate) mod tests {
         let elsewhere = Worker { host: "elsewhere".to_owned(), system: "another".to_owned(), ..here.clone() };
         let path = layout.workers().join(name);
         fs::create_dir_all(layout.workers()).unwrap();
-        fs::write(&path, serde_json::to_string(if is_here { &here } else { &elsewhere }).unwrap()).unwrap();
-        File::options().write(true).open(path).unwrap().set_modified(SystemTime::now() - silent).unwrap();
+        // As a worker beats: nobody sees half of it.
+        let new = layout.workers().join(format!("{name}{NEW}"));
+        fs::write(&new, serde_json::to_string(if is_here { &here } else { &elsewhere }).unwrap()).unwrap();
+        File::options().write(true).open(&new).unwrap().set_modified(SystemTime::now() - silent).unwrap();
+        fs::rename(new, path).unwrap();
     }
 
     fn join<T>(results: &Results<'static>, body: impl FnOnce(&Member<'static>) -> T) -> T {
