@@ -12,15 +12,6 @@ use crate::sweep::{Contrast, RefinedAxis, Refinement, Sweep};
 use crate::table::columns::{Table, Value, columns};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// What is to be divided.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Division {
-    /// The new sets, in order.
-    pub sets: BTreeSet<u64>,
-    /// Cells that would be divided, had the sweep room for their sets.
-    pub cells_left: u64,
-}
-
 /// A cell: how often it was halved, and the rows of its first corner.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CellOfGrid {
@@ -90,30 +81,31 @@ pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap
     grid.seen().into_iter().filter_map(row).collect()
 }
 
-/// Divides the cells whose sets differ, for as long as there is room.
-pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, SetRow>) -> Division {
+/// Divides the cells whose sets differ, for as long as there is room: the new sets, and the number of cells that would be
+/// divided, had the sweep room for their sets.
+pub fn divide(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, SetRow>) -> (BTreeSet<u64>, u64) {
     let grid = Cells { sweep, refinement, known };
-    let mut division = Division::default();
+    let (mut sets, mut cells_left) = (BTreeSet::new(), 0);
     let mut room = refinement.max_sets.saturating_sub(known.len() as u64);
     for (leaf, seen) in grid.seen() {
         if leaf.level == grid.levels() || !seen.differ(&refinement.contrast) {
             continue;
         }
-        let is_new = |set: &u64| !known.contains_key(set) && !division.sets.contains(set);
+        let is_new = |set: &u64| !known.contains_key(set) && !sets.contains(set);
         let new: BTreeSet<u64> =
             grid.lattice(&leaf, true).iter().filter_map(|rows| sweep.set_at(rows)).filter(is_new).collect();
         // All that would be new is dropped by a condition.
         if new.is_empty() {
             continue;
         }
-        if division.cells_left > 0 || new.len() as u64 > room {
-            division.cells_left += 1;
+        if cells_left > 0 || new.len() as u64 > room {
+            cells_left += 1;
             continue;
         }
         room -= new.len() as u64;
-        division.sets.extend(new);
+        sets.extend(new);
     }
-    division
+    (sets, cells_left)
 }
 
 /// What the sets that touch a cell have.

@@ -20,7 +20,6 @@ use crate::model::Parameters;
 use crate::reduce::{SetRow, divide, reduce_jobs};
 use crate::results::{Results, ResultsError};
 use crate::sweep::{Round, Standing, Sweep, merged};
-use precision::Need;
 use std::collections::BTreeMap;
 
 /// The round after those that a directory has. All their jobs must be done.
@@ -41,10 +40,10 @@ fn decide(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Round {
     let mut points = Vec::new();
     for (&number, row) in sets {
         let jobs = row.finished_jobs + row.failed_jobs;
-        match rounds.precision.as_ref().map_or(Need::Nothing, |precision| precision::need(precision, jobs, row)) {
-            Need::Nothing => standing.sets_done += 1,
-            Need::TooMuch => standing.sets_capped += 1,
-            Need::Seeds(seeds) => {
+        match rounds.precision.as_ref().and_then(|precision| precision::need(precision, jobs, row)) {
+            None => standing.sets_done += 1,
+            Some(seeds) if seeds <= jobs => standing.sets_capped += 1,
+            Some(seeds) => {
                 standing.sets_open += 1;
                 points.extend(sweep.points_of_set(number, jobs..seeds));
             }
@@ -53,11 +52,10 @@ fn decide(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Round {
     if points.is_empty()
         && let Some(refinement) = &rounds.refinement
     {
-        let division = divide(sweep, refinement, sets);
-        standing.sets_open = division.sets.len() as u64;
-        standing.cells_capped = division.cells_left;
+        let (new, cells_capped) = divide(sweep, refinement, sets);
+        (standing.sets_open, standing.cells_capped) = (new.len() as u64, cells_capped);
         let seeds = rounds.seeds_at_first(sweep.seed_count());
-        points.extend(division.sets.into_iter().flat_map(|set| sweep.points_of_set(set, 0..seeds)));
+        points.extend(new.into_iter().flat_map(|set| sweep.points_of_set(set, 0..seeds)));
     }
     Round { points: merged(points), standing }
 }

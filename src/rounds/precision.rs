@@ -15,24 +15,10 @@ use crate::sweep::Precision;
 /// Seeds of a set below which its interval is not trusted, unless it may have no more.
 pub const MIN_SEEDS: u64 = 24;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Need {
-    /// Every statistic is known to the target, or there is nothing to know: no job has a value.
-    Nothing,
-    /// More seeds than it may have.
-    TooMuch,
-    Seeds(u64),
-}
-
-/// What a set with these seeds and statistics needs.
-pub(super) fn need(precision: &Precision, seeds: u64, row: &SetRow) -> Need {
-    let most = *precision.seeds.end();
-    let Some(worst) = row.error_over_target(precision) else { return Need::Nothing };
-    match seeds_for(seeds, worst, MIN_SEEDS, most) {
-        None => Need::Nothing,
-        Some(_) if seeds >= most => Need::TooMuch,
-        Some(more) => Need::Seeds(more),
-    }
+/// The seeds that a set with some and these statistics is to have next: no more than it has if it may have no more. `None` if
+/// every statistic is known to the target, or if there is nothing to know: no job has a value.
+pub(super) fn need(precision: &Precision, seeds: u64, row: &SetRow) -> Option<u64> {
+    seeds_for(seeds, row.error_over_target(precision)?, MIN_SEEDS, *precision.seeds.end())
 }
 
 /// The seeds that a set with some gets next, if its half-width is `error` times the target; `None` if it needs no more.
@@ -83,32 +69,32 @@ mod tests {
         let relative = precision(&["tau_mean"], Target::Relative(0.01));
         let seeds = |seeds, half| need(&relative, seeds, &row(2.0, half));
         // The target is 0.02.
-        assert_eq!(seeds(40, 0.0199), Need::Nothing);
-        assert_eq!(seeds(40, 0.024), Need::Seeds(58));
-        assert_eq!(seeds(40, 0.0201), Need::Seeds(50));
-        assert_eq!(seeds(40, 0.2), Need::Seeds(80));
-        assert_eq!(seeds(200, 0.2), Need::Seeds(256));
-        assert_eq!(seeds(256, 0.2), Need::TooMuch);
-        assert_eq!(seeds(256, 0.0199), Need::Nothing);
+        assert_eq!(seeds(40, 0.0199), None);
+        assert_eq!(seeds(40, 0.024), Some(58));
+        assert_eq!(seeds(40, 0.0201), Some(50));
+        assert_eq!(seeds(40, 0.2), Some(80));
+        assert_eq!(seeds(200, 0.2), Some(256));
+        assert_eq!(seeds(256, 0.2), Some(256));
+        assert_eq!(seeds(256, 0.0199), None);
         // However good it looks.
-        assert_eq!(seeds(4, 1e-6), Need::Seeds(8));
-        assert_eq!(seeds(20, 1e-6), Need::Seeds(25));
-        assert_eq!(seeds(16, 1e-6), Need::Seeds(MIN_SEEDS));
-        assert_eq!(seeds(MIN_SEEDS, 1e-6), Need::Nothing);
+        assert_eq!(seeds(4, 1e-6), Some(8));
+        assert_eq!(seeds(20, 1e-6), Some(25));
+        assert_eq!(seeds(16, 1e-6), Some(MIN_SEEDS));
+        assert_eq!(seeds(MIN_SEEDS, 1e-6), None);
         let absolute = precision(&["tau_mean"], Target::Absolute(0.05));
-        assert_eq!(need(&absolute, 40, &row(2.0, 0.0499)), Need::Nothing);
-        assert_eq!(need(&absolute, 40, &row(1e-3, 0.06)), Need::Seeds(58));
+        assert_eq!(need(&absolute, 40, &row(2.0, 0.0499)), None);
+        assert_eq!(need(&absolute, 40, &row(1e-3, 0.06)), Some(58));
     }
 
     #[test]
     fn the_worst_of_several_statistics_counts_and_one_without_value_does_not() {
         let both = precision(&["tau_mean", "drop_mean"], Target::Relative(0.01));
         let row = SetRow { drop_mean: Some(1.0), ..row(2.0, 0.01) };
-        assert_eq!(need(&both, 40, &row), Need::Seeds(80), "a value without interval");
+        assert_eq!(need(&both, 40, &row), Some(80), "a value without interval");
         let interval = Some(Interval { low: 0.995, high: 1.005 });
-        assert_eq!(need(&both, 40, &SetRow { drop_interval: interval, ..row }), Need::Nothing);
+        assert_eq!(need(&both, 40, &SetRow { drop_interval: interval, ..row }), None);
         // A slider that slides has no intervals between slips, and never will.
-        assert_eq!(need(&both, 4, &SetRow::default()), Need::Nothing);
+        assert_eq!(need(&both, 4, &SetRow::default()), None);
     }
 
     proptest! {

@@ -181,7 +181,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 is_out_of_time = true;
                 self.events.send(&RunEvent::OutOfTime)?;
             }
-            if jobs_out == 0 && (is_interrupted || work.has_ended()) {
+            if jobs_out == 0 && (is_interrupted || work.has_ended) {
                 return Ok(!is_interrupted && !is_out_of_time);
             }
             // A sender is kept, so an error means that there is nothing yet.

@@ -131,7 +131,8 @@ pub(super) struct Work<'a> {
     /// When it last looked for parts of dead workers, or began to, and the beats that it saw first.
     last_look: Option<Instant>,
     beats: HashMap<String, SystemTime>,
-    has_ended: bool,
+    /// Whether there will be no more jobs for this worker.
+    pub has_ended: bool,
 }
 
 impl<'a> Work<'a> {
@@ -164,11 +165,6 @@ impl<'a> Work<'a> {
             self.take_next(is_busy)?;
         }
         Ok(self.jobs.pop_front())
-    }
-
-    /// Whether there will be no more jobs for this worker.
-    pub const fn has_ended(&self) -> bool {
-        self.has_ended
     }
 
     /// Takes the next part with jobs to run, if there is one.

@@ -53,7 +53,28 @@ pub(super) struct Repeated {
 impl Axis {
     /// An axis of columns of equal length, 1 to [`MAX_ROWS`].
     pub fn table(columns: Vec<Column>) -> Result<Self, Repeated> {
-        Table::new(columns).map(Self::Table)
+        let period = columns.iter().find(|column| column.quantity.is_period());
+        let ranks = |row: u32| {
+            let others = columns.iter().filter(|column| !column.quantity.is_period());
+            let others: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
+            (others, period.map(|period| period.rank(row)), row)
+        };
+        let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
+        ranked.sort_unstable_by(|left, right| left.partial_cmp(right).unwrap_or(Ordering::Equal));
+        let mut is_first = vec![false; ranked.len()];
+        let mut repeated: Vec<(u32, u32)> = Vec::new();
+        for group in ranked.chunk_by(|(left, ..), (right, ..)| left == right) {
+            let rows = group.iter().map(|&(.., row)| row);
+            is_first[rows.clone().min().unwrap_or_default() as usize] = true;
+            let neighbours = rows.clone().zip(rows.skip(1));
+            let close = neighbours.filter(|&(a, b)| period.is_none_or(|period| period.is_close(a, b)));
+            repeated.extend(close.map(|(a, b)| (a.max(b), a.min(b))));
+        }
+        if let Some((later, earlier)) = repeated.into_iter().min() {
+            return Err(Repeated { earlier: earlier as usize, later: later as usize });
+        }
+        let sorted = ranked.into_iter().map(|(.., row)| row).collect();
+        Ok(Self::Table(Table { columns, sorted, is_first }))
     }
 
     pub fn quantities(&self) -> Vec<Quantity> {
@@ -108,31 +129,6 @@ impl Axis {
 }
 
 impl Table {
-    fn new(columns: Vec<Column>) -> Result<Self, Repeated> {
-        let period = columns.iter().find(|column| column.quantity.is_period());
-        let ranks = |row: u32| {
-            let others = columns.iter().filter(|column| !column.quantity.is_period());
-            let others: Vec<Value> = others.map(|column| column.values[row as usize]).collect();
-            (others, period.map(|period| period.rank(row)), row)
-        };
-        let mut ranked: Vec<_> = (0..).take(columns[0].values.len()).map(ranks).collect();
-        ranked.sort_unstable_by(|left, right| left.partial_cmp(right).unwrap_or(Ordering::Equal));
-        let mut is_first = vec![false; ranked.len()];
-        let mut repeated: Vec<(u32, u32)> = Vec::new();
-        for group in ranked.chunk_by(|(left, ..), (right, ..)| left == right) {
-            let rows = group.iter().map(|&(.., row)| row);
-            is_first[rows.clone().min().unwrap_or_default() as usize] = true;
-            let neighbours = rows.clone().zip(rows.skip(1));
-            let close = neighbours.filter(|&(a, b)| period.is_none_or(|period| period.is_close(a, b)));
-            repeated.extend(close.map(|(a, b)| (a.max(b), a.min(b))));
-        }
-        if let Some((later, earlier)) = repeated.into_iter().min() {
-            return Err(Repeated { earlier: earlier as usize, later: later as usize });
-        }
-        let sorted = ranked.into_iter().map(|(.., row)| row).collect();
-        Ok(Self { columns, sorted, is_first })
-    }
-
     /// Where a row stands among the sorted ones, against one that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let columns = |fix_period| self.columns.iter().filter(move |column| column.quantity.is_period() == fix_period);

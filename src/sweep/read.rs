@@ -11,7 +11,7 @@ use super::grid::Sweep;
 use super::job::Identity;
 use super::quantity::Quantity;
 use super::read_axes;
-use super::read_rounds::{read_precision, read_refinement};
+use super::read_rounds::{Wanted, read_precision, read_refinement};
 use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::{Parameters, Value};
@@ -70,12 +70,17 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     checks::whole(&sweep, &file, &places)?;
     if has_rounds {
         let sets = sweep.first_sets().len() as u64;
-        if let Some(wanted) = &wanted {
-            wanted.check_sets(sets)?;
-        } else if sets > MAX_SETS {
-            let problem =
-                format!("[axes]: {sets} sets; a sweep with [precision] has at most {MAX_SETS}; take several sweeps");
-            return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+        match &wanted {
+            Some(Wanted { max_sets, max_sets_at, .. }) if *max_sets < sets => {
+                return Err(max_sets_at.must_be(&format!("at least the {sets} sets of the axes as they stand")));
+            }
+            None if sets > MAX_SETS => {
+                let problem = format!(
+                    "[axes]: {sets} sets; a sweep with [precision] has at most {MAX_SETS}; take several sweeps"
+                );
+                return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+            }
+            _ => {}
         }
     }
     Ok(sweep)

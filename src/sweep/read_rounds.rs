@@ -103,8 +103,8 @@ pub(super) struct Wanted<'a> {
     axes: Vec<WantedAxis<'a>>,
     by: Statistic,
     contrast: Contrast,
-    max_sets: u64,
-    max_sets_at: Entry<'a>,
+    pub max_sets: u64,
+    pub max_sets_at: Entry<'a>,
 }
 
 /// An axis that is to be refined.
@@ -229,14 +229,6 @@ impl<'a> Wanted<'a> {
             }
         }))?;
         Ok(Refinement { axes, by: self.by, contrast: self.contrast.clone(), max_sets: self.max_sets })
-    }
-
-    /// Refuses fewer sets than there are at first.
-    pub fn check_sets(&self, at_first: u64) -> Result<(), Refused> {
-        if self.max_sets < at_first {
-            return Err(self.max_sets_at.must_be(&format!("at least the {at_first} sets of the axes as they stand")));
-        }
-        Ok(())
     }
 }
 
