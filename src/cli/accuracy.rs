@@ -129,10 +129,6 @@ fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Re
     files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))
 }
 
-fn or_dash(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.1e}"))
-}
-
 /// The sets of a sweep, with seed 0.
 fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
     let mut sets: Vec<Parameters> = Vec::new();
@@ -235,7 +231,7 @@ fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
             1e9 * row.cost.per_step,
             times.unwrap_or_else(|| "-".to_owned()),
             together.unwrap_or_else(|| "-".to_owned()),
-            or_dash(row.ledger_residual.map(f64::abs)),
+            row.ledger_residual.map_or_else(|| "-".to_owned(), |residual| format!("{:.1e}", residual.abs())),
         ));
     }
     lines

@@ -6,6 +6,7 @@ use super::frame::{Frame, LEFT, Layout, RIGHT};
 use super::hues::Hues;
 use super::legend::{Mark, entry};
 use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
+use super::sets::ascending;
 use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
 pub use super::values::columns;
 use super::values::{FREQUENCY_COLUMN, Values};
@@ -214,10 +215,12 @@ fn hues(values: &Values) -> Result<Hues, BadOption> {
 /// The sets of each panel and its title.
 fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, BadOption> {
     let Some(values) = panels else { return Ok(vec![(String::new(), sets.to_vec())]) };
-    let of = |value: f64| sets.iter().copied().filter(|&set| values.numbers[set] == Some(value)).collect::<Vec<_>>();
-    let groups: Vec<(String, Vec<usize>)> =
-        values.distinct().into_iter().map(|value| (values.setting(value), of(value))).collect();
-    let groups: Vec<_> = groups.into_iter().filter(|(_, sets)| !sets.is_empty()).collect();
+    let of = |value: f64| {
+        let members: Vec<usize> = sets.iter().copied().filter(|&set| values.numbers[set] == Some(value)).collect();
+        (values.setting(value), members)
+    };
+    let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten()).into_iter().map(of).collect();
+    groups.retain(|(_, sets)| !sets.is_empty());
     let problem = match groups.len() {
         0 => "no set has a value of it".to_owned(),
         1..=MAX_PANELS => return Ok(groups),

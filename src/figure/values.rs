@@ -2,7 +2,7 @@
 //! table there is the frequency, which follows from a parameter.
 
 use super::BadOption;
-use super::sets::{ETA, FREQUENCY, ascending, capitalised, parameter, symbol_of, three_digits};
+use super::sets::{ETA, FREQUENCY, capitalised, parameter, symbol_of, three_digits};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
 use crate::sweep::nearest;
@@ -108,7 +108,9 @@ impl Values {
 
     /// Its name and one of its values.
     pub(super) fn setting(&self, value: f64) -> String {
-        format!("{} = {} {}", self.name(), self.word(value), self.column.unit).trim_end().to_owned()
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index, if there are words")]
+        let word = self.words.get(value as usize).cloned().unwrap_or_else(|| three_digits(value));
+        format!("{} = {word} {}", self.name(), self.column.unit).trim_end().to_owned()
     }
 
     /// Its symbol in the paper, or its name.
@@ -118,16 +120,6 @@ impl Values {
             "eta" => "η".to_owned(),
             name => Symbol::from_key(name).map_or_else(|| name.to_owned(), symbol_of),
         }
-    }
-
-    fn word(&self, value: f64) -> String {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index, if there are words")]
-        self.words.get(value as usize).cloned().unwrap_or_else(|| three_digits(value))
-    }
-
-    /// The values that occur, ascending.
-    pub(super) fn distinct(&self) -> Vec<f64> {
-        ascending(self.numbers.iter().copied().flatten())
     }
 }
 
