@@ -22,7 +22,7 @@ const WIDE: f64 = 3.0;
 const HIGH_SHARE: f64 = 0.5;
 const MILLISECONDS: f64 = 1e3;
 
-type Getter = fn(&SetSummary) -> Option<Statistic>;
+pub(super) type Getter = fn(&SetSummary) -> Option<Statistic>;
 
 /// A quantity of a panel: its label, its value, and whether it lies between 0 and 1.
 type Quantity = (&'static str, Getter, bool);

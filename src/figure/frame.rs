@@ -6,7 +6,7 @@ use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::picture::{Anchor, Dot, Fill, Sheet, Stroke, snapped};
 use super::style::{
-    AXIS, BAR_WIDTH, DARK_GREY, HALF_DIGIT, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, TICK_TEXT, WHITE, ink_on,
+    AXIS, BAR_WIDTH, DARK_GREY, HALF_DIGIT, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, WHITE, ink_on,
 };
 use crate::reduce::Statistic;
 use kuva::render::color::Color;
@@ -80,7 +80,8 @@ impl<'a> Layout<'a> {
 
         let right = total - MARGIN;
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
-        let notes = if look.style.has_small_print() { wrapped(&look.note, right - MARGIN) } else { Vec::new() };
+        // A journal has the small print in the caption.
+        let notes = if look.style == Style::Screen { wrapped(&look.note, right - MARGIN) } else { Vec::new() };
         let rows = self.heights.len() as f64;
         let heading = if self.has_headings { HEADING } else { 0.0 };
         let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
@@ -278,7 +279,7 @@ impl Frame {
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
     pub(super) fn axes(&self, sheet: &mut Sheet) {
         let (right, bottom) = (self.right(), self.bottom());
-        let style = sheet.style();
+        let style = sheet.picture.style;
         let (x_axis, y_axis) = (style.numbered(&self.x, self.width), style.numbered(&self.y, self.height));
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
@@ -308,7 +309,7 @@ impl Frame {
         let mut free = EDGE;
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
-            if x - half >= free && x + half <= sheet.width() - EDGE {
+            if x - half >= free && x + half <= sheet.picture.scene.width - EDGE {
                 sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
             }
@@ -426,7 +427,7 @@ mod tests {
             frame.axes(&mut sheet);
             frame.heading(&mut sheet, "set with a long name, of which much is to be said", "");
         }
-        (sheet.width(), sheet.texts())
+        (sheet.picture.scene.width, sheet.texts())
     }
 
     #[test]

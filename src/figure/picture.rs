@@ -20,9 +20,9 @@ const MAX_PIXELS: f64 = 1e8;
 
 pub struct Picture {
     name: String,
-    style: Style,
+    pub(super) style: Style,
     note: String,
-    scene: Scene,
+    pub(super) scene: Scene,
 }
 
 /// A format of a file.
@@ -124,7 +124,7 @@ impl Picture {
 
 /// A sheet to draw on. Lengths are units of the SVG, from the upper left corner.
 pub(super) struct Sheet {
-    picture: Picture,
+    pub(super) picture: Picture,
     clips: usize,
 }
 
@@ -180,14 +180,6 @@ impl Sheet {
         scene.text_color = Some(BLACK.to_owned());
         let picture = Picture { name: name.to_owned(), style: look.style, note: look.note.clone(), scene };
         Self { picture, clips: 0 }
-    }
-
-    pub(super) const fn style(&self) -> Style {
-        self.picture.style
-    }
-
-    pub(super) const fn width(&self) -> f64 {
-        self.picture.scene.width
     }
 
     /// Where each text starts and ends, and what it says.

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::dependence::{label, lines, number};
+use super::dependence::{Getter, label, lines, number};
 use super::frame::{Cell, Frame, Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
 use super::picture::{Dot, Picture, Sheet, Stroke};
@@ -20,8 +20,6 @@ const MIN_VALUES: usize = 4;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
-
-type Getter = fn(&SetSummary) -> Option<Statistic>;
 
 const SHARE: (&str, Getter) =
     ("Share of time within slips", |set| set.slip_share.map(|value| Statistic { value, interval: None }));

@@ -51,7 +51,9 @@ pub fn simulation(
     let (first, last) =
         bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
     let x = || Axis::linear("Time t (s)", first, last);
-    let period = period(parameters, last - first);
+    // One that is ramped, or too fast, is not drawn.
+    let is_drawn = |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
+    let period = parameters.modulation_period.filter(is_drawn);
     let onsets: Vec<f64> = onsets.iter().copied().filter(|onset| (first..=last).contains(onset)).collect();
 
     let rows = [period.map(|_| MODULATION_HEIGHT), trace.map(|_| TRACE_HEIGHT), map.map(|_| MAP_HEIGHT)];
@@ -105,11 +107,6 @@ pub fn simulation(
         percent.draw(&mut sheet, &frame);
     }
     Ok(sheet.finish())
-}
-
-/// The period in s of a modulation that can be drawn over a time in s: one that is not ramped, nor too fast.
-fn period(parameters: &Parameters, time: f64) -> Option<f64> {
-    parameters.modulation_period.filter(|period| parameters.ramp_time == 0.0 && time / period <= MAX_PERIODS)
 }
 
 fn marks(sheet: &mut Sheet, frame: &Frame, instants: &[f64], stroke: Stroke) {

@@ -40,11 +40,6 @@ impl Style {
         }
     }
 
-    /// Whether parameters stand under figures; a journal has them in the caption.
-    pub(super) const fn has_small_print(self) -> bool {
-        matches!(self, Self::Screen)
-    }
-
     /// An axis of this length with the numbers that it needs on a small figure, and ticks that can be distinguished.
     pub(super) fn numbered(self, axis: &Axis, length: f64) -> Axis {
         match self {
