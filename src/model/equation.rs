@@ -8,44 +8,10 @@
 //! At the ends the missing neighbour drops out. The sum runs over the attached contacts of block j; `a_i` is where contact
 //! i attached. S is tridiagonal: the springs `K_int` between neighbours, the attached contacts of each block, and the
 //! driving spring at block 1. All blocks have the same mass m, so the squared angular frequencies are the eigenvalues of
-//! S/m. The solvers have their own fast forms of all this; [`acceleration`] is the plain one that they are tested against.
+//! S/m. The solvers have their own fast forms of the equation; `tests/it/equation_of_motion.rs` holds them against the plain
+//! one.
 
-use super::{Drive, Parameters};
-
-/// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
-pub fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
-    drive.stiffness * (drive.motion(time).0 - trailing_edge)
-}
-
-/// Forces of the attached contacts of one block: Σ `k_i` in N/m and Σ `k_i a_i` in N.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactSums {
-    /// Σ `k_i`, in N/m.
-    pub stiffness: f64,
-    /// Σ `k_i a_i`, in N.
-    pub pull: f64,
-}
-
-/// Accelerations x'' of the blocks, in m/s²: the equation of motion, term by term.
-///
-/// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at `time`.
-pub fn acceleration(
-    parameters: &Parameters,
-    drive: &Drive,
-    time: f64,
-    displacement: &[f64],
-    velocity: &[f64],
-    contacts: &[ContactSums],
-) -> Vec<f64> {
-    let (x, mass, coupling) = (displacement, parameters.block_mass(), parameters.coupling_stiffness());
-    let of_block = |j: usize| {
-        let before = if j > 0 { coupling * (x[j - 1] - x[j]) } else { shear_force(drive, time, x[0]) };
-        let after = if j + 1 < x.len() { coupling * (x[j + 1] - x[j]) } else { 0.0 };
-        let held = contacts[j].stiffness * x[j] - contacts[j].pull;
-        (before + after - held) / mass - parameters.damping_rate * velocity[j]
-    };
-    (0..x.len()).map(of_block).collect()
-}
+use super::Parameters;
 
 /// The tridiagonal stiffness matrix of the slider for given contact stiffnesses.
 #[derive(Clone, Debug)]

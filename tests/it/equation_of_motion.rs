@@ -1,8 +1,42 @@
 //! Both solvers follow the equation of motion, as a plain integration of its plain form shows.
 
-use stickslip::model::equation::{ContactSums, acceleration};
 use stickslip::model::{Change, ContactEvent, Drive, Parameters};
 use stickslip::solver::{Limits, Observer, Solver, simulate};
+
+/// Shear force `F_S = K_d (u(t) - x_1)` at a time in s, for a trailing edge at `trailing_edge` m, in N.
+fn shear_force(drive: &Drive, time: f64, trailing_edge: f64) -> f64 {
+    drive.stiffness * (drive.motion(time).0 - trailing_edge)
+}
+
+/// Forces of the attached contacts of one block: Σ `k_i` in N/m and Σ `k_i a_i` in N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct ContactSums {
+    /// Σ `k_i`, in N/m.
+    stiffness: f64,
+    /// Σ `k_i a_i`, in N.
+    pull: f64,
+}
+
+/// Accelerations x'' of the blocks, in m/s²: the equation of motion, term by term.
+///
+/// `displacement` in m, `velocity` in m/s and `contacts` have one entry a block; the drive is that of the cycle at `time`.
+fn acceleration(
+    parameters: &Parameters,
+    drive: &Drive,
+    time: f64,
+    displacement: &[f64],
+    velocity: &[f64],
+    contacts: &[ContactSums],
+) -> Vec<f64> {
+    let (x, mass, coupling) = (displacement, parameters.block_mass(), parameters.coupling_stiffness());
+    let of_block = |j: usize| {
+        let before = if j > 0 { coupling * (x[j - 1] - x[j]) } else { shear_force(drive, time, x[0]) };
+        let after = if j + 1 < x.len() { coupling * (x[j + 1] - x[j]) } else { 0.0 };
+        let held = contacts[j].stiffness * x[j] - contacts[j].pull;
+        (before + after - held) / mass - parameters.damping_rate * velocity[j]
+    };
+    (0..x.len()).map(of_block).collect()
+}
 
 /// Keeps the stiffness of the attached contacts of each block at the start, the number of breaks, and the displacements at
 /// the end.
