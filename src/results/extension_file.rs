@@ -14,7 +14,7 @@ use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::results::error::ResultsError;
 use crate::results::layout::Layout;
 use crate::results::settled::settled;
-use crate::results::tables::{JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{JOBS, JobRow, PrecursorRow, SlipRow};
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
 use crate::table::columns::Table;
@@ -201,6 +201,9 @@ pub(super) fn read(layout: &Layout<'_>) -> Result<Vec<Record>, ResultsError> {
     let listed = layout.listed_extensions()?;
     if listed.is_empty() {
         refuse_old(layout)?;
+        if !layout.parts_in(&layout.table(JOBS))?.is_empty() {
+            return Err(ResultsError::damaged(&layout.extension(0), MISSING));
+        }
     }
     let mut records: Vec<Record> = Vec::with_capacity(listed.len());
     for number in 0..listed.last().map_or(0, |last| last + 1) {

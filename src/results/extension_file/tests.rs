@@ -195,6 +195,15 @@ fn a_changed_or_cut_file_of_an_extension_is_named() {
         let error = open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)).unwrap_err();
         assert!(error.to_string().contains("run/extension-000.json: damaged"), "{error}");
     }
+    fs::remove_file(&path).unwrap();
+    fs::create_dir_all(root.path().join("tables/jobs")).unwrap();
+    fs::write(root.path().join("tables/jobs/part-000-000000.parquet"), "").unwrap();
+    for lost in
+        [open(&Layout::new(&Disk, root.path()), &sweep(TWO_SEEDS)), Results::read(&Layout::new(&Disk, root.path()))]
+    {
+        let error = lost.unwrap_err().to_string();
+        assert!(error.contains("run/extension-000.json: damaged: it is missing"), "{error}");
+    }
 }
 
 #[test]
