@@ -5,8 +5,9 @@
 use super::exit::{Exit, UsageError};
 use super::output::{self, quoted};
 use super::sweep::{self, PresetFlag};
-use super::{threads, time};
+use super::time;
 use crate::results::layout::Layout;
+use crate::run::threads;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};

@@ -1,7 +1,7 @@
 //! Progress of a run: a bar with an ETA on a terminal, plain lines otherwise; on standard error.
 
 use super::output;
-use super::threads::Threads;
+use crate::run::threads::Threads;
 use crate::run::{RunEvent, Tally};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;

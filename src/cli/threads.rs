@@ -1,105 +1,22 @@
-//! `--threads`: how many threads a command takes: as asked for, by what a batch system grants, or all cores.
+//! `--threads`: how many threads a command takes.
 
 use super::exit::UsageError;
-use crate::table::shown::shown;
+use crate::run::threads::{self, Threads};
 use clap::Args;
-use std::ffi::OsString;
 use std::num::NonZeroUsize;
-
-/// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
-/// `HQ_CPUS` is not among them: it lists the cores by their ids.
-const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
-
-/// Most threads of one process, more than nearly any machine has cores. Starting so many takes seconds, and four times as
-/// many minutes, in which no signal stops a run.
-const MAX_THREADS: usize = 1024;
 
 /// The flag.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ThreadsFlag {
     /// Threads [default: those that the batch system grants, else all cores]
-    #[arg(long, value_name = "N", value_parser = parse)]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
     threads: Option<NonZeroUsize>,
 }
 
-/// How many threads, and who said so.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Threads {
-    /// `None`: one for each core.
-    pub count: Option<NonZeroUsize>,
-    /// The variable that they are from.
-    pub variable: Option<&'static str>,
-}
-
 impl ThreadsFlag {
-    /// Those that are asked for, else those of the first variable that is set, else all cores.
+    /// Those that are asked for, else those of the environment.
     pub fn choose(self) -> Result<Threads, UsageError> {
-        self.choose_in(|variable| std::env::var_os(variable))
-    }
-
-    fn choose_in(self, environment: impl Fn(&str) -> Option<OsString>) -> Result<Threads, UsageError> {
-        let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
-        let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| self.threads.is_none()) else {
-            return Ok(Threads { count: self.threads, variable: None });
-        };
-        // OpenMP's may be a list, of one number for each level of nesting.
-        match parse(value.to_string_lossy().split(',').next().unwrap_or_default().trim()) {
-            Ok(count) => Ok(Threads { count: Some(count), variable: Some(variable) }),
-            Err(problem) => {
-                let value = shown(value.as_ref());
-                Err(UsageError(format!("{variable}={value}: {problem}; unset it, or give --threads")))
-            }
-        }
-    }
-}
-
-/// A number of threads, as a flag has it.
-pub(super) fn parse(text: &str) -> Result<NonZeroUsize, String> {
-    let count = text.parse().ok().filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
-    count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn choose(asked: Option<usize>, environment: &[(&str, &str)]) -> Result<Threads, UsageError> {
-        let value = |name: &str| environment.iter().find(|(key, _)| *key == name).map(|(_, value)| value.into());
-        ThreadsFlag { threads: asked.map(|count| NonZeroUsize::new(count).unwrap()) }.choose_in(value)
-    }
-
-    fn threads(count: usize, variable: Option<&'static str>) -> Threads {
-        Threads { count: NonZeroUsize::new(count), variable }
-    }
-
-    #[test]
-    fn what_is_asked_for_comes_before_the_environment_and_that_before_all_cores() {
-        let slurm = ("SLURM_CPUS_PER_TASK", "16");
-        let openmp = ("OMP_NUM_THREADS", "4,2");
-        assert_eq!(choose(Some(3), &[slurm]).unwrap(), threads(3, None));
-        assert_eq!(choose(Some(3), &[("NCPUS", "many")]).unwrap(), threads(3, None));
-        assert_eq!(choose(None, &[openmp, slurm]).unwrap(), threads(16, Some("SLURM_CPUS_PER_TASK")));
-        assert_eq!(choose(None, &[("NSLOTS", "8"), openmp]).unwrap(), threads(4, Some("OMP_NUM_THREADS")));
-        assert_eq!(choose(None, &[("OMP_NUM_THREADS", ""), ("NCPUS", "2")]).unwrap(), threads(2, Some("NCPUS")));
-        assert_eq!(choose(None, &[("HQ_CPUS", "0,1,7")]).unwrap(), threads(0, None));
-    }
-
-    #[test]
-    fn too_many_are_refused_whoever_asks_for_them() {
-        assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
-        for count in [1025_u64, 1 << 62] {
-            assert_eq!(parse(&count.to_string()).unwrap_err(), "must be a whole number from 1 to 1024");
-        }
-    }
-
-    #[test]
-    fn a_bad_variable_is_named_with_its_value() {
-        for value in ["0", "-1", "many", "1.5", "2(x3)", "1025", "99999999"] {
-            let error = choose(None, &[("LSB_DJOB_NUMPROC", value)]).unwrap_err().to_string();
-            assert!(
-                error.starts_with(&format!("LSB_DJOB_NUMPROC={value}: must be a whole number from 1 to 1024")),
-                "{error}"
-            );
-        }
+        Threads::choose(self.threads, |variable| std::env::var_os(variable))
+            .map_err(|error| UsageError(error.to_string()))
     }
 }

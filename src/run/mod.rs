@@ -21,11 +21,12 @@ mod take;
 mod tally;
 #[cfg(test)]
 mod tests;
+pub mod threads;
 mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
-pub use shard::Shard;
-pub use status::{Failure, Overview, Present, Status, status, status_with};
+pub use shard::{Shard, ShardError};
+pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
 pub use tally::Tally;
 
 use crate::observe::Measurements;

@@ -1,0 +1,112 @@
+//! The number of threads: as asked for, by what a batch system grants, or all cores.
+
+use crate::table::shown::shown;
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+
+/// Variables that hold the cores of a job, the most specific first: Slurm, OpenMP and HyperQueue, PBS, Grid Engine, LSF.
+/// `HQ_CPUS` is not among them: it lists the cores by their ids.
+const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
+
+/// Most threads of one process, more than nearly any machine has cores. Starting so many takes seconds, and four times as
+/// many minutes, in which no signal stops a run.
+pub const MAX_THREADS: usize = 1024;
+
+/// What is no number of threads.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ThreadsError {
+    #[error("{variable}={value}: must be a whole number from 1 to {MAX_THREADS}; unset it, or give --threads")]
+    Variable {
+        variable: &'static str,
+        /// What it holds, as it can be shown.
+        value: String,
+    },
+    #[error("{0} threads: must be a whole number from 1 to {MAX_THREADS}")]
+    Asked(NonZeroUsize),
+}
+
+/// How many threads, and who said so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Threads {
+    /// `None`: one for each core.
+    pub count: Option<NonZeroUsize>,
+    /// The variable that they are from.
+    pub variable: Option<&'static str>,
+}
+
+impl Threads {
+    /// Those that are asked for, else those of the first variable that is set, else all cores.
+    pub fn choose(
+        asked: Option<NonZeroUsize>,
+        environment: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<Self, ThreadsError> {
+        let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
+        let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| asked.is_none()) else {
+            let too_many = asked.filter(|count| !is_bearable(*count));
+            return too_many.map_or(Ok(Self { count: asked, variable: None }), |count| Err(ThreadsError::Asked(count)));
+        };
+        // OpenMP's may be a list, of one number for each level of nesting.
+        let count = value.to_str().and_then(|value| value.split(',').next()?.trim().parse().ok());
+        let count = count.filter(|count| is_bearable(*count));
+        let count =
+            count.ok_or_else(|| ThreadsError::Variable { variable, value: shown(value.as_ref()).to_string() })?;
+        Ok(Self { count: Some(count), variable: Some(variable) })
+    }
+}
+
+fn is_bearable(count: NonZeroUsize) -> bool {
+    count.get() <= MAX_THREADS
+}
+
+/// A number of threads, as a flag has it.
+pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
+    let count = text.parse().ok().filter(|count| is_bearable(*count));
+    count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn choose(asked: Option<usize>, environment: &[(&str, &str)]) -> Result<Threads, ThreadsError> {
+        let value = |name: &str| environment.iter().find(|(key, _)| *key == name).map(|(_, value)| value.into());
+        Threads::choose(asked.map(|count| NonZeroUsize::new(count).unwrap()), value)
+    }
+
+    fn threads(count: usize, variable: Option<&'static str>) -> Threads {
+        Threads { count: NonZeroUsize::new(count), variable }
+    }
+
+    #[test]
+    fn what_is_asked_for_comes_before_the_environment_and_that_before_all_cores() {
+        let slurm = ("SLURM_CPUS_PER_TASK", "16");
+        let openmp = ("OMP_NUM_THREADS", "4,2");
+        assert_eq!(choose(Some(3), &[slurm]).unwrap(), threads(3, None));
+        assert_eq!(choose(Some(3), &[("NCPUS", "many")]).unwrap(), threads(3, None));
+        assert_eq!(choose(None, &[openmp, slurm]).unwrap(), threads(16, Some("SLURM_CPUS_PER_TASK")));
+        assert_eq!(choose(None, &[("NSLOTS", "8"), openmp]).unwrap(), threads(4, Some("OMP_NUM_THREADS")));
+        assert_eq!(choose(None, &[("OMP_NUM_THREADS", ""), ("NCPUS", "2")]).unwrap(), threads(2, Some("NCPUS")));
+        assert_eq!(choose(None, &[("HQ_CPUS", "0,1,7")]).unwrap(), threads(0, None));
+    }
+
+    #[test]
+    fn too_many_are_refused_whoever_asks_for_them() {
+        assert_eq!(choose(Some(1024), &[]).unwrap(), threads(1024, None));
+        for count in [1025, 1 << 62] {
+            let error = choose(Some(count), &[]).unwrap_err().to_string();
+            assert_eq!(error, format!("{count} threads: must be a whole number from 1 to 1024"));
+            assert!(parse(&count.to_string()).is_err());
+        }
+    }
+
+    #[test]
+    fn a_bad_variable_is_named_with_its_value() {
+        for value in ["0", "-1", "many", "1.5", "2(x3)", "1025", "99999999"] {
+            let error = choose(None, &[("LSB_DJOB_NUMPROC", value)]).unwrap_err().to_string();
+            assert!(
+                error.starts_with(&format!("LSB_DJOB_NUMPROC={value}: must be a whole number from 1 to 1024")),
+                "{error}"
+            );
+        }
+    }
+}
