@@ -30,6 +30,7 @@ pub use moments::{Moments, quantile};
 pub use reduced::{SetSummary, Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
+pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

@@ -25,8 +25,8 @@ pub mod threads;
 mod walltime;
 
 pub use crate::results::events::{RunEvent, RunReport};
-pub use shard::{Shard, ShardError};
-pub use status::{Failure, MAX_FAILURES, Overview, Present, Status, status, status_with};
+pub use shard::Shard;
+pub use status::{Failure, Overview, Present, Status, status, status_with};
 pub use tally::Tally;
 
 use crate::observe::Measurements;
