@@ -136,7 +136,7 @@ pub(super) fn join<'a, T, E: From<ResultsError>>(
     threads: usize,
     body: impl FnOnce(&Member<'a>) -> Result<T, E>,
 ) -> Result<T, E> {
-    let member = Member::join(layout, Worker::here(sweep, threads)).map_err(ResultsError::from)?;
+    let member = Member::join(layout, Worker::here(sweep, threads))?;
     member.check_peace()?;
     std::thread::scope(|scope| {
         let (end, ended) = channel::<()>();
@@ -186,7 +186,7 @@ impl Layout<'_> {
 }
 
 impl<'a> Member<'a> {
-    fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, StorageError> {
+    fn join(layout: &Layout<'a>, worker: Worker) -> Result<Self, ResultsError> {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
         let host: String = worker.host.chars().map(plain).collect();
         let number = own_number();
@@ -197,8 +197,9 @@ impl<'a> Member<'a> {
         layout.ensure_folder(&layout.workers())?;
         // First, so that nobody takes what follows for a dead one's.
         member.beat()?;
-        layout.ensure_folder(&member.staging())?;
-        layout.storage.create(&member.claim())?.write(member.name.as_bytes())?;
+        let folder = layout.ensure_folder(&member.staging());
+        let claim = || layout.storage.create(&member.claim())?.write(member.name.as_bytes());
+        folder.and_then(|()| claim()).map_err(|error| member.burial().unwrap_or_else(|| error.into()))?;
         Ok(member)
     }
 
