@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How long to wait for another process that does the same, such as a reduction.
-const MAX_WAIT: Duration = Duration::from_mins(10);
+const MAX_WAIT: Duration = if cfg!(test) { Duration::from_secs(5) } else { Duration::from_mins(10) };
 
 /// Files that are being prepared for their places. Dropped before [`Commit::publish`], it removes what it can.
 pub struct Commit<'a> {

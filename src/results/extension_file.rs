@@ -201,8 +201,12 @@ pub(super) fn read(layout: &Layout<'_>) -> Result<Vec<Record>, ResultsError> {
     let listed = layout.listed_extensions()?;
     if listed.is_empty() {
         refuse_old(layout)?;
-        if !layout.parts_in(&layout.table(JOBS))?.is_empty() {
-            return Err(ResultsError::damaged(&layout.extension(0), MISSING));
+        // In this order: whoever has parts there has had its extension there before.
+        let has_parts = !layout.parts_in(&layout.table(JOBS))?.is_empty();
+        match (has_parts, layout.listed_extensions()?.is_empty()) {
+            (true, true) => return Err(ResultsError::damaged(&layout.extension(0), MISSING)),
+            (_, false) => return read(layout),
+            (false, true) => (),
         }
     }
     let mut records: Vec<Record> = Vec::with_capacity(listed.len());

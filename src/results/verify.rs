@@ -148,12 +148,13 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
 
 /// Opens a directory from the files of its extensions, and from footers where these are lost.
 fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salvaged<'a>, ResultsError> {
-    let listed = layout.listed_extensions()?;
+    // In this order: whoever has parts there has had its extension there before.
     let mut parts: Vec<(PartName, &str)> = Vec::new();
     for table in [tables::JOBS, tables::SLIPS] {
         parts.extend(layout.parts_in(&layout.table(table))?.into_iter().map(|part| (part, table)));
     }
     parts.sort_unstable();
+    let listed = layout.listed_extensions()?;
     if listed.is_empty() {
         refuse_old(layout)?;
         if parts.is_empty() {
