@@ -91,7 +91,11 @@ impl<'a> Layout<'a> {
 
     /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<HashSet<PartName>, StorageError> {
-        let names = self.storage.list(folder)?;
+        let names = match self.storage.list(folder) {
+            // A file on the way is somebody else's.
+            Err(error) if error.is_missing() => Vec::new(),
+            names => names?,
+        };
         Ok(names.into_iter().filter_map(|name| PartName::of_path(name.as_ref())).collect())
     }
 
