@@ -44,7 +44,7 @@ pub struct HardCase {
     end_time: f64,
     slips: u64,
     /// Whether counts of breaks differ so far from seed to seed that only means compare.
-    pub is_chaotic: bool,
+    is_chaotic: bool,
     /// If it must not reach its end: how its outcome begins, `refused` or `stopped`, and what that contains, - for a blank.
     failure: Option<(&'static str, &'static str)>,
 }
@@ -108,12 +108,6 @@ impl HardCase {
             }
         }
         Some(case)
-    }
-
-    /// Parameters and end, in s, of a case that the event-driven solver must bring to its end.
-    pub fn to_the_end(&self) -> Option<(Parameters, f64)> {
-        let ends = self.failure.is_none() && matches!(self.solver, Solver::EventDriven { .. });
-        self.parameters().ok().filter(|_| ends).map(|parameters| (parameters, self.end_time))
     }
 
     /// What differs from the defaults, in words.

@@ -25,7 +25,7 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Slips that are held at once: 170 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
-/// A slip that waits is held whole, and counts for so many.
+/// A waiting slip is held whole, and takes the memory of this many others.
 const WAITING: u64 = (size_of::<Slip>() / size_of::<SlipStats>()) as u64;
 
 columns! {

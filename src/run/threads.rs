@@ -8,7 +8,7 @@ use std::num::NonZeroUsize;
 /// `HQ_CPUS` is not among them: it lists the cores by their ids.
 const VARIABLES: [&str; 5] = ["SLURM_CPUS_PER_TASK", "OMP_NUM_THREADS", "NCPUS", "NSLOTS", "LSB_DJOB_NUMPROC"];
 
-/// Most threads of one process, more than nearly any machine has cores. Starting so many takes seconds, and four times as
+/// Most threads of one process: nearly no machine has more cores. Starting this many takes seconds, and four times as
 /// many minutes, in which no signal stops a run.
 pub const MAX_THREADS: usize = 1024;
 

@@ -5,7 +5,7 @@ use crate::table::value::Shortest;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::RangeInclusive;
 
-/// Most sets of a sweep with rounds: the points of every round are listed in the manifest.
+/// Most sets of a sweep with rounds: the points of every round are listed in the file of its extension.
 pub(super) const MAX_SETS: u64 = 100_000;
 
 /// What a sweep decides by itself.
@@ -159,7 +159,7 @@ pub fn merged(mut ranges: Vec<RangeInclusive<u64>>) -> Vec<RangeInclusive<u64>> 
     merged
 }
 
-/// As `first-last` pairs with spaces between them: hundreds of thousands may stand in a manifest.
+/// As `first-last` pairs with spaces between them: hundreds of thousands may stand in the file of an extension.
 fn write_ranges<S: Serializer>(ranges: &[RangeInclusive<u64>], serializer: S) -> Result<S::Ok, S::Error> {
     let words: Vec<String> = ranges.iter().map(|range| format!("{}-{}", range.start(), range.end())).collect();
     serializer.serialize_str(&words.join(" "))
