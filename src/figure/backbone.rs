@@ -8,7 +8,7 @@ use super::picture::{Dot, Picture, Stroke};
 use super::sets::{ETA, Grid};
 use super::style::{BAR_WIDTH, BLACK, BLUE, GREY, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::reduce::{BackboneBin, Point, SetSummary};
+use crate::reduce::{BackboneBin, Point, SetRow};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -35,7 +35,7 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
-pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], look: &Look) -> Option<Picture> {
     let placed: Vec<(&Point, Place)> =
         points.iter().filter_map(|point| Some((point, (point.eta, point.phase?)))).collect();
     let slips: Vec<Place> = placed.iter().map(|slip| slip.1).collect();
@@ -97,7 +97,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetSummar
 type Average = (f64, f64, Option<(f64, f64)>);
 
 /// Mean phases of the locked sets of each bin, at the mean η of these sets, with their intervals.
-fn averages(bins: &[BackboneBin], sets: &[SetSummary]) -> Vec<Average> {
+fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
     let average = |bin: &BackboneBin| {
         let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
         let locked = sets.iter().filter(|set| set.is_locked).map(|set| set.parameters.eta()).filter(within);

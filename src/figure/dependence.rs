@@ -8,7 +8,7 @@ use super::picture::{Picture, Sheet};
 use super::sets::{Grid, distinct, modulation, parameter, swept};
 use super::style::{INKS, Look, RADIUS, curve, dot};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
-use crate::reduce::{SetSummary, Statistic};
+use crate::reduce::{SetRow, Statistic};
 
 /// Of a column of panels; between columns stand the numbers of the right one.
 const WIDTH: f64 = 330.0;
@@ -22,28 +22,28 @@ const WIDE: f64 = 3.0;
 const HIGH_SHARE: f64 = 0.5;
 const MILLISECONDS: f64 = 1e3;
 
-pub(super) type Getter = fn(&SetSummary) -> Option<Statistic>;
+pub(super) type Getter = fn(&SetRow) -> Option<Statistic>;
 
 /// A quantity of a panel: its label, its value, and whether it lies between 0 and 1.
 type Quantity = (&'static str, Getter, bool);
 
 const QUANTITIES: [Quantity; 4] = [
-    ("Mean interval τ (ms)", |set| set.tau_mean.map(|tau| tau.times(MILLISECONDS)), false),
+    ("Mean interval τ (ms)", |set| Some(Statistic::of(set.tau_mean, set.tau_interval)?.times(MILLISECONDS)), false),
     (
         "Standard deviation of τ (ms)",
         |set| {
             let deviation = set.tau_deviation.filter(|deviation| *deviation > 0.0);
-            deviation.map(|deviation| Statistic { value: MILLISECONDS * deviation, interval: None })
+            Some(Statistic::of(deviation, None)?.times(MILLISECONDS))
         },
         false,
     ),
-    ("Locking index", |set| set.locking_index, true),
-    ("Resultant length of φ", |set| set.resultant_length, true),
+    ("Locking index", |set| Statistic::of(set.locking_index, set.locking_interval), true),
+    ("Resultant length of φ", |set| Statistic::of(set.resultant_length, set.length_interval), true),
 ];
 
 /// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
 /// modulations; `None` for others. Quantities that no set has get no panel.
-pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let [symbol] = swept(&sets.iter())[..] else { return None };
     let min_values = if symbol == Symbol::BreakOn { 2 } else { MIN_VALUES };
     let lines = lines(sets.iter())?;
@@ -74,7 +74,7 @@ pub(super) fn dependence(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 }
 
 /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
-fn y_axis((label, value, is_share): Quantity, sets: &[SetSummary]) -> Option<Axis> {
+fn y_axis((label, value, is_share): Quantity, sets: &[SetRow]) -> Option<Axis> {
     let ends = sets.iter().filter_map(value).flat_map(Statistic::ends);
     if !is_share {
         return Axis::of_data(label, ends.map(|end| end.max(0.0)), WIDE, 0.0);
@@ -83,7 +83,7 @@ fn y_axis((label, value, is_share): Quantity, sets: &[SetSummary]) -> Option<Axi
     Some(Axis::linear(label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
 }
 
-fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetSummary>], symbol: Symbol, value: Getter) {
+fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetRow>], symbol: Symbol, value: Getter) {
     for (line, ink) in lines.iter().zip(INKS) {
         let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, value(set)?)));
         frame.statistics(sheet, &points.collect::<Vec<_>>(), curve(ink), RADIUS);
@@ -91,9 +91,9 @@ fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetSummary>], symbol: Sy
 }
 
 /// The sets of each modulation, in their order, if there are enough inks.
-pub(super) fn lines<'a>(sets: impl Iterator<Item = &'a SetSummary>) -> Option<Vec<Vec<&'a SetSummary>>> {
-    let modulation = |set: &SetSummary| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
-    let mut lines: Vec<Vec<&SetSummary>> = Vec::new();
+pub(super) fn lines<'a>(sets: impl Iterator<Item = &'a SetRow>) -> Option<Vec<Vec<&'a SetRow>>> {
+    let modulation = |set: &SetRow| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
+    let mut lines: Vec<Vec<&SetRow>> = Vec::new();
     for set in sets {
         match lines.iter_mut().find(|line| modulation(line[0]) == modulation(set)) {
             Some(line) => line.push(set),
@@ -123,15 +123,22 @@ pub(super) fn label(symbol: Symbol) -> String {
 mod tests {
     use super::super::sets::tests::set;
     use super::*;
+    use crate::model::selected::Selected;
 
-    fn spread(deviation: f64, amplitude: f64) -> SetSummary {
+    fn spread(deviation: f64, amplitude: f64) -> SetRow {
         let plain = set(amplitude, 0.02, 4.0);
-        SetSummary { parameters: Parameters { threshold_deviation: deviation, ..plain.parameters.clone() }, ..plain }
+        SetRow {
+            parameters: Selected::new(Parameters {
+                threshold_deviation: deviation,
+                ..plain.parameters.parameters.clone()
+            }),
+            ..plain
+        }
     }
 
     #[test]
     fn one_swept_parameter_becomes_the_axis_and_each_modulation_a_line() {
-        let sets: Vec<SetSummary> =
+        let sets: Vec<SetRow> =
             [0.0, 0.0137, 0.137].iter().flat_map(|&dfs| [spread(dfs, 0.0), spread(dfs, 1e-6)]).collect();
         assert_eq!(number(&sets[5].parameters, Symbol::Dfs), Some(0.137 / 1.37));
         let svg = dependence(&sets, &Look::default()).unwrap().svg();
@@ -144,7 +151,7 @@ mod tests {
             dependence(&[set(0.0, 1.0, 1.0), set(1e-6, 0.1, 1.0), set(1e-6, 0.2, 1.0)], &Look::default()).is_none()
         );
         let mut two = sets;
-        two[0].parameters.blocks = 9;
+        two[0].parameters.parameters.blocks = 9;
         assert!(dependence(&two, &Look::default()).is_none(), "two parameters");
         let many = (0..7).flat_map(|step| [0.0, 0.0137, 0.137].map(|dfs| spread(dfs, 1e-6 + 1e-7 * f64::from(step))));
         assert!(dependence(&many.collect::<Vec<_>>(), &Look::default()).is_none(), "seven modulations");
@@ -152,8 +159,7 @@ mod tests {
 
     #[test]
     fn quantities_without_values_get_no_panel_and_sets_without_slips_no_figure() {
-        let slides =
-            |set: SetSummary| SetSummary { tau_mean: None, tau_deviation: None, resultant_length: None, ..set };
+        let slides = |set: SetRow| SetRow { tau_mean: None, tau_deviation: None, resultant_length: None, ..set };
         let mut sets = [0.0, 0.0137, 0.137].map(|dfs| slides(spread(dfs, 1e-6)));
         let svg = dependence(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains("Locking index") && !svg.contains("Mean interval"));
@@ -167,7 +173,13 @@ mod tests {
     fn the_breaking_rule_is_an_axis_of_words() {
         let tension = |amplitude| {
             let plain = set(amplitude, 0.02, 4.0);
-            SetSummary { parameters: Parameters { break_on: BreakOn::Tension, ..plain.parameters.clone() }, ..plain }
+            SetRow {
+                parameters: Selected::new(Parameters {
+                    break_on: BreakOn::Tension,
+                    ..plain.parameters.parameters.clone()
+                }),
+                ..plain
+            }
         };
         let svg = dependence(&[set(1e-6, 0.02, 4.0), tension(1e-6)], &Look::default()).unwrap().svg();
         assert!(svg.contains(">magnitude<") && svg.contains(">tension<"));
@@ -175,11 +187,11 @@ mod tests {
 
     #[test]
     fn error_bars_are_those_of_the_data() {
-        let mut sets: Vec<SetSummary> = [0.0, 0.01, 0.02].map(|dfs| spread(dfs, 1e-6)).to_vec();
-        let lines = |sets: &[SetSummary]| dependence(sets, &Look::default()).unwrap().svg().matches("<path").count();
+        let mut sets: Vec<SetRow> = [0.0, 0.01, 0.02].map(|dfs| spread(dfs, 1e-6)).to_vec();
+        let lines = |sets: &[SetRow]| dependence(sets, &Look::default()).unwrap().svg().matches("<path").count();
         let with = lines(&sets);
         for set in &mut sets {
-            set.locking_index = set.locking_index.map(|index| Statistic { interval: None, ..index });
+            set.locking_interval = None;
         }
         assert_eq!(with - lines(&sets), 3);
     }

@@ -23,7 +23,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     check_reduced(layout)?;
     let points = read(layout)?;
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
-    let look = &look.with_note(&sets::common(sets.iter().map(|set| &set.parameters)));
+    let look = &look.with_note(&sets::common(sets.iter().map(|set| &*set.parameters)));
     let mut pictures: Vec<Picture> = Vec::new();
     pictures.extend(backbone::backbone(&points, &read(layout)?, &sets, look));
     pictures.extend(intervals::intervals(&points, look));
@@ -54,7 +54,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
     check_reduced(layout)?;
     let rows: Vec<SetRow> = read(layout)?;
-    let look = &look.with_note(&sets::common(rows.iter().map(|row| &row.parameters.parameters)));
+    let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
     let picture = own::own(&rows, figure, look)?;
     check_size(&picture, look)?;
     Ok(picture)

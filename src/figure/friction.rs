@@ -6,7 +6,7 @@ use super::legend::{Entry, Mark, entry};
 use super::picture::Picture;
 use super::sets::{Modulations, frequency};
 use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, STRIPE, curve, dot};
-use crate::reduce::{SetSummary, Statistic};
+use crate::reduce::{SetRow, Statistic};
 
 const LAYOUT: Layout = Layout::column(558.0, &[340.0], 0.0, RIGHT);
 /// Least amplitudes, zero included, and most periods of the figure.
@@ -16,17 +16,18 @@ const MAX_PERIODS: usize = 3;
 const REDUCTION: (f64, f64) = (0.2, 0.3);
 /// Draws sets that differ in the modulation alone, with 5 amplitudes or more and at most
 /// 3 periods; `None` for others. Forces are in units of those at Δ = 0, or in N if there is no such set.
-pub(super) fn friction(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn friction(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let Modulations { free, amplitudes, periods, .. } = Modulations::of(sets.iter())?;
     let amplitudes = amplitudes.len() + usize::from(free.is_some());
     if amplitudes < MIN_AMPLITUDES || !(1..=MAX_PERIODS).contains(&periods.len()) {
         return None;
     }
-    let units = free.and_then(|set| Some((set.peak_force?, set.mean_friction?.value)));
+    let units = free.and_then(|set| Some((set.peak_force_mean?, set.mean_friction?)));
     let (peak_force, mean_friction) = units.unwrap_or((1.0, 1.0));
-    let point = |set: &SetSummary| {
+    let point = |set: &SetRow| {
         let force = set.parameters.drive_stiffness * set.parameters.modulation_amplitude;
-        Some((force / peak_force, set.mean_friction?.times(1.0 / mean_friction)))
+        let friction = Statistic::of(set.mean_friction, set.mean_friction_interval)?;
+        Some((force / peak_force, friction.times(1.0 / mean_friction)))
     };
     let points = || sets.iter().filter_map(point);
     let (_, widest) = bounds(points().map(|point| point.0))?;
@@ -66,7 +67,7 @@ mod tests {
 
     #[test]
     fn forces_are_in_units_of_those_without_modulation_if_these_are_known() {
-        let mut sets: Vec<SetSummary> = (1..=5).map(|step| set(1e-6 * f64::from(step), 0.02, 4.0)).collect();
+        let mut sets: Vec<SetRow> = (1..=5).map(|step| set(1e-6 * f64::from(step), 0.02, 4.0)).collect();
         assert!(friction(&sets, &Look::default()).unwrap().svg().contains(">Mean friction ⟨Fₛ⟩ (N)<"));
         sets.push(set(0.0, 1.0, 1.0));
         let svg = friction(&sets, &Look::default()).unwrap().svg();

@@ -8,7 +8,7 @@ use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
 use super::sets::{modulation, setting, swept, thousands};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::Parameters;
-use crate::reduce::{HistogramBin, SetSummary};
+use crate::reduce::{HistogramBin, SetRow};
 
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
@@ -52,7 +52,7 @@ impl<'a> Panel<'a> {
 
 /// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more
 /// sets or none.
-pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
+pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
     let panels = panels(sets, bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
     let layout = Layout { has_headings: true, ..Layout::column(WIDTH, HEIGHTS.get(..panels.len())?, 10.0, RIGHT) };
@@ -75,21 +75,21 @@ pub(super) fn histograms(sets: &[SetSummary], bins: &[HistogramBin], look: &Look
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it
 /// otherwise equals.
-fn panels<'a>(sets: &[SetSummary], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
-    let bars = |set: &SetSummary| bins.iter().filter(|bin| bin.set_id == set.set_id).collect();
-    let is_identical = |set: &&SetSummary| set.parameters.threshold_deviation == 0.0;
-    let (identical, others): (Vec<&SetSummary>, Vec<&SetSummary>) = sets.iter().partition(is_identical);
-    let is_twin = |identical: &SetSummary, other: &SetSummary| {
-        identical.parameters == Parameters { threshold_deviation: 0.0, ..other.parameters.clone() }
+fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
+    let bars = |set: &SetRow| bins.iter().filter(|bin| bin.set_id == set.set_id).collect();
+    let is_identical = |set: &&SetRow| set.parameters.threshold_deviation == 0.0;
+    let (identical, others): (Vec<&SetRow>, Vec<&SetRow>) = sets.iter().partition(is_identical);
+    let is_twin = |identical: &SetRow, other: &SetRow| {
+        *identical.parameters == Parameters { threshold_deviation: 0.0, ..other.parameters.parameters.clone() }
     };
-    let is_shown = |set: &&SetSummary| !is_identical(set) || !others.iter().any(|other| is_twin(set, other));
+    let is_shown = |set: &&SetRow| !is_identical(set) || !others.iter().any(|other| is_twin(set, other));
     // Sets come in the order of Δ and then T.
-    let mut shown: Vec<&SetSummary> = sets.iter().filter(is_shown).collect();
+    let mut shown: Vec<&SetRow> = sets.iter().filter(is_shown).collect();
     shown.sort_by(|left, right| {
         left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
     });
     let swept = swept(&shown.iter().copied());
-    let panel = |set: &SetSummary| {
+    let panel = |set: &SetRow| {
         let settings = swept.iter().map(|&symbol| setting(&set.parameters, symbol));
         let twin = identical.iter().find(|twin| !is_identical(&set) && is_twin(twin, set));
         Panel {
@@ -156,15 +156,16 @@ fn outline(bars: &[&HistogramBin]) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::selected::Selected;
 
-    fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetSummary {
+    fn set(id: &str, deviation: f64, frequency: Option<f64>) -> SetRow {
         let parameters = Parameters {
             threshold_deviation: deviation,
             modulation_amplitude: frequency.map_or(0.0, |_| 1e-6),
             modulation_period: frequency.map(|frequency| 1.0 / frequency),
             ..Parameters::default()
         };
-        SetSummary { set_id: id.to_owned(), parameters, ..SetSummary::default() }
+        SetRow { set_id: id.to_owned(), parameters: Selected::new(parameters), ..SetRow::default() }
     }
 
     fn bin(id: &str, low: f64, high: f64, density: f64) -> HistogramBin {

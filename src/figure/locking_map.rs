@@ -9,7 +9,7 @@ use super::picture::{Fill, Ink, Picture, Stroke};
 use super::regions::middles;
 use super::sets::{Grid, MICROMETRES, Modulations, Periods, is_modulated};
 use super::style::{BLACK, Look, WHITE, shade};
-use crate::reduce::SetSummary;
+use crate::reduce::SetRow;
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ const FREE: Ink = "#f2f2f0";
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.
-pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let Modulations { modulated, amplitudes, periods, .. } =
         Modulations::of(sets.iter().filter(|set| is_modulated(set)))?;
     let cells = amplitudes.len() * periods.len();
@@ -44,7 +44,7 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let indices = Axis::linear("", 0.0, 1.0);
     let cell_colours: [&CellColour<'_>; 2] = [
         &|set| Some(if set.is_locked { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) }),
-        &|set| set.locking_index.map(|index| shade(index.value)),
+        &|set| set.locking_index.map(shade),
     ];
     let bars = [numbers.bar(), ColourBar::of_axis("locking index", &indices)];
     let legend = [
@@ -55,7 +55,7 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     let (page, mut sheet) = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, COLOUR_BAR).page("locking-map", look, &legend);
     for (panel, (cell_colour, bar)) in cell_colours.into_iter().zip(bars).enumerate() {
         let frame = page.frame(panel, 0, periods.grid.axis(periods.label), amplitudes.axis("Amplitude Δ (µm)"));
-        let cell = |set: &SetSummary| {
+        let cell = |set: &SetRow| {
             let period = periods.grid.index_of(periods.place(set.parameters.modulation_period?));
             Some((period, amplitudes.index_of(MICROMETRES * set.parameters.modulation_amplitude)))
         };
@@ -81,10 +81,10 @@ pub(super) fn locking_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 }
 
 /// The colour of a set in a panel, if it has one.
-type CellColour<'a> = dyn Fn(&SetSummary) -> Option<Color> + 'a;
+type CellColour<'a> = dyn Fn(&SetRow) -> Option<Color> + 'a;
 
 /// n of τ = nT.
-fn whole_periods(set: &SetSummary) -> Option<usize> {
+fn whole_periods(set: &SetRow) -> Option<usize> {
     usize::try_from(set.periods?).ok()
 }
 
@@ -95,7 +95,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn of(sets: &[&SetSummary]) -> Self {
+    fn of(sets: &[&SetRow]) -> Self {
         let locked = sets.iter().filter(|set| set.is_locked);
         let present = || locked.clone().filter_map(|set| whole_periods(set)).map(|n| n.min(MAX_PERIODS + 1));
         let first = present().min().unwrap_or(0);
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::model::Parameters;
 
-    fn grid(amplitudes: u32, periods: u32) -> Vec<SetSummary> {
+    fn grid(amplitudes: u32, periods: u32) -> Vec<SetRow> {
         let row = |row: u32| {
             (1..=periods).map(move |column| set(1e-7 * f64::from(row), 0.01 * f64::from(column), f64::from(column)))
         };
@@ -141,14 +141,13 @@ mod tests {
         assert!(locking_map(&grid(9, 7), &Look::default()).is_none());
         sets.push(set(0.0, 1.0, 1.0));
         assert!(locking_map(&sets, &Look::default()).is_some(), "a set without modulation lies on no grid");
-        sets[3].parameters = Parameters { drive_velocity: 1e-5, ..sets[3].parameters.clone() };
+        sets[3].parameters.parameters = Parameters { drive_velocity: 1e-5, ..sets[3].parameters.parameters.clone() };
         assert!(locking_map(&sets, &Look::default()).is_none(), "two velocities");
     }
 
     #[test]
     fn a_diagonal_is_no_grid() {
-        let sets: Vec<SetSummary> =
-            (1..=20).map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0)).collect();
+        let sets: Vec<SetRow> = (1..=20).map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0)).collect();
         assert!(locking_map(&sets, &Look::default()).is_none());
     }
 
@@ -165,7 +164,7 @@ mod tests {
     #[test]
     fn sets_that_are_not_locked_are_as_pale_as_the_ground() {
         let mut sets = grid(8, 8);
-        let free = |sets: &[SetSummary]| locking_map(sets, &Look::default()).unwrap().svg().matches(FREE).count();
+        let free = |sets: &[SetRow]| locking_map(sets, &Look::default()).unwrap().svg().matches(FREE).count();
         let none = free(&sets);
         for set in &mut sets {
             set.is_locked = false;

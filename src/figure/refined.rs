@@ -9,7 +9,7 @@ use super::picture::{Dot, Fill, Ink, Picture, Stroke};
 use super::sets::MICROMETRES;
 use super::style::{BAR_WIDTH, INKS, LIGHT_GREY, Look, RADIUS, WHITE, dot};
 use crate::model::Symbol;
-use crate::reduce::{CellRow, SetSummary};
+use crate::reduce::{CellRow, SetRow};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, HashMap};
 
@@ -27,7 +27,7 @@ const MARGINS: Ends = (0.8, 1.25);
 const OUTLINE: Stroke = Stroke::solid(LIGHT_GREY, 0.5);
 
 /// Draws the cells of a grid that was refined along two axes and has no third, or the edges along one; `None` for others.
-pub(super) fn refined(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn refined(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
     if cells.iter().all(|cell| cell.y.is_some()) { map(cells, look) } else { edges(cells, sets, look) }
 }
 
@@ -61,7 +61,7 @@ fn scale(label: &str, (low, high): Ends, margins: Ends, narrow: impl FnOnce() ->
 /// Ends of a cell along an axis.
 type Ends = (f64, f64);
 /// A quantity of a set.
-type Quantity = Box<dyn Fn(&SetSummary) -> Option<f64>>;
+type Quantity = Box<dyn Fn(&SetRow) -> Option<f64>>;
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let first = cells.first()?;
@@ -104,10 +104,10 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
 }
 
 /// The edges along one axis against the one other quantity in which sets differ.
-fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture> {
-    let by_id: HashMap<&str, &SetSummary> = sets.iter().map(|set| (set.set_id.as_str(), set)).collect();
+fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
+    let by_id: HashMap<&str, &SetRow> = sets.iter().map(|set| (set.set_id.as_str(), set)).collect();
     let at_edges = cells.iter().filter(|cell| cell.differs);
-    let bands: Vec<(&CellRow, &SetSummary)> =
+    let bands: Vec<(&CellRow, &SetRow)> =
         at_edges.filter_map(|cell| Some((cell, *by_id.get(cell.set_id.as_deref()?)?))).collect();
     let refined = &cells.first()?.x;
     let quantities = Symbol::ALL.into_iter().filter(|symbol| *symbol != Symbol::Seed).filter_map(|symbol| {
@@ -150,6 +150,7 @@ fn edges(cells: &[CellRow], sets: &[SetSummary], look: &Look) -> Option<Picture>
 mod tests {
     use super::*;
     use crate::model::Parameters;
+    use crate::model::selected::Selected;
 
     fn cell(x: (f64, f64), y: Option<(f64, f64)>, differs: bool) -> CellRow {
         CellRow {
@@ -182,10 +183,10 @@ mod tests {
 
     #[test]
     fn edges_along_one_axis_are_drawn_against_the_other_quantity() {
-        let set = |name: f64, drive_velocity| SetSummary {
+        let set = |name: f64, drive_velocity| SetRow {
             set_id: format!("{name}"),
-            parameters: Parameters { drive_velocity, ..Parameters::default() },
-            ..SetSummary::default()
+            parameters: Selected::new(Parameters { drive_velocity, ..Parameters::default() }),
+            ..SetRow::default()
         };
         let cells =
             [cell((1e-6, 1.1e-6), None, true), cell((2e-6, 2.1e-6), None, true), cell((3e-6, 4e-6), None, false)];

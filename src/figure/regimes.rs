@@ -11,7 +11,7 @@ use super::sets::{Grid, distinct, modulation, swept};
 use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, WHITE, curve, dot, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{SetSummary, Statistic};
+use crate::reduce::{SetRow, Statistic};
 
 const LINES: Layout = Layout::column(558.0, &[190.0; 3], ROW_GAP, RIGHT);
 const MAP: Layout = Layout::column(490.0, &[220.0; 3], ROW_GAP, COLOUR_BAR);
@@ -21,14 +21,14 @@ const MIN_VALUES: usize = 4;
 const LOGARITHMIC: f64 = 20.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 
-const SHARE: (&str, Getter) =
-    ("Share of time within slips", |set| set.slip_share.map(|value| Statistic { value, interval: None }));
-const FRICTION: (&str, Getter) = ("Mean friction (N)", |set| set.mean_friction);
-const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| set.tau_mean);
+const SHARE: (&str, Getter) = ("Share of time within slips", |set| Statistic::of(set.slip_share, None));
+const FRICTION: (&str, Getter) =
+    ("Mean friction (N)", |set| Statistic::of(set.mean_friction, set.mean_friction_interval));
+const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| Statistic::of(set.tau_mean, set.tau_interval));
 
 /// Draws sets in which, besides the modulation, only V0 or the reattachment delay differs, or any one parameter if not
 /// all sets are stick-slip; `None` for others.
-pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let [symbol] = swept(&sets.iter())[..] else { return None };
     let is_plain = sets.iter().all(|set| set.regime == Some(Regime::StickSlip));
     let values = distinct(sets.iter(), |parameters| number(parameters, symbol));
@@ -57,7 +57,7 @@ pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
             }
         }
         for (line, ink) in lines.iter().zip(INKS) {
-            let point = |set: &&SetSummary| Some((number(&set.parameters, symbol)?, statistic(set)?));
+            let point = |set: &&SetRow| Some((number(&set.parameters, symbol)?, statistic(set)?));
             frame.statistics(&mut sheet, &line.iter().filter_map(point).collect::<Vec<_>>(), curve(ink), RADIUS);
             let sliding = line.iter().filter(|set| set.regime == Some(Regime::Sliding)).filter_map(point);
             frame.points(&mut sheet, sliding.map(|(x, y)| (x, y.value)), Dot::solid(WHITE, RADIUS - 1.6));
@@ -69,7 +69,7 @@ pub(super) fn regimes(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
 /// 4 values or more; `None` for others.
-pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let swept = swept(&sets.iter());
     // The drive velocity is the x axis wherever it is one.
     let [horizontal, vertical] = match swept[..] {
@@ -85,12 +85,12 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
         return None;
     }
     let [columns, rows] = grids.map(Grid::of);
-    let cell = |set: &SetSummary| {
+    let cell = |set: &SetRow| {
         let place = |symbol, grid: &Grid| Some(grid.index_of(number(&set.parameters, symbol)?));
         Some((place(horizontal, &columns)?, place(vertical, &rows)?))
     };
     let ends = |(column, row)| (columns.cell(column), rows.cell(row));
-    let cells: Vec<(&SetSummary, Cell)> = sets.iter().filter_map(|set| Some((set, ends(cell(set)?)))).collect();
+    let cells: Vec<(&SetRow, Cell)> = sets.iter().filter_map(|set| Some((set, ends(cell(set)?)))).collect();
     let (page, mut sheet) = MAP.page(
         "regime-map",
         look,
@@ -110,7 +110,7 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
             borders(sheet, &frame, &cells);
         });
         if row == 0 {
-            let regime = |set: &SetSummary| Regime::ALL.iter().position(|regime| set.regime == Some(*regime));
+            let regime = |set: &SetRow| Regime::ALL.iter().position(|regime| set.regime == Some(*regime));
             let numbers = sets.iter().filter_map(|set| Some((cell(set)?, regime(set)?))).collect();
             for (middle, index) in middles(&numbers) {
                 let share = if Regime::ALL[index] == Regime::StickSlip { 0.0 } else { 1.0 };
@@ -124,7 +124,7 @@ pub(super) fn regime_map(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 }
 
 /// Lines between neighbouring cells of different regimes.
-fn borders(sheet: &mut Sheet, frame: &Frame, cells: &[(&SetSummary, Cell)]) {
+fn borders(sheet: &mut Sheet, frame: &Frame, cells: &[(&SetRow, Cell)]) {
     for (index, &(set, (x, y))) in cells.iter().enumerate() {
         for &(_, (other_x, other_y)) in cells[index + 1..].iter().filter(|(other, _)| other.regime != set.regime) {
             let meets = |a: (f64, f64), b: (f64, f64)| {
@@ -148,19 +148,21 @@ mod tests {
     use super::super::sets::tests::set;
     use super::*;
     use crate::model::Parameters;
+    use crate::model::selected::Selected;
 
-    fn at(velocity: f64, delay: f64, share: f64) -> SetSummary {
+    fn at(velocity: f64, delay: f64, share: f64) -> SetRow {
         let plain = set(0.0, 1.0, 1e-5 / velocity);
-        let parameters = Parameters { drive_velocity: velocity, reattachment_time: delay, ..plain.parameters.clone() };
+        let parameters =
+            Parameters { drive_velocity: velocity, reattachment_time: delay, ..plain.parameters.parameters.clone() };
         let regime = Some(Regime::at(share));
         let is_sliding = regime == Some(Regime::Sliding);
         let tau_mean = plain.tau_mean.filter(|_| !is_sliding);
-        SetSummary { parameters, slip_share: Some(share), regime, tau_mean, ..plain }
+        SetRow { parameters: Selected::new(parameters), slip_share: Some(share), regime, tau_mean, ..plain }
     }
 
     #[test]
     fn a_sweep_of_the_velocity_shows_its_regimes_with_sliding_as_open_circles() {
-        let sets: Vec<SetSummary> = [0.05, 0.1, 0.3, 0.7, 1.0]
+        let sets: Vec<SetRow> = [0.05, 0.1, 0.3, 0.7, 1.0]
             .iter()
             .zip(1..)
             .map(|(&share, step)| at(1e-5 * f64::from(1 << step), 0.005, share))
@@ -176,10 +178,13 @@ mod tests {
             regimes(&sets[..4], &Look::default()).unwrap().svg().matches(&format!("fill=\"{WHITE}\"")).count() + 3
         );
         assert!(regimes(&sets[..3], &Look::default()).is_none(), "three values");
-        let sizes: Vec<SetSummary> = (1..=5)
+        let sizes: Vec<SetRow> = (1..=5)
             .map(|blocks| {
                 let plain = set(0.0, 1.0, 1.0);
-                SetSummary { parameters: Parameters { blocks, ..plain.parameters.clone() }, ..plain }
+                SetRow {
+                    parameters: Selected::new(Parameters { blocks, ..plain.parameters.parameters.clone() }),
+                    ..plain
+                }
             })
             .collect();
         assert!(regimes(&sizes, &Look::default()).is_none(), "nothing but stick-slip, and the drive is one");
@@ -187,7 +192,7 @@ mod tests {
 
     #[test]
     fn two_parameters_make_a_map_with_lines_between_regimes() {
-        let grid = |shares: fn(u32, u32) -> f64| -> Vec<SetSummary> {
+        let grid = |shares: fn(u32, u32) -> f64| -> Vec<SetRow> {
             (0..4)
                 .flat_map(|row| {
                     (0..5).map(move |column| {
@@ -196,9 +201,8 @@ mod tests {
                 })
                 .collect()
         };
-        let map = |sets: &[SetSummary]| {
-            regime_map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count()
-        };
+        let map =
+            |sets: &[SetRow]| regime_map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count();
         let without = map(&grid(|_, _| 0.05));
         assert_eq!(map(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
         assert!(regime_map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(), "two rows");

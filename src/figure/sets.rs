@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, logarithmic_bounds};
 use crate::model::{Description, Parameters, Symbol, Value};
-use crate::reduce::SetSummary;
+use crate::reduce::SetRow;
 
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
@@ -13,7 +13,7 @@ pub(super) const FREQUENCY: &str = "Modulation frequency 1/T (Hz)";
 pub(super) const ETA: &str = "η = 2πΔ / (T V₀)";
 
 /// Parameters other than those of the modulation in which sets differ.
-pub(super) fn swept<'a>(sets: &(impl Iterator<Item = &'a SetSummary> + Clone)) -> Vec<Symbol> {
+pub(super) fn swept<'a>(sets: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<Symbol> {
     let is_swept = |symbol: &Symbol| {
         let mut values = sets.clone().map(|set| set.parameters.get(*symbol));
         let first = values.next();
@@ -24,8 +24,8 @@ pub(super) fn swept<'a>(sets: &(impl Iterator<Item = &'a SetSummary> + Clone)) -
 
 /// Sets that differ in the modulation alone.
 pub(super) struct Modulations<'a> {
-    pub(super) modulated: Vec<&'a SetSummary>,
-    pub(super) free: Option<&'a SetSummary>,
+    pub(super) modulated: Vec<&'a SetRow>,
+    pub(super) free: Option<&'a SetRow>,
     /// Amplitudes of the modulated sets in m, ascending.
     pub(super) amplitudes: Vec<f64>,
     /// Periods of the modulated sets in s, ascending.
@@ -34,24 +34,24 @@ pub(super) struct Modulations<'a> {
 
 impl<'a> Modulations<'a> {
     /// `None` if another parameter differs.
-    pub(super) fn of(sets: impl Iterator<Item = &'a SetSummary> + Clone) -> Option<Self> {
+    pub(super) fn of(sets: impl Iterator<Item = &'a SetRow> + Clone) -> Option<Self> {
         if !swept(&sets).is_empty() {
             return None;
         }
-        let (modulated, free): (Vec<&SetSummary>, Vec<&SetSummary>) = sets.partition(|set| is_modulated(set));
+        let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) = sets.partition(|set| is_modulated(set));
         let amplitudes = distinct(modulated.iter().copied(), |parameters| Some(parameters.modulation_amplitude));
         let periods = distinct(modulated.iter().copied(), |parameters| parameters.modulation_period);
         Some(Self { modulated, free: free.first().copied(), amplitudes, periods })
     }
 }
 
-pub(super) fn is_modulated(set: &SetSummary) -> bool {
+pub(super) fn is_modulated(set: &SetRow) -> bool {
     set.parameters.modulation_period.is_some()
 }
 
 /// The distinct values of a quantity, ascending.
 pub(super) fn distinct<'a>(
-    sets: impl Iterator<Item = &'a SetSummary>,
+    sets: impl Iterator<Item = &'a SetRow>,
     quantity: impl Fn(&Parameters) -> Option<f64>,
 ) -> Vec<f64> {
     ascending(sets.filter_map(|set| quantity(&set.parameters)))
@@ -259,29 +259,40 @@ impl Periods {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::model::selected::Selected;
     use crate::observe::Regime;
-    use crate::reduce::Statistic;
+    use crate::reduce::Interval;
 
     /// A set at Δ in m and T in s that locks to `periods` of T.
-    pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetSummary {
+    pub(in crate::figure) fn set(amplitude: f64, period: f64, periods: f64) -> SetRow {
         let tau = periods * period;
-        let statistic = |value: f64| Some(Statistic { value, interval: Some((0.9 * value, 1.1 * value)) });
+        let interval = |value: f64| Some(Interval { low: 0.9 * value, high: 1.1 * value });
+        let of_modulated = |value: f64| (amplitude > 0.0).then_some(value);
+        let (locking_index, resultant_length) = (of_modulated(0.8), of_modulated(0.7));
+        let mean_friction = 280.0 - 1e7 * amplitude;
         let parameters =
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() };
-        SetSummary {
+        SetRow {
             set_id: format!("{amplitude:e} {period:e}"),
-            parameters: parameters.validated().unwrap(),
-            tau_mean: statistic(tau),
+            parameters: Selected::new(parameters.validated().unwrap()),
+            tau_mean: Some(tau),
+            tau_interval: interval(tau),
             tau_deviation: Some(0.1 * tau),
-            tau_quartiles: Some([0.98 * tau, tau, 1.02 * tau]),
+            tau_25: Some(0.98 * tau),
+            tau_50: Some(tau),
+            tau_75: Some(1.02 * tau),
             periods: (0..100_u32).find(|&n| (f64::from(n) - periods).abs() <= 0.5).map(u64::from),
             is_locked: amplitude > 0.0,
-            locking_index: statistic(0.8).filter(|_| amplitude > 0.0),
-            resultant_length: statistic(0.7).filter(|_| amplitude > 0.0),
-            peak_force: Some(480.0),
-            mean_friction: statistic(280.0 - 1e7 * amplitude),
+            locking_index,
+            locking_interval: locking_index.and_then(interval),
+            resultant_length,
+            length_interval: resultant_length.and_then(interval),
+            peak_force_mean: Some(480.0),
+            mean_friction: Some(mean_friction),
+            mean_friction_interval: interval(mean_friction),
             regime: Some(Regime::StickSlip),
             slip_share: Some(0.05),
+            ..SetRow::default()
         }
     }
 
@@ -293,9 +304,9 @@ pub(super) mod tests {
 
     #[test]
     fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
-        let mut other = set(1e-6, 0.02, 4.0).parameters;
+        let mut other = set(1e-6, 0.02, 4.0).parameters.parameters;
         other.blocks = 9;
-        let all = [set(1e-6, 0.02, 4.0).parameters, other];
+        let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
         let found = common(all.iter()).replace('\u{a0}', " ");
         assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 1e8 N/m, Kd = 4e7 N/m"), "{found}");
         assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1e-6 m, T = 0.02 s"), "{found}");

@@ -7,7 +7,7 @@ use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Fill, Ink, Picture, Sheet, Stroke};
 use super::sets::{Modulations, Periods, amplitude};
 use super::style::{GREY, GRID, INKS, Look, REFERENCE};
-use crate::reduce::SetSummary;
+use crate::reduce::SetRow;
 
 const LAYOUT: Layout = Layout::column(558.0, &[310.0, 160.0], ROW_GAP, RIGHT);
 /// Least values of the period that make a staircase.
@@ -23,12 +23,12 @@ const BOX: f64 = 0.3;
 
 /// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most
 /// 3 amplitudes; `None` for others. Periods are in units of τ₀ if there is a set without modulation.
-pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
+pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let sets = Modulations::of(sets.iter())?;
     if sets.periods.len() < MIN_PERIODS || sets.amplitudes.len() > MAX_AMPLITUDES {
         return None;
     }
-    let free = sets.free.and_then(|set| set.tau_mean).map(|tau| tau.value);
+    let free = sets.free.and_then(|set| set.tau_mean);
     let periods = Periods::of(&sets.periods, free);
     let x = periods.grid.axis(periods.label);
     let ratios = sets.modulated.iter().filter_map(|set| quartiles(set)).flatten();
@@ -51,7 +51,7 @@ pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
     });
     for (&height, ink) in sets.amplitudes.iter().zip(INKS) {
         let of_height = sets.modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
-        let places: Vec<(f64, &SetSummary)> =
+        let places: Vec<(f64, &SetRow)> =
             of_height.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
         draw(&mut sheet, &frames, &periods, &places, ink);
     }
@@ -62,7 +62,7 @@ pub(super) fn staircase(sets: &[SetSummary], look: &Look) -> Option<Picture> {
 }
 
 /// One amplitude: sets at their places.
-fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f64, &SetSummary)], ink: Ink) {
+fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f64, &SetRow)], ink: Ink) {
     frames[0].clipped(sheet, |sheet| {
         for (place, set) in places {
             if let Some([low, _, high]) = quartiles(set) {
@@ -74,7 +74,7 @@ fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f6
     let medians = places.iter().filter_map(|(place, set)| Some((*place, quartiles(set)?[1])));
     frames[0].points(sheet, medians, dot(ink));
     let mut indices: Vec<(f64, f64)> =
-        places.iter().filter_map(|(place, set)| Some((*place, set.locking_index?.value))).collect();
+        places.iter().filter_map(|(place, set)| Some((*place, set.locking_index?))).collect();
     indices.sort_by(|left, right| left.0.total_cmp(&right.0));
     frames[1].points(sheet, indices.iter().copied(), dot(ink));
     frames[1].curve(sheet, indices, Stroke::solid(ink, 1.2));
@@ -84,9 +84,9 @@ const fn dot(ink: Ink) -> Dot {
     Dot::solid(ink, 3.0)
 }
 
-fn quartiles(set: &SetSummary) -> Option<[f64; 3]> {
+fn quartiles(set: &SetRow) -> Option<[f64; 3]> {
     let period = set.parameters.modulation_period?;
-    Some(set.tau_quartiles?.map(|tau| tau / period))
+    Some([set.tau_25?, set.tau_50?, set.tau_75?].map(|tau| tau / period))
 }
 
 #[cfg(test)]
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn many_periods_and_few_amplitudes_make_a_staircase() {
-        let steps = |amplitude: f64, count: u32| -> Vec<SetSummary> {
+        let steps = |amplitude: f64, count: u32| -> Vec<SetRow> {
             (1..=count).map(|step| set(amplitude, 0.01 * f64::from(step), (12.0 / f64::from(step)).ceil())).collect()
         };
         let mut sets = steps(1e-6, 24);

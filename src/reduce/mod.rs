@@ -27,7 +27,7 @@ pub use gather::reduce_jobs;
 pub(crate) use gather::row_of;
 pub use histogram::HistogramBin;
 pub use moments::{Moments, quantile};
-pub use reduced::{SetSummary, Statistic, advise, read_reduced, read_sets};
+pub use reduced::{Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
