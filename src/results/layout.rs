@@ -19,10 +19,10 @@ use crate::sweep::{Outline, Sweep};
 use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
 use crate::table::storage::{Storage, StorageError};
 use std::collections::{BTreeSet, HashSet};
+use std::ffi::OsString;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-const TABLES: &str = "tables";
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
 /// Folder of the results directories that nobody placed elsewhere.
@@ -45,7 +45,6 @@ impl fmt::Debug for Layout<'_> {
 }
 
 impl<'a> Layout<'a> {
-    /// The layout under a directory.
     pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
         Self { storage, root: root.to_owned() }
     }
@@ -70,10 +69,6 @@ impl<'a> Layout<'a> {
         ResultsError::refused(&self.root, format!("{problem}; name one that a run made, such as {RESULTS}/fig3"))
     }
 
-    pub fn tables(&self) -> PathBuf {
-        self.root.join(TABLES)
-    }
-
     pub fn table(&self, name: &str) -> PathBuf {
         self.tables().join(name)
     }
@@ -89,14 +84,14 @@ impl<'a> Layout<'a> {
         Ok(Dataset::new(self.storage, paths.map(of_part).collect::<Result<_, _>>()?))
     }
 
+    /// The names in a folder; none where a file lies on the way, which is somebody else's.
+    fn names_in(&self, folder: &Path) -> Result<Vec<OsString>, StorageError> {
+        self.storage.list(folder).or_else(|error| if error.is_missing() { Ok(Vec::new()) } else { Err(error) })
+    }
+
     /// The parts that have a file in a folder.
     pub(super) fn parts_in(&self, folder: &Path) -> Result<HashSet<PartName>, StorageError> {
-        let names = match self.storage.list(folder) {
-            // A file on the way is somebody else's.
-            Err(error) if error.is_missing() => Vec::new(),
-            names => names?,
-        };
-        Ok(names.into_iter().filter_map(|name| PartName::of_path(name.as_ref())).collect())
+        Ok(self.names_in(folder)?.into_iter().filter_map(|name| PartName::of_path(name.as_ref())).collect())
     }
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
@@ -104,32 +99,15 @@ impl<'a> Layout<'a> {
         self.storage.ensure_folder_below(&self.root, folder)
     }
 
-    pub fn reduced(&self) -> PathBuf {
-        self.root.join("reduced")
-    }
-
     /// File of a reduced table.
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }
 
-    pub fn figures(&self) -> PathBuf {
-        self.root.join("figures")
-    }
-
-    pub fn report(&self) -> PathBuf {
-        self.root.join("report.html")
-    }
-
-    /// Folder of everything that is no result.
-    pub fn run(&self) -> PathBuf {
-        self.root.join(RUN)
-    }
-
     /// The folders in which names are results.
     pub fn result_folders(&self) -> Vec<PathBuf> {
         let tables = [tables::SLIPS, tables::PRECURSORS, tables::JOBS];
-        let folders = [self.root.clone(), self.run(), self.root.join(TABLES)];
+        let folders = [self.root.clone(), self.run(), self.tables()];
         folders.into_iter().chain(tables.map(|table| self.table(table))).collect()
     }
 
@@ -141,47 +119,44 @@ impl<'a> Layout<'a> {
     /// Numbers of the extensions that the folder lists: a network file system may not yet find them by their names.
     pub(super) fn listed_extensions(&self) -> Result<BTreeSet<usize>, StorageError> {
         let number = |name: &str| name.strip_prefix(EXTENSION)?.strip_suffix(".json")?.parse().ok();
-        let names = match self.storage.list(&self.run()) {
-            // A file at this place is somebody else's.
-            Err(error) if error.is_missing() => return Ok(BTreeSet::new()),
-            names => names?,
-        };
+        let names = self.names_in(&self.run())?;
         let numbers = names.iter().filter_map(|name| number(name.to_str()?));
         Ok(numbers.filter(|&number| names.iter().any(|name| self.extension(number).ends_with(name))).collect())
-    }
-
-    /// Where a repair puts what is damaged.
-    pub fn quarantine(&self) -> PathBuf {
-        self.run().join("quarantine")
     }
 
     /// Where one writer, known by a name of its own, prepares files.
     pub fn staging(&self, writer: &str) -> PathBuf {
         self.run().join("staging").join(writer)
     }
+}
 
-    /// Folder of the lock files.
-    pub fn locks(&self) -> PathBuf {
-        self.run().join("lock")
-    }
+/// Paths below the root, each a method of its name.
+macro_rules! places {
+    ($($(#[$about:meta])* $place:ident = $path:literal;)*) => {
+        impl Layout<'_> {$(
+            $(#[$about])*
+            pub fn $place(&self) -> PathBuf {
+                self.root.join($path)
+            }
+        )*}
+    };
+}
 
-    /// Folder of the workers' files.
-    pub fn workers(&self) -> PathBuf {
-        self.run().join("workers")
-    }
-
-    pub fn claims(&self) -> PathBuf {
-        self.run().join("claims")
-    }
-
-    /// Folder of what a stopped run had finished of parts that are not done.
-    pub fn spill(&self) -> PathBuf {
-        self.run().join("spill")
-    }
-
-    pub fn logs(&self) -> PathBuf {
-        self.run().join("log")
-    }
+places! {
+    tables = "tables";
+    reduced = "reduced";
+    figures = "figures";
+    report = "report.html";
+    /// Everything that is no result.
+    run = "run";
+    claims = "run/claims";
+    locks = "run/lock";
+    logs = "run/log";
+    /// What a repair took away, as it was damaged.
+    quarantine = "run/quarantine";
+    /// What a stopped run had finished of parts that are not done.
+    spill = "run/spill";
+    workers = "run/workers";
 }
 
 /// Name of a part, which is that of its file in every table.
