@@ -11,7 +11,7 @@ use crate::observe::{Recording, SlipObserver};
 use crate::reduce::Moments;
 use crate::run::cpu;
 use crate::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -70,9 +70,9 @@ columns! {
     }
 }
 
-impl Table for Stability {
-    const NAME: &'static str = "hard-cases";
-    const MEANING: &'static str = "One row per hard case that is refused or takes fixed steps, else two: in Taylor steps with an audit, and as a job";
+tables! {
+    Stability = "hard-cases",
+        "One row per hard case that is refused or takes fixed steps, else two: in Taylor steps with an audit, and as a job";
 }
 
 impl HardCase {

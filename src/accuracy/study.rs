@@ -16,7 +16,7 @@ use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Recording, Slip, SlipObserver, measure};
 use crate::run::cpu;
 use crate::solver::{Limits, Observer, Resolve, Solver, Summary, TOLERANCES, simulate, simulate_audited};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -152,10 +152,7 @@ columns! {
     }
 }
 
-impl Table for MethodRow {
-    const NAME: &'static str = "methods";
-    const MEANING: &'static str = "One row per set of parameters and solver setting";
-}
+tables! { MethodRow = "methods", "One row per set of parameters and solver setting"; }
 
 /// A quantity of slips whose distributions are compared.
 type Quantity = (&'static str, fn(&Slip) -> Option<f64>);
@@ -188,9 +185,8 @@ columns! {
     }
 }
 
-impl Table for DistanceRow {
-    const NAME: &'static str = "distances";
-    const MEANING: &'static str =
+tables! {
+    DistanceRow = "distances",
         "One row per set of parameters, solver setting and quantity, in the unit of its column in `slips`";
 }
 

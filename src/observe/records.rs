@@ -2,7 +2,7 @@
 
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 
 /// Several observers of one run; the first decides when it has seen enough.
 pub struct Observers<'a> {
@@ -235,16 +235,7 @@ impl From<&ContactEvent> for ContactRow {
     }
 }
 
-/// The tables that one simulation writes on request.
-macro_rules! tables {
-    ($($row:ty = $name:literal, $meaning:literal;)*) => {
-        $(impl Table for $row {
-            const NAME: &'static str = $name;
-            const MEANING: &'static str = $meaning;
-        })*
-    };
-}
-
+// The tables that one simulation writes on request.
 tables! {
     TraceRow = "trace", "One row per sample of a simulation";
     MapRow = "map", "One row per sample and block";

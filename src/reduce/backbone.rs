@@ -5,7 +5,7 @@ use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use super::set::FinishedSet;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote, random_load_mean};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -42,10 +42,7 @@ columns! {
     }
 }
 
-impl Table for BackboneBin {
-    const NAME: &'static str = "backbone";
-    const MEANING: &'static str = "One row per bin of eta that holds slips, four bins per decade";
-}
+tables! { BackboneBin = "backbone", "One row per bin of eta that holds slips, four bins per decade"; }
 
 /// Pools the sets of each bin.
 #[derive(Clone, Debug, Default)]

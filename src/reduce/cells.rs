@@ -9,7 +9,7 @@
 
 use super::set::SetRow;
 use crate::sweep::{Contrast, RefinedAxis, Refinement, Sweep};
-use crate::table::columns::{Table, Value, columns};
+use crate::table::columns::{Value, columns, tables};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A cell: how often it was halved, and the rows of its first corner.
@@ -39,10 +39,7 @@ columns! {
     }
 }
 
-impl Table for CellRow {
-    const NAME: &'static str = "cells";
-    const MEANING: &'static str = "One row per undivided cell, if the sweep has `[refine]` with one axis or two";
-}
+tables! { CellRow = "cells", "One row per undivided cell, if the sweep has `[refine]` with one axis or two"; }
 
 /// The undivided cells, coarse ones first; none of grids that are refined along more than two axes.
 pub(super) fn cell_rows(sweep: &Sweep, refinement: &Refinement, known: &BTreeMap<u64, SetRow>) -> Vec<CellRow> {

@@ -1,7 +1,7 @@
 //! Histograms of the interval τ, one per parameter set (Fig. 2).
 
 use super::SetRow;
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 
 /// Bins per mean interval: 1.9 ms at the paper's standard case, where the peaks are 5 ms wide and 50 ms apart.
 const BINS_PER_MEAN: f64 = 60.0;
@@ -18,9 +18,8 @@ columns! {
     }
 }
 
-impl Table for HistogramBin {
-    const NAME: &'static str = "histograms";
-    const MEANING: &'static str =
+tables! {
+    HistogramBin = "histograms",
         "One row per bin of the intervals of a set, of a width of mean tau / 60; empty bins are left out";
 }
 

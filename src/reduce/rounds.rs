@@ -4,7 +4,7 @@
 use super::set::SetRow;
 use crate::results::Results;
 use crate::sweep::{Precision, Sweep};
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 use crate::table::file::{DatasetError, Footer, TableWriter};
 use crate::table::storage::StoredFile;
 use std::collections::HashMap;
@@ -21,18 +21,14 @@ columns! {
     }
 }
 
-impl Table for RoundOfSet {
-    const NAME: &'static str = "sets of a sweep in rounds";
-    const MEANING: &'static str = "Further columns of `sets`, if the sweep has `[precision]` or `[refine]`";
+tables! {
+    RoundOfSet = "sets of a sweep in rounds", "Further columns of `sets`, if the sweep has `[precision]` or `[refine]`";
 }
 
 /// A set of a sweep in rounds.
 pub type SetInRounds = (SetRow, RoundOfSet);
 
-impl Table for SetInRounds {
-    const NAME: &'static str = SetRow::NAME;
-    const MEANING: &'static str = SetRow::MEANING;
-}
+tables! { SetInRounds = SetRow::NAME, SetRow::MEANING; }
 
 /// Writes the table of sets, with the columns that the sweep asks for.
 pub(super) enum SetWriter<'a> {

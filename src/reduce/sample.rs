@@ -2,7 +2,7 @@
 
 use crate::model::Parameters;
 use crate::observe::Slip;
-use crate::table::columns::{Table, columns};
+use crate::table::columns::{columns, tables};
 use crate::table::value::words;
 
 /// Slips up to which all become points; of more, every k-th in table order remains.
@@ -68,10 +68,7 @@ impl Point {
     }
 }
 
-impl Table for Point {
-    const NAME: &'static str = "points";
-    const MEANING: &'static str = "Slips for scatter figures: all up to 20,000, or every k-th in table order";
-}
+tables! { Point = "points", "Slips for scatter figures: all up to 20,000, or every k-th in table order"; }
 
 /// Distance k of the points among `slips` rows.
 pub(super) const fn spacing(slips: u64) -> u64 {

@@ -7,7 +7,7 @@
 use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::parts::row_count;
-use crate::results::tables::{self, JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{self, JobRow};
 use crate::sweep::Outline;
 use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
 use crate::table::file::{Batch, Dataset, DatasetError, RowCount};
@@ -16,7 +16,7 @@ use crate::table::storage::Storage;
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, UInt32Array};
-use arrow_schema::{ArrowError, DataType, Field, Fields, SchemaRef};
+use arrow_schema::{ArrowError, DataType, Field, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use serde::Serialize;
@@ -94,14 +94,9 @@ impl Results<'_> {
         let names: Vec<&str> = self.tables().collect();
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
-            let columns = match table {
-                tables::SLIPS => schema::<SlipRow<'_>>(),
-                tables::PRECURSORS => schema::<PrecursorRow<'_>>(),
-                _ => schema::<JobRow>(),
-            };
             let name = format!("{table}.{}", format.extension());
             let file = self.layout().storage.create(&to.join(&name))?;
-            let schema = schema_of(self.joined(&columns));
+            let schema = schema_of(self.joined(&tables::schema_of(table)));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
             for (done, part) in parts.iter().enumerate() {
@@ -208,26 +203,19 @@ impl Jobs {
         let of_jobs = |name: &str| -> Result<ArrayRef, ArrowError> {
             take(self.rows.column_by_name(name).ok_or_else(|| missing(name))?, &jobs, None)
         };
-        let columns = columns_of(schema.fields(), |name| match rows.column_by_name(name) {
+        let column_of = |name: &str| match rows.column_by_name(name) {
             Some(column) => Ok(Arc::clone(column)),
             None if name == FREQUENCY => {
                 let periods = of_jobs(PERIOD)?;
                 let periods = periods.as_primitive_opt::<Float64Type>().ok_or_else(|| missing(PERIOD))?;
-                Ok(Arc::new(
-                    periods.iter().map(|period| period.map(|period| rounded(1.0 / period))).collect::<Float64Array>(),
-                ))
+                let frequencies = periods.iter().map(|period| Some(rounded(1.0 / period?)));
+                Ok(Arc::new(frequencies.collect::<Float64Array>()) as ArrayRef)
             }
             None => of_jobs(name),
-        })?;
+        };
+        let columns = schema.fields().iter().map(|field| column_of(field.name())).collect::<Result<Vec<_>, _>>()?;
         RecordBatch::try_new(Arc::clone(schema), columns)
     }
-}
-
-fn columns_of(
-    fields: &Fields,
-    column: impl Fn(&str) -> Result<ArrayRef, ArrowError>,
-) -> Result<Vec<ArrayRef>, ArrowError> {
-    fields.iter().map(|field| column(field.name())).collect()
 }
 
 /// A number as people wrote it, before its reciprocal was taken: to twelve significant digits, as axes are.

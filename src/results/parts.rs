@@ -169,26 +169,34 @@ type Jobs<'a> = Vec<(Label<DriveAndSeed>, Option<&'a Outcome>)>;
 
 columns! {
     /// What the jobs table says about the rows of a job in other tables.
-    struct RowsOfJob {
+    pub(super) struct RowsOfJob {
+        job_id: String;
         outcome: JobOutcome;
         slips: Option<u64>;
         precursors: Option<u64>;
     }
 }
 
-/// How many rows the jobs of a part have in a table, as its jobs file says. A job that may run again, as it failed or was
-/// ended by a time limit, may have more: a run that was killed while it replaced them left them, and the same command puts
-/// that right.
+impl RowsOfJob {
+    /// How many rows the job has in a table. One that may run again, as it failed or was ended by a time limit, may have more:
+    /// a run that was killed while it replaced them left them, and the same command puts that right.
+    pub(super) fn count(&self, table: &str) -> RowCount {
+        let rows = if table == tables::SLIPS { self.slips } else { self.precursors };
+        let may_exceed = matches!(self.outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
+        RowCount { least: rows.unwrap_or(0), may_exceed }
+    }
+}
+
+/// How many rows the jobs of a part have in a table, as its jobs file says.
 pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, DatasetError> {
-    let mut count = RowCount { least: 0, may_exceed: false };
+    let mut all = RowCount { least: 0, may_exceed: false };
     for batch in jobs.rows::<RowsOfJob>() {
-        for RowsOfJob { outcome, slips, precursors } in batch? {
-            let rows = if table == tables::SLIPS { slips } else { precursors };
-            count.least = count.least.saturating_add(rows.unwrap_or(0));
-            count.may_exceed |= matches!(outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
+        for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
+            all.least = all.least.saturating_add(least);
+            all.may_exceed |= may_exceed;
         }
     }
-    Ok(count)
+    Ok(all)
 }
 
 /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A run

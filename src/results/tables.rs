@@ -6,8 +6,10 @@ use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{Measurements, Precursor, Regime, Slip};
 use crate::sweep::Sweep;
-use crate::table::columns::{Table, columns};
+use crate::table::arrow::schema;
+use crate::table::columns::{Table, columns, tables};
 use crate::table::value::words;
+use arrow_schema::SchemaRef;
 
 words! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +75,15 @@ pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
 pub const PRECURSORS: &str = <PrecursorRow<'_> as Table>::NAME;
 pub const JOBS: &str = JobRow::NAME;
 
+/// The columns of the table of this name, with units and meanings.
+pub(super) fn schema_of(table: &str) -> SchemaRef {
+    match table {
+        SLIPS => schema::<SlipRow<'_>>(),
+        PRECURSORS => schema::<PrecursorRow<'_>>(),
+        _ => schema::<JobRow>(),
+    }
+}
+
 /// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
     let [job_id, set_id] = [sweep.job_id(parameters).to_string(), sweep.set_id(parameters).to_string()];
@@ -92,19 +103,10 @@ pub type PrecursorRow<'a> = (&'a Label<DriveAndSeed>, &'a Precursor);
 /// A row of the jobs table.
 pub type JobRow = (Label<All>, JobRecord);
 
-impl Table for SlipRow<'_> {
-    const NAME: &'static str = "slips";
-    const MEANING: &'static str = "One row per slip past start-up";
-}
-
-impl Table for PrecursorRow<'_> {
-    const NAME: &'static str = "precursors";
-    const MEANING: &'static str = "One row per precursor of a recorded slip; only if the sweep records precursors";
-}
-
-impl Table for JobRow {
-    const NAME: &'static str = "jobs";
-    const MEANING: &'static str = "One row per job";
+tables! {
+    SlipRow<'_> = "slips", "One row per slip past start-up";
+    PrecursorRow<'_> = "precursors", "One row per precursor of a recorded slip; only if the sweep records precursors";
+    JobRow = "jobs", "One row per job";
 }
 
 columns! {

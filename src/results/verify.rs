@@ -9,11 +9,10 @@ use crate::results::directory::Results;
 use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{Record, refuse_old};
 use crate::results::layout::{Layout, PartName};
-use crate::results::tables::{self, JobOutcome, JobRow, PrecursorRow, RowOfJob, SlipRow};
+use crate::results::parts::RowsOfJob;
+use crate::results::tables::{self, RowOfJob};
 use crate::sweep::Part;
-use crate::table::arrow::schema;
-use crate::table::columns::columns;
-use crate::table::file::{Dataset, DatasetError, RowCount, footer, has_columns};
+use crate::table::file::{Dataset, DatasetError, footer, has_columns};
 use crate::table::shown::serialize_path;
 use crate::table::storage::StorageError;
 use serde::Serialize;
@@ -338,30 +337,15 @@ fn misplacement(
     if ["sweep", "extension"].into_iter().any(differs) {
         return Some(("it is of another sweep".to_owned(), Remedy::Part));
     }
-    let schema = match table {
-        tables::SLIPS => schema::<SlipRow<'_>>(),
-        tables::PRECURSORS => schema::<PrecursorRow<'_>>(),
-        _ => schema::<JobRow>(),
-    };
-    (!has_columns(texts, &schema)).then(|| ("it is of another table".to_owned(), Remedy::Part))
-}
-
-columns! {
-    /// What the jobs table says about the rows of a job in other tables.
-    struct JobCounts {
-        job_id: String;
-        outcome: JobOutcome;
-        slips: Option<u64>;
-        precursors: Option<u64>;
-    }
+    (!has_columns(texts, &tables::schema_of(table))).then(|| ("it is of another table".to_owned(), Remedy::Part))
 }
 
 /// Holds the rows of all tables of a part against each other, and against the plan.
 fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
     let dataset = |table| Dataset::new(results.layout().storage, vec![results.part_file(table, part)]);
     let path = results.part_file(tables::JOBS, part);
-    let jobs = dataset(tables::JOBS).rows::<JobCounts>().collect::<Result<Vec<_>, _>>()?;
-    let jobs: Vec<JobCounts> = jobs.into_iter().flatten().collect();
+    let jobs = dataset(tables::JOBS).rows::<RowsOfJob>().collect::<Result<Vec<_>, _>>()?;
+    let jobs: Vec<RowsOfJob> = jobs.into_iter().flatten().collect();
     let mut planned = 0;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
@@ -390,11 +374,9 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
                 }
             }
         }
-        for (JobCounts { job_id, outcome, slips, precursors }, rows) in jobs.iter().zip(rows) {
-            let least = if table == tables::SLIPS { *slips } else { *precursors }.unwrap_or(0);
-            let may_exceed = matches!(outcome, JobOutcome::Failed | JobOutcome::TimeLimit);
-            let count = RowCount { least, may_exceed }.check(rows);
-            count.or_else(|problem| damaged(&path, format!("of job {job_id} {problem}")))?;
+        for (job, rows) in jobs.iter().zip(rows) {
+            let checked = job.count(table).check(rows);
+            checked.or_else(|problem| damaged(&path, format!("of job {} {problem}", job.job_id)))?;
         }
     }
     Ok(())

@@ -4,7 +4,7 @@
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
 use crate::observe::Regime;
-use crate::table::columns::{Column, Kind, Part, Row, Table, Value, columns};
+use crate::table::columns::{Column, Kind, Part, Row, Value, columns, tables};
 use std::borrow::Cow;
 use std::sync::LazyLock;
 
@@ -112,10 +112,7 @@ columns! {
     }
 }
 
-impl Table for SetRow {
-    const NAME: &'static str = "sets";
-    const MEANING: &'static str = "One row per parameter set, all seeds together";
-}
+tables! { SetRow = "sets", "One row per parameter set, all seeds together"; }
 
 /// A column of a set that a sweep file may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -58,6 +58,17 @@ pub trait Table: Row {
     const MEANING: &'static str;
 }
 
+/// Row types of tables, each with the name of its table and what a row is.
+macro_rules! tables {
+    ($($row:ty = $name:expr, $meaning:expr;)*) => {
+        $(impl $crate::table::columns::Table for $row {
+            const NAME: &'static str = $name;
+            const MEANING: &'static str = $meaning;
+        })*
+    };
+}
+pub(crate) use tables;
+
 /// A field of a row type: one cell, several that belong together, or all the cells of another row. What the macro `columns` is built on.
 pub trait Part: Sized {
     /// The columns of a field with this name, unit and meaning.
@@ -259,10 +270,7 @@ pub(crate) mod tests {
 
     pub(crate) type Readings = (Reading, Selected<PeriodAndRule>);
 
-    impl Table for Readings {
-        const NAME: &'static str = "readings";
-        const MEANING: &'static str = "One row per reading";
-    }
+    tables! { Readings = "readings", "One row per reading"; }
 
     #[cfg(feature = "sweeps")]
     pub(crate) fn readings() -> [Readings; 2] {
