@@ -90,10 +90,10 @@ impl<'a> Gathering<'a> {
         let mut sets: BTreeMap<String, SetJobs> = BTreeMap::new();
         each_job(&jobs, is_wanted, |job, parameters| {
             let seed = parameters.seed;
-            let new = |set_id: &String| SetJobs::new(set_id.clone(), parameters);
+            let new = |set_id: &String| SetJobs { set_id: set_id.clone(), parameters, ..SetJobs::default() };
             sets.entry(job.set_id).or_insert_with_key(new).push(seed, &job.facts);
         })?;
-        let unordered = sets.values().filter(|set| !set.is_in_order);
+        let unordered = sets.values().filter(|set| set.is_out_of_order);
         let mut unordered: HashMap<String, Vec<(u64, JobFacts)>> =
             unordered.map(|set| (set.set_id.clone(), Vec::new())).collect();
         if !unordered.is_empty() {
@@ -107,8 +107,8 @@ impl<'a> Gathering<'a> {
         for set in &mut sets {
             let Some(mut jobs) = unordered.remove(&set.set_id) else { continue };
             jobs.sort_by_key(|(seed, _)| *seed);
-            let new = SetJobs::new(std::mem::take(&mut set.set_id), std::mem::take(&mut set.parameters));
-            *set = SetJobs { is_in_order: false, ..new };
+            let SetJobs { set_id, parameters, .. } = std::mem::take(set);
+            *set = SetJobs { set_id, parameters, is_out_of_order: true, ..SetJobs::default() };
             for (seed, facts) in &jobs {
                 set.push(*seed, facts);
             }
@@ -163,7 +163,7 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
     let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
     let mut slips = 0;
     for set in sets {
-        let more = if set.is_in_order { set.slips } else { set.slips.saturating_mul(WAITING) };
+        let more = if set.is_out_of_order { set.slips.saturating_mul(WAITING) } else { set.slips };
         slips = more.saturating_add(slips);
         match chunks.last_mut() {
             Some(chunk) if slips <= max_slips => chunk.push(set),
@@ -237,10 +237,10 @@ fn slips_of(
             if here % spacing == 0 {
                 set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
             }
-            if set.jobs.is_in_order {
-                set.push(&slip);
-            } else {
+            if set.jobs.is_out_of_order {
                 set.waiting.push((job.seed, slip));
+            } else {
+                set.push(&slip);
             }
         }
     }
@@ -250,7 +250,7 @@ fn slips_of(
 /// The row of a set of these jobs.
 #[cfg(test)]
 pub(crate) fn row_of(parameters: &Parameters, jobs: &[crate::observe::Measurements]) -> SetRow {
-    let mut set = Gathered::new(SetJobs::new(String::new(), parameters.clone()));
+    let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
     for (seed, job) in (0..).zip(jobs) {
         let averages = job.averages;
         let facts = JobFacts {

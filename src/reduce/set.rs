@@ -24,7 +24,7 @@ const LOCKED_LENGTH: f64 = 0.5;
 const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
 
 /// What the jobs table says about a set.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SetJobs {
     /// Id of the set, 32 hexadecimal characters.
     pub set_id: String,
@@ -45,34 +45,15 @@ pub(super) struct SetJobs {
     pub slip_share: Moments,
     /// How the slider moved in the jobs; mixed if they differ.
     pub regime: Option<Regime>,
-    /// Seed of the last of them, and whether they came in the order of their seeds.
+    /// Seed of the last of them, and whether one came after a higher seed.
     pub last_seed: Option<u64>,
-    pub is_in_order: bool,
+    pub is_out_of_order: bool,
 }
 
 impl SetJobs {
-    /// A set without jobs so far.
-    pub(super) fn new(set_id: String, parameters: Parameters) -> Self {
-        let none = Moments::default();
-        Self {
-            set_id,
-            parameters,
-            finished: 0,
-            failed: 0,
-            slips: 0,
-            without_slips: 0,
-            friction: none,
-            attached_fraction: none,
-            slip_share: none,
-            regime: None,
-            last_seed: None,
-            is_in_order: true,
-        }
-    }
-
     /// A job of the set has ended.
     pub(super) fn push(&mut self, seed: u64, job: &JobFacts) {
-        self.is_in_order &= self.last_seed.is_none_or(|last| last < seed);
+        self.is_out_of_order |= self.last_seed.is_some_and(|last| last >= seed);
         self.last_seed = Some(seed);
         if job.outcome == JobOutcome::Failed {
             self.failed += 1;
@@ -246,7 +227,7 @@ pub(super) mod tests {
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() }
                 .validated()
                 .unwrap();
-        SetJobs { finished: 1, ..SetJobs::new(format!("{amplitude:e} {period}"), parameters) }
+        SetJobs { set_id: format!("{amplitude:e} {period}"), parameters, finished: 1, ..SetJobs::default() }
     }
 
     pub(in crate::reduce) fn slip(interval: Option<f64>, phase: Option<f64>) -> Slip {
