@@ -263,7 +263,6 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
     })
 }
 
-/// The table of cases.
 const TABLE: &str = include_str!("hard_cases.txt");
 
 /// Every case, group by group.

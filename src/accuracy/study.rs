@@ -190,7 +190,6 @@ tables! {
         "One row per set of parameters, solver setting and quantity, in the unit of its column in `slips`";
 }
 
-/// All that a study finds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Set by set, solver by solver.

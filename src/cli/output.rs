@@ -25,7 +25,6 @@ pub fn report(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Writes warnings to standard error.
 pub fn warn(warnings: &[String]) {
     for warning in warnings {
         report(&format!("warning: {warning}"));

@@ -12,7 +12,6 @@ const PLAIN_SPACING: Duration = Duration::from_secs(10);
 /// Steps of the bar: thousandths of the predicted cost.
 const RESOLUTION: u32 = 1000;
 
-/// Shows the events of a run.
 pub struct Progress {
     bar: ProgressBar,
     is_terminal: bool,

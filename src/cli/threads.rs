@@ -5,7 +5,6 @@ use crate::run::threads::{self, Threads};
 use clap::Args;
 use std::num::NonZeroUsize;
 
-/// The flag.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ThreadsFlag {
     /// Threads [default: those that the batch system grants, else all cores]

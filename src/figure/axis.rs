@@ -19,7 +19,6 @@ enum Finer {
     Mantissas,
 }
 
-/// One axis of a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
@@ -52,7 +51,6 @@ const MAX_MULTIPLES: usize = 1000;
 const LARGEST: f64 = 1e100;
 
 impl Axis {
-    /// Linear from `low` to `high`.
     pub(super) fn linear(label: &str, low: f64, high: f64) -> Self {
         Self::linear_with(label, low, high, MAX_TICKS)
     }

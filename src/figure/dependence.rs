@@ -114,7 +114,6 @@ pub(super) fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
     }
 }
 
-/// Its label.
 pub(super) fn label(symbol: Symbol) -> String {
     if symbol == Symbol::Dfs { "Spread of thresholds Δfₛ / fₛ".to_owned() } else { parameter(symbol) }
 }

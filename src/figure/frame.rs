@@ -160,7 +160,6 @@ impl Page<'_> {
 /// A rectangle of data: its ends along x and along y.
 pub(super) type Cell = ((f64, f64), (f64, f64));
 
-/// A rectangle with two axes.
 pub(super) struct Frame {
     pub(super) left: f64,
     pub(super) top: f64,
@@ -226,7 +225,6 @@ impl Frame {
         sheet.clipped([self.left, self.top, self.width, self.height], draw);
     }
 
-    /// A curve through data points.
     pub(super) fn curve(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, stroke: Stroke) {
         sheet.line(points.into_iter().map(|point| self.place(point)).collect(), stroke);
     }

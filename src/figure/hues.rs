@@ -30,7 +30,6 @@ impl Hues {
         }
     }
 
-    /// The ink of a value.
     pub(super) fn ink(&self, value: f64) -> Ink {
         match self {
             Self::Inks(values) => {

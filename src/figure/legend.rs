@@ -29,7 +29,6 @@ pub(super) enum Mark {
 /// An entry of a legend: a mark and a text.
 pub(super) type Entry = (Mark, String);
 
-/// An entry of a legend.
 pub(super) fn entry(mark: Mark, text: impl Into<String>) -> Entry {
     (mark, text.into())
 }

@@ -32,25 +32,18 @@ const SMALL_RADIUS: f64 = 2.5;
 /// What a figure shows: columns by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OwnFigure {
-    /// Column of the x axis.
     pub x: String,
-    /// Column of the y axis.
     pub y: String,
-    /// Column that the colours show.
     pub colour: Option<String>,
     /// Column of which each value has a panel.
     pub panels: Option<String>,
-    /// Whether the x axis is logarithmic.
     pub is_log_x: bool,
-    /// Whether the y axis is.
     pub is_log_y: bool,
     /// Ends of the x axis, those of the data if they are not given.
     pub x_limits: (Option<f64>, Option<f64>),
-    /// Ends of the y axis.
     pub y_limits: (Option<f64>, Option<f64>),
     /// Label of the x axis in the place of that of its column.
     pub x_label: Option<String>,
-    /// Label of the y axis.
     pub y_label: Option<String>,
 }
 
@@ -199,7 +192,6 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
     (low - margin, high + margin)
 }
 
-/// The colours of a column.
 fn hues(values: &Values) -> Result<Hues, BadOption> {
     if values.is_worded() && values.words.len() > INKS.len() {
         let problem =

@@ -25,7 +25,6 @@ pub struct Picture {
     pub(super) scene: Scene,
 }
 
-/// A format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Vectors, for the browser and for changes by hand.
@@ -39,7 +38,6 @@ impl Format {
     /// Those that figures get if none is asked for.
     pub const DEFAULT: [Self; 2] = [Self::Svg, Self::Png];
 
-    /// What its files end in.
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Svg => "svg",
@@ -67,7 +65,6 @@ impl Picture {
         Size { width, height }
     }
 
-    /// The figure in a format.
     pub fn encoded(&self, format: Format) -> Result<Vec<u8>> {
         match format {
             Format::Svg => Ok(self.svg().into_bytes()),
@@ -98,7 +95,6 @@ impl Picture {
         pdf(&self.scene, self.style.points()).map_err(|reason| self.not_encoded(Format::Pdf, &reason))
     }
 
-    /// The figure as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
         let pixels = self.scene.width * self.scene.height * f64::from(self.style.pixels()).powi(2);
         if pixels > MAX_PIXELS {

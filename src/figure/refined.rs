@@ -60,7 +60,6 @@ fn scale(label: &str, (low, high): Ends, margins: Ends, narrow: impl FnOnce() ->
 
 /// Ends of a cell along an axis.
 type Ends = (f64, f64);
-/// A quantity of a set.
 type Quantity = Box<dyn Fn(&SetRow) -> Option<f64>>;
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {

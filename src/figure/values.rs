@@ -11,7 +11,6 @@ use crate::table::columns::{Column, Kind, Row, Value, columns};
 /// Longest meaning that goes into the label of an axis.
 const LONGEST: usize = 40;
 
-/// Name of the column of frequencies.
 pub(super) const FREQUENCY_COLUMN: &str = "frequency";
 
 columns! {

@@ -58,7 +58,6 @@ impl Sampling {
 }
 
 columns! {
-    /// One sample of a trace.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TraceRow {
         time: f64 = "s", "time";
@@ -110,7 +109,6 @@ impl Observer for Trace {
 }
 
 columns! {
-    /// One cell of a space-time map.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MapRow {
         time: f64 = "s", "time";
@@ -180,7 +178,6 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The profile of a slider.
     pub fn new(parameters: &Parameters) -> Self {
         Self { spacing: parameters.slider_length / parameters.blocks as f64, rows: Vec::new() }
     }

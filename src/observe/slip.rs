@@ -223,7 +223,6 @@ impl Active {
 }
 
 impl SlipObserver {
-    /// An observer for one job.
     pub fn new(parameters: &Parameters, recording: &Recording) -> Self {
         let start = Peak { time: 0.0, force: 0.0 };
         let contacts = (parameters.blocks * parameters.contacts_per_block) as u64;

@@ -22,7 +22,6 @@ pub struct CellOfGrid {
 }
 
 columns! {
-    /// A cell of a refined grid.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct CellRow {
         set_id: Option<String> = "", "set at the corner with the lowest values; null if a condition drops it";
@@ -149,7 +148,6 @@ fn class(value: Value<'_>, contrast: &Contrast) -> (String, Option<f64>) {
     }
 }
 
-/// The cells of a sweep.
 pub struct Cells<'a> {
     pub sweep: &'a Sweep,
     pub refinement: &'a Refinement,

@@ -49,7 +49,6 @@ columns! {
 }
 
 columns! {
-    /// The job of a slip.
     #[derive(PartialEq)]
     struct JobOfSlip {
         set_id: String;

@@ -42,7 +42,6 @@ pub struct ReductionSummary {
     pub slips: u64,
     /// Points kept for scatter figures.
     pub points: u64,
-    /// Bins of η.
     pub backbone: Vec<BackboneBin>,
 }
 

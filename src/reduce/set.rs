@@ -109,7 +109,6 @@ impl SetSlips {
         self.slow_front_speed.extend(slip.slow_front_speed);
     }
 
-    /// The statistics of the set.
     pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);

@@ -34,7 +34,6 @@ const COLUMNS: [&str; 14] = [
 const DROPPED: u32 = 7;
 
 columns! {
-    /// The job of a slip.
     #[derive(PartialEq)]
     struct JobOfSlip {
         set_id: String;

@@ -67,7 +67,6 @@ pub(super) struct Census {
 }
 
 columns! {
-    /// What the census counts.
     struct Counted {
         regime: Option<Regime>;
         slips: u64;
@@ -163,7 +162,6 @@ fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
     [begin.trim_end().to_owned(), end.trim_start().to_owned()]
 }
 
-/// The back-bone of the reduced data.
 pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, DatasetError> {
     let mut columns = Columns::new::<BackboneBin>();
     for bin in read_reduced::<BackboneBin>(layout)? {

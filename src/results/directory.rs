@@ -90,7 +90,6 @@ impl<'a> Results<'a> {
         Ok(results)
     }
 
-    /// The directory of these records.
     pub(super) fn new(layout: &Layout<'a>, records: Vec<Record>) -> Result<Self, ResultsError> {
         let extensions = extension_file::extensions(layout, &records)?;
         Ok(Self { layout: layout.clone(), records, extensions })
@@ -114,7 +113,7 @@ impl<'a> Results<'a> {
             return Err(ResultsError::refused(layout.root(), problem));
         }
         let mut differences = found.version_differences();
-        differences.extend(found.sweep().difference(sweep).iter().map(ToString::to_string));
+        differences.extend(found.sweep().differences(sweep));
         found.refuse(&differences, "choose another directory with --out, or undo the change")?;
         Ok(found)
     }
@@ -267,7 +266,6 @@ impl<'a> Results<'a> {
         &self.extensions[self.extensions.len() - 1].sweep
     }
 
-    /// All jobs in their parts.
     pub fn plan(&self) -> Plan<'_> {
         Plan::new(&self.extensions)
     }

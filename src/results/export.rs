@@ -169,7 +169,6 @@ fn prepare(storage: &dyn Storage, folder: &Path) -> Result<PathBuf, ResultsError
     Ok(unfinished)
 }
 
-/// The jobs of a part.
 struct Jobs {
     rows: RecordBatch,
     by_id: HashMap<String, u32>,

@@ -9,7 +9,6 @@ use crate::results::workers::Member;
 use crate::sweep::{Extension, Round, Standing};
 use serde::{Deserialize, Serialize};
 
-/// Name of the lock.
 const LOCK: &str = "round";
 
 /// How far the rounds of a sweep are.

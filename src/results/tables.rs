@@ -96,11 +96,8 @@ pub fn relabel<S, T>(label: &Label<S>) -> Label<T> {
     (names.clone(), Selected::new(selected.parameters.clone()), *loading)
 }
 
-/// A row of the slips table.
 pub type SlipRow<'a> = (&'a Label<DriveAndSeed>, &'a Slip);
-/// A row of the precursors table.
 pub type PrecursorRow<'a> = (&'a Label<DriveAndSeed>, &'a Precursor);
-/// A row of the jobs table.
 pub type JobRow = (Label<All>, JobRecord);
 
 tables! {

@@ -24,7 +24,6 @@ const WRITER: &str = "repair";
 /// Keys of a footer that say which program wrote a file, as far as its numbers depend on it.
 const VERSIONS: [&str; 2] = ["model_version", "rng_scheme"];
 
-/// What a verification found.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Verification {
     /// Whether nothing is damaged; parts may be missing.

@@ -29,7 +29,6 @@ use std::time::{Duration, Instant, SystemTime};
 pub const BEAT: Duration = if cfg!(test) { Duration::from_secs(1) } else { Duration::from_secs(5) };
 /// A worker of another host is dead if its file is older than one's own by this time.
 pub const SILENCE: Duration = if cfg!(test) { Duration::from_secs(4) } else { Duration::from_mins(1) };
-/// Name of the thread that beats.
 pub(crate) const BEAT_THREAD: &str = "beat";
 /// What the names of workers, and of their staging folders, begin with.
 const PREFIX: &str = "worker-";

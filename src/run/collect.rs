@@ -4,10 +4,9 @@
 use crate::results::ResultsError;
 use crate::results::layout::PartName;
 use crate::results::parts::Outcome;
-use crate::run::cpu;
 use crate::run::take::{PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
-use crate::run::{Events, Joined, Kernel, RunEvent, RunReport};
+use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu};
 use crate::solver::SimulationError;
 use crate::sweep::Job;
 use std::any::Any;

@@ -36,7 +36,6 @@ pub struct Overview {
     pub predicted_cost_missing: f64,
 }
 
-/// The state of a results directory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
     pub name: String,

@@ -7,9 +7,8 @@
 use crate::results::claims::{Claims, Standing};
 use crate::results::layout::PartName;
 use crate::results::pending::{Again, PartState, Pending};
-use crate::results::tables;
 use crate::results::workers::{Living, Member};
-use crate::results::{Results, ResultsError};
+use crate::results::{Results, ResultsError, tables};
 use crate::run::walltime::Walltime;
 use crate::sweep::{Outline, Part};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -78,7 +77,6 @@ impl<'a> Share<'a> {
         Ok(Self { results, parts, retry_failed, pending: Pending::look_up(results)? })
     }
 
-    /// The part of an outline.
     pub fn part(&self, outline: &Outline) -> Part {
         self.results.plan().part(outline)
     }

@@ -33,7 +33,6 @@ impl Sweep {
         self.seed_axis().map_or(1, |axis| self.axes[axis + 1..].iter().map(Axis::len).product())
     }
 
-    /// The rows of a point.
     pub fn rows(&self, point: u64) -> Vec<u64> {
         let mut rows = vec![0; self.axes.len()];
         find_rows(point, &self.row_counts(), &mut rows);
@@ -58,7 +57,6 @@ impl Sweep {
         Some((quantity.key(), value))
     }
 
-    /// The set of a point.
     pub fn set_of(&self, point: u64) -> u64 {
         let stride = self.seed_stride();
         point - point / stride % self.seed_count() * stride

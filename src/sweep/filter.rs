@@ -20,7 +20,6 @@ use std::cmp::Ordering;
 /// Most words and signs of a condition: it is read and evaluated by recursion.
 const MAX_TOKENS: usize = 500;
 
-/// A condition on a point.
 #[derive(Clone, Debug)]
 pub(super) struct Condition(Expression);
 
@@ -33,7 +32,6 @@ enum Expression {
     Combined(Box<(Self, Operator, Self)>),
 }
 
-/// An operator between two expressions.
 #[derive(Clone, Copy, Debug)]
 struct Operator {
     sign: &'static str,

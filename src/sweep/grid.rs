@@ -14,7 +14,6 @@ use super::rounds::Rounds;
 use crate::model::{Parameters, Symbol};
 use crate::observe::Recording;
 use crate::solver::Solver;
-use std::fmt;
 use std::ops::Range;
 
 #[derive(Clone, Debug)]
@@ -31,30 +30,12 @@ pub struct Sweep {
     pub(super) rounds: Option<Rounds>,
 }
 
-/// Something besides axes and conditions in which two sweeps differ.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
-    /// Section and key, such as `model.K`.
-    pub key: String,
-    /// The value in the first sweep.
-    pub before: String,
-    /// The value in the other.
-    pub after: String,
-}
-
-impl fmt::Display for Difference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} -> {}", self.key, self.before, self.after)
-    }
-}
-
 impl Sweep {
     /// The name: letters, digits, `_` and `-`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The text of the file.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -63,7 +44,6 @@ impl Sweep {
         &self.recording
     }
 
-    /// The solver of every job.
     pub const fn solver(&self) -> Solver {
         self.solver
     }
@@ -86,7 +66,6 @@ impl Sweep {
         self.axes.iter().map(Axis::len).product()
     }
 
-    /// The numbers of all points.
     pub(super) fn points(&self) -> Range<u64> {
         0..self.point_count()
     }
@@ -117,19 +96,18 @@ impl Sweep {
         is_job.then(|| self.axes.iter().zip(rows).fold(0, |number, (axis, row)| number * axis.len() + row))
     }
 
-    /// The id of a job.
     pub fn job_id(&self, parameters: &Parameters) -> Id {
         self.identity.job(parameters)
     }
 
-    /// The id of the set of a job.
     pub fn set_id(&self, parameters: &Parameters) -> Id {
         self.identity.set(parameters)
     }
 
-    /// In what another sweep differs besides axes and conditions: name, model, recording, solver. Parameters that an axis
-    /// of either sets are left out, as an axis may be added, changed or dropped.
-    pub fn difference(&self, other: &Self) -> Vec<Difference> {
+    /// In what another sweep differs besides axes and conditions: name, model, recording, solver, each as section and key
+    /// with the value before and after. Parameters that an axis of either sets are left out, as an axis may be added,
+    /// changed or dropped.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
         let moved = |symbol| self.moves(symbol) || other.moves(symbol);
         let values = |sweep: &Self| {
             let model = Symbol::ALL
@@ -147,8 +125,9 @@ impl Sweep {
         before
             .iter()
             .chain(added)
-            .map(|(key, _)| Difference { key: key.clone(), before: value(&before, key), after: value(&after, key) })
-            .filter(|difference| difference.before != difference.after)
+            .map(|(key, _)| (key, value(&before, key), value(&after, key)))
+            .filter(|(_, before, after)| before != after)
+            .map(|(key, before, after)| format!("{key}: {before} -> {after}"))
             .collect()
     }
 

@@ -34,7 +34,7 @@ mod source;
 mod tests;
 
 pub use cost::predicted_cost;
-pub use grid::{Difference, Sweep};
+pub use grid::Sweep;
 pub use job::{Id, Identity, Job};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};

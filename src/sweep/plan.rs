@@ -136,7 +136,7 @@ fn own_jobs<'a>(
 }
 
 impl<'a> Plan<'a> {
-    /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::difference`].
+    /// The plan of these extensions. Their sweeps differ in axes, conditions and bounds only, see [`Sweep::differences`].
     pub const fn new(extensions: &'a [Extension]) -> Self {
         Self { extensions }
     }

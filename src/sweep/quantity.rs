@@ -11,7 +11,6 @@ use std::ops::RangeInclusive;
 /// A parameter, or one of the two quantities that stand for the period T.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
-    /// A parameter of the model.
     Parameter(Symbol),
     /// η = 2πΔ/(T V0).
     Eta,
@@ -98,7 +97,6 @@ impl Point {
         fits.expect("values are checked when the file is read");
     }
 
-    /// Whether the modulation is on.
     pub fn is_modulated(&self) -> bool {
         self.parameters.modulation_amplitude > 0.0
     }

@@ -127,7 +127,6 @@ impl Rounds {
 }
 
 impl Round {
-    /// Whether it has a point.
     pub fn has(&self, point: u64) -> bool {
         contains(&self.points, point)
     }

@@ -120,7 +120,6 @@ pub struct Statistic {
     pub key: &'static str,
     /// Its SI unit; empty for a pure number or a word.
     pub unit: &'static str,
-    /// What can be asked of it.
     pub kind: StatisticKind,
 }
 
@@ -158,7 +157,6 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
 });
 
 impl Statistic {
-    /// Whether it has a confidence interval.
     pub const fn has_interval(self) -> bool {
         matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
     }

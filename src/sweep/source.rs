@@ -19,7 +19,6 @@ use toml::de::{DeTable, DeValue};
 /// A sweep file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// The file cannot be read.
     #[error("{}: cannot be read: {source}; check the path and its permissions", shown(path))]
     Unreadable {
         path: PathBuf,
@@ -35,7 +34,6 @@ pub enum SweepError {
     },
 }
 
-/// A mistake in a sweep file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// Line, counted from 1.
@@ -117,7 +115,6 @@ impl<'a> Source<'a> {
         self.text.as_bytes().get(stretch).unwrap_or_default().split(|byte| *byte == b'\n').count() - 1
     }
 
-    /// The tables of the text.
     pub fn table(&self) -> Result<DeTable<'a>, Refused> {
         // The errors of a parser that goes on after one mostly follow from it.
         DeTable::parse(self.text).map(Spanned::into_inner).map_err(|error| {

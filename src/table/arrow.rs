@@ -80,7 +80,6 @@ pub struct RowBuffer {
     rows: usize,
 }
 
-/// The cells of one column.
 enum Cells {
     Real(Vec<Option<f64>>),
     Count(Vec<Option<i64>>),
@@ -104,7 +103,6 @@ impl RowBuffer {
         self.rows
     }
 
-    /// Whether there is no row.
     pub const fn is_empty(&self) -> bool {
         self.rows == 0
     }

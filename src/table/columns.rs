@@ -22,7 +22,6 @@
 pub use super::value::{Field, Kind, Value};
 use std::borrow::Cow;
 
-/// A column of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     pub name: Cow<'static, str>,
@@ -31,7 +30,6 @@ pub struct Column {
     /// One line, without a full stop.
     pub meaning: &'static str,
     pub kind: Kind,
-    /// Whether cells may be null.
     pub nullable: bool,
 }
 

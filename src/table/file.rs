@@ -13,9 +13,8 @@ use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
 use arrow_schema::{DataType, Field, Schema};
 use bytes::Bytes;
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
@@ -59,13 +58,11 @@ impl Footer {
         self.with("sweep_name", name).with("sweep", text)
     }
 
-    /// The same, with one more text.
     pub fn with(mut self, key: &str, text: &str) -> Self {
         self.0.insert(key.to_owned(), text.to_owned());
         self
     }
 
-    /// The text under a key.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.0.get(key).map(String::as_str)
     }
@@ -179,7 +176,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// The rows, of this type.
     pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
         arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
     }
@@ -261,7 +257,6 @@ impl<'a> Dataset<'a> {
     }
 }
 
-/// Reads files one after the other.
 struct Reader<'a> {
     storage: &'a dyn Storage,
     files: std::vec::IntoIter<(PathBuf, Option<RowCount>)>,

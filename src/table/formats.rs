@@ -14,7 +14,6 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How rows are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     Parquet,
@@ -34,7 +33,6 @@ impl Format {
     }
 }
 
-/// Writes one file.
 pub struct RowWriter {
     path: PathBuf,
     encoder: Encoder,
