@@ -3,7 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::run::no_standing_figure;
-use crate::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
+use crate::figure::{Format, Limits, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
@@ -74,10 +74,6 @@ Examples:
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";
 
-/// The ends of an axis.
-#[derive(Clone, Copy, Debug, Default)]
-struct Limits(Option<f64>, Option<f64>);
-
 fn limits(text: &str) -> Result<Limits, &'static str> {
     const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
     let end = |text: &str| match text.trim() {
@@ -85,7 +81,7 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
         number => number.parse().ok().filter(|end: &f64| end.is_finite()).map(Some).ok_or(WANTED),
     };
     match text.split_once(':') {
-        Some((low, high)) if text.trim() != ":" => Ok(Limits(end(low)?, end(high)?)),
+        Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
         _ => Err(WANTED),
     }
 }
@@ -93,7 +89,6 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
 impl Arguments {
     fn own(&self) -> Option<OwnFigure> {
         let is_log = |axis| self.log.as_ref().is_some_and(|axes| axes.contains(axis));
-        let [x_limits, y_limits] = [self.xlim, self.ylim].map(Option::unwrap_or_default);
         Some(OwnFigure {
             x: self.x.clone()?,
             y: self.y.clone()?,
@@ -101,8 +96,8 @@ impl Arguments {
             panels: self.panels.clone(),
             is_log_x: is_log('x'),
             is_log_y: is_log('y'),
-            x_limits: (x_limits.0, x_limits.1),
-            y_limits: (y_limits.0, y_limits.1),
+            x_limits: self.xlim.unwrap_or_default(),
+            y_limits: self.ylim.unwrap_or_default(),
             x_label: self.xlabel.clone(),
             y_label: self.ylabel.clone(),
         })

@@ -29,6 +29,9 @@ const LINE_WIDTH: f64 = 1.0;
 const FEW_SETS: usize = 500;
 const SMALL_RADIUS: f64 = 2.5;
 
+/// The ends of an axis.
+pub type Limits = (Option<f64>, Option<f64>);
+
 /// What a figure shows: columns by name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OwnFigure {
@@ -40,8 +43,8 @@ pub struct OwnFigure {
     pub is_log_x: bool,
     pub is_log_y: bool,
     /// Ends of the x axis, those of the data if they are not given.
-    pub x_limits: (Option<f64>, Option<f64>),
-    pub y_limits: (Option<f64>, Option<f64>),
+    pub x_limits: Limits,
+    pub y_limits: Limits,
     /// Label of the x axis in the place of that of its column.
     pub x_label: Option<String>,
     pub y_label: Option<String>,
@@ -52,7 +55,7 @@ struct Asked<'a> {
     option: &'static str,
     values: &'a Values,
     is_log: bool,
-    limits: (Option<f64>, Option<f64>),
+    limits: Limits,
     label: &'a Option<String>,
 }
 

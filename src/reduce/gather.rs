@@ -16,7 +16,7 @@ use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
 use crate::results::layout::Layout;
 use crate::results::parts::committed_files;
-use crate::results::tables::{All, JOBS, JobOutcome, SLIPS};
+use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
 use crate::table::columns::columns;
 use crate::table::file::{Dataset, DatasetError};
@@ -45,14 +45,6 @@ columns! {
         attached_fraction: Option<f64>;
         slip_share: Option<f64>;
         regime: Option<Regime>;
-    }
-}
-
-columns! {
-    #[derive(PartialEq)]
-    struct JobOfSlip {
-        set_id: String;
-        seed: u64;
     }
 }
 

@@ -49,10 +49,7 @@ impl<const D: usize> Sequences<D> {
     pub(super) fn estimate(mut self) -> Estimate<D> {
         let count = self.values.len();
         let n = count as f64;
-        let mut total = [0.0; D];
-        for value in &self.values {
-            add(&mut total, value);
-        }
+        let total = sum(&self.values);
         let mean = total.map(|sum| sum / n);
         for value in &mut self.values {
             for (component, mean) in value.iter_mut().zip(mean) {
@@ -100,13 +97,7 @@ impl<const D: usize> Sequences<D> {
     /// Covariance of the sum by the spread of the sums of jobs; `None` for fewer than [`MANY_JOBS`].
     fn spread_of_sums(&self) -> Option<Matrix<D>> {
         let jobs = self.starts.len();
-        let sums = self.jobs().map(|job| {
-            let mut sum = [0.0; D];
-            for value in job {
-                add(&mut sum, value);
-            }
-            [sum]
-        });
+        let sums = self.jobs().map(|job| [sum(job)]);
         (jobs >= MANY_JOBS).then(|| Self::of(sums).products(0).times(jobs as f64 / (jobs as f64 - 1.0)))
     }
 
@@ -134,6 +125,13 @@ fn is_wide(lag: f64, time: f64, n: f64) -> bool {
     }
     let decay = DECAY / libm::log((2.0 * time + 1.0) / (2.0 * time - 1.0));
     libm::exp(-lag / decay) < decay / (lag * n).sqrt()
+}
+
+fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
+    values.iter().fold([0.0; D], |mut sum, value| {
+        add(&mut sum, value);
+        sum
+    })
 }
 
 fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {

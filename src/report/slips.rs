@@ -4,8 +4,8 @@ use super::tables::described;
 use crate::observe::Slip;
 use crate::results::Results;
 use crate::results::parts::committed_files;
-use crate::results::tables::{JOBS, SLIPS};
-use crate::table::columns::{Row, Value, columns};
+use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::table::columns::{Row, Value};
 use crate::table::file::DatasetError;
 use serde::Serialize;
 use serde_json::Value as Json;
@@ -32,14 +32,6 @@ const COLUMNS: [&str; 14] = [
 ];
 /// Bits of a single-precision number that are dropped: what is left has a relative error of 8e-6.
 const DROPPED: u32 = 7;
-
-columns! {
-    #[derive(PartialEq)]
-    struct JobOfSlip {
-        set_id: String;
-        seed: u64;
-    }
-}
 
 /// What the page says of its slips.
 #[derive(Debug, Serialize)]

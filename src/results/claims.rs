@@ -4,7 +4,6 @@
 //! the winner dead makes the next generation. A claim stays while anybody is at work, as one who has looked before may not
 //! know yet what became of it. Who has lost some claims lists them all, and does not ask for one after the other.
 
-use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::workers::{Living, Member};
 use crate::table::storage::StorageError;
@@ -13,7 +12,6 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 /// The claims as they were when they were listed.
 #[derive(Debug)]
 pub struct Claims<'a> {
-    results: &'a Results<'a>,
     member: &'a Member<'a>,
     /// The last generation of each.
     generations: HashMap<String, u64>,
@@ -30,15 +28,15 @@ pub enum Standing<'a> {
 }
 
 impl<'a> Claims<'a> {
-    pub fn list(results: &'a Results<'a>, member: &'a Member<'a>) -> Result<Self, StorageError> {
-        results.layout().ensure_folder(&results.layout().claims())?;
-        let mut claims = Self { results, member, generations: HashMap::new(), own: HashSet::new() };
+    pub fn list(member: &'a Member<'a>) -> Result<Self, StorageError> {
+        member.layout().ensure_folder(&member.layout().claims())?;
+        let mut claims = Self { member, generations: HashMap::new(), own: HashSet::new() };
         claims.refresh()?;
         Ok(claims)
     }
 
     pub fn refresh(&mut self) -> Result<(), StorageError> {
-        let names = self.results.layout().storage.list(&self.results.layout().claims())?;
+        let names = self.member.layout().storage.list(&self.member.layout().claims())?;
         for name in &names {
             if let Some((what, generation)) = name.to_str().and_then(|name| name.rsplit_once('.'))
                 && let Ok(generation) = generation.parse::<u64>()
@@ -71,7 +69,7 @@ impl<'a> Claims<'a> {
 
     /// Makes a claim; false if another was first.
     pub fn take(&mut self, what: &str, generation: u64) -> Result<bool, ResultsError> {
-        let layout = self.results.layout();
+        let layout = self.member.layout();
         let path = layout.claims().join(format!("{what}.{generation}"));
         let is_made = layout.storage.link_new(&self.member.claim(), &path)?;
         // A network file system may have made it and been asked again.
@@ -85,7 +83,7 @@ impl<'a> Claims<'a> {
 
     /// The worker that has made a claim; empty if it is gone.
     fn owner(&self, what: &str, generation: u64) -> Result<String, StorageError> {
-        let layout = self.results.layout();
+        let layout = self.member.layout();
         match layout.storage.read(&layout.claims().join(format!("{what}.{generation}"))) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
             name => Ok(String::from_utf8_lossy(&name?).into_owned()),

@@ -285,7 +285,7 @@ impl<'a> Results<'a> {
     }
 
     /// Names of the tables, that of the jobs last.
-    pub fn tables(&self) -> impl Iterator<Item = &'static str> + use<> {
+    pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
         let precursors = self.sweep().recording().precursors.then_some(tables::PRECURSORS);
         [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
     }

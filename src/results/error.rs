@@ -61,14 +61,12 @@ impl fmt::Display for ResultsError {
         let Self { kind, path, problem } = self;
         let path = shown(path);
         match kind {
-            ErrorKind::Refused | ErrorKind::Busy | ErrorKind::Stopped | ErrorKind::Disk => {
-                write!(f, "{path}: {problem}")
-            }
             ErrorKind::Damaged => write!(
                 f,
                 "{path}: damaged: {}; `stickslip verify` on the results directory reports how to repair it",
                 shown_text(problem)
             ),
+            _ => write!(f, "{path}: {problem}"),
         }
     }
 }

@@ -78,7 +78,7 @@ impl Results<'_> {
         format: Format,
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
-        let done = self.done_parts()?;
+        let (storage, done) = (self.layout().storage, self.done_parts()?);
         let mut exported = Exported::default();
         let mut parts = Vec::new();
         for part in self.plan().outlines() {
@@ -95,7 +95,7 @@ impl Results<'_> {
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
             let name = format!("{table}.{}", format.extension());
-            let file = self.layout().storage.create(&to.join(&name))?;
+            let file = storage.create(&to.join(&name))?;
             let schema = schema_of(self.joined(&tables::schema_of(table)));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
@@ -103,7 +103,8 @@ impl Results<'_> {
                 progress((number * parts.len() + done) as u64, total);
                 rows += self.copy_part(table, part, &schema, &mut writer)?;
             }
-            let bytes = writer.finish()?;
+            writer.finish()?;
+            let bytes = storage.length(&to.join(&name))?;
             exported.files.push(ExportedFile { name, rows, bytes });
         }
         progress(total, total);
@@ -146,9 +147,9 @@ impl Results<'_> {
         };
         let mut copied = 0;
         for batch in rows.batches() {
-            let batch = batch?;
-            writer.write(&jobs.join(&batch, schema)?)?;
-            copied += batch.rows.num_rows() as u64;
+            let Batch { path, rows } = batch?;
+            writer.write(&jobs.join(&rows, schema).map_err(DatasetError::damaged(&path))?)?;
+            copied += rows.num_rows() as u64;
         }
         Ok(copied)
     }
@@ -187,12 +188,8 @@ impl Jobs {
         Ok(Self { rows, by_id })
     }
 
-    /// The rows of a batch with the columns of a schema: its own, those of its jobs, and the frequency.
-    fn join(&self, batch: &Batch, schema: &SchemaRef) -> Result<RecordBatch, DatasetError> {
-        self.joined(&batch.rows, schema).map_err(DatasetError::damaged(&batch.path))
-    }
-
-    fn joined(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+    /// Rows with the columns of a schema: their own, those of their jobs, and the frequency.
+    fn join(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
         let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
         let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
         let job = |id: Option<&str>| id.and_then(|id| self.by_id.get(id)).copied();

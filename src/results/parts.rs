@@ -25,6 +25,16 @@ use std::path::PathBuf;
 /// What a job of a part ended with: its measurements, or why it failed.
 pub type Outcome = Result<Measurements, String>;
 
+/// What was run of a part.
+#[derive(Clone, Copy, Debug)]
+pub struct PartRun<'a> {
+    pub part: &'a Part,
+    /// What its jobs ended with, by position.
+    pub outcomes: &'a BTreeMap<usize, Outcome>,
+    /// Positions of its jobs that an earlier run has spilled.
+    pub spilled: &'a BTreeSet<usize>,
+}
+
 impl Results<'_> {
     /// The file of a part in a table.
     pub fn part_file(&self, table: &str, part: &Outline) -> PathBuf {
@@ -36,31 +46,19 @@ impl Results<'_> {
     }
 
     /// Spills the outcomes of some jobs of a part, beside those that are spilled already.
-    pub fn spill(
-        &self,
-        member: &Member<'_>,
-        part: &Part,
-        outcomes: &BTreeMap<usize, Outcome>,
-        spilled: &BTreeSet<usize>,
-    ) -> Result<(), ResultsError> {
-        let is_finished = |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
-        let from = (!spilled.is_empty()).then_some(Place::Spill);
-        self.write(member, part, outcomes, is_finished, from, Place::Spill)
+    pub fn spill(&self, member: &Member<'_>, run: PartRun<'_>) -> Result<(), ResultsError> {
+        let is_finished = |position: &usize| run.outcomes.contains_key(position) || run.spilled.contains(position);
+        let from = (!run.spilled.is_empty()).then_some(Place::Spill);
+        self.write(member, run, is_finished, from, Place::Spill)
     }
 
-    /// Commits a part: the outcomes of its jobs by position. Jobs without one keep the rows that they have, in the tables
-    /// or `spilled`.
+    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or spilled.
     /// On an error the part counts as before, or as done, but never as half done.
-    pub fn commit(
-        &self,
-        member: &Member<'_>,
-        part: &Part,
-        outcomes: &BTreeMap<usize, Outcome>,
-        spilled: &BTreeSet<usize>,
-    ) -> Result<(), ResultsError> {
+    pub fn commit(&self, member: &Member<'_>, run: PartRun<'_>) -> Result<(), ResultsError> {
+        let PartRun { part, outcomes, spilled } = run;
         let keeps = outcomes.len() < part.jobs.len();
         let from = if spilled.is_empty() { Place::Tables } else { Place::Spill };
-        self.write(member, part, outcomes, |_| true, keeps.then_some(from), Place::Tables)?;
+        self.write(member, run, |_| true, keeps.then_some(from), Place::Tables)?;
         if spilled.is_empty() { Ok(()) } else { Ok(self.remove_spilled(part)?) }
     }
 
@@ -81,7 +79,7 @@ impl Results<'_> {
 
     fn remove_spilled(&self, part: &Outline) -> Result<(), StorageError> {
         // Jobs first: what is spilled without them is nothing.
-        for table in self.tables().collect::<Vec<_>>().into_iter().rev() {
+        for table in self.tables().rev() {
             match self.layout().storage.remove(&self.spilled_file(table, part)) {
                 // Another worker was first.
                 Err(error) if error.kind() == ErrorKind::NotFound => (),
@@ -95,8 +93,7 @@ impl Results<'_> {
     fn write(
         &self,
         member: &Member<'_>,
-        part: &Part,
-        outcomes: &BTreeMap<usize, Outcome>,
+        PartRun { part, outcomes, .. }: PartRun<'_>,
         is_written: impl Fn(&usize) -> bool,
         from: Option<Place>,
         to: Place,

@@ -155,6 +155,14 @@ impl JobRecord {
 }
 
 columns! {
+    #[derive(PartialEq)]
+    pub struct JobOfSlip {
+        set_id: String;
+        seed: u64;
+    }
+}
+
+columns! {
     /// Any row of a job, in any table.
     pub(super) struct RowOfJob {
         job_id: String;

@@ -233,7 +233,7 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
     let layout = results.layout();
     // In this order: whoever has its jobs there has had the rest there before.
     let mut there: HashMap<&str, HashSet<PartName>> = HashMap::new();
-    for table in results.tables().collect::<Vec<_>>().into_iter().rev() {
+    for table in results.tables().rev() {
         there.insert(table, layout.parts_in(&layout.table(table))?);
     }
     let mut planned = HashSet::new();
@@ -279,9 +279,7 @@ fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
 
 /// The files of a part, that of its jobs first.
 fn files_of(results: &Results<'_>, part: &Part) -> Vec<PathBuf> {
-    let mut files: Vec<PathBuf> = results.tables().map(|table| results.part_file(table, part)).collect();
-    files.reverse();
-    files
+    results.tables().rev().map(|table| results.part_file(table, part)).collect()
 }
 
 /// What is wrong with the files of a part, which it has in these tables.

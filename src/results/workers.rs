@@ -485,7 +485,7 @@ pub(crate) mod tests {
         let root = tempfile::tempdir().unwrap();
         let results = results(root.path());
         join(&results, |first| {
-            let mut claims = Claims::list(&results, first).unwrap();
+            let mut claims = Claims::list(first).unwrap();
             assert!(claims.take("part", 0).unwrap());
             let standing =
                 |claims: &Claims<'_>, member: &Member<'_>| match claims.standing("part", &member.others().unwrap()) {
@@ -496,7 +496,7 @@ pub(crate) mod tests {
                 };
             assert_eq!(standing(&claims, first), Ok(None));
             join(&results, |second| {
-                let mut others = Claims::list(&results, second).unwrap();
+                let mut others = Claims::list(second).unwrap();
                 assert_eq!(standing(&others, second), Err(first.name().to_owned()));
                 assert!(!others.take("part", 0).unwrap());
                 assert!(others.take("other", 0).unwrap());
@@ -506,7 +506,7 @@ pub(crate) mod tests {
             assert!(claims.last("other").is_some(), "its owner has ended, but others are there");
             fs::write(results.layout().claims().join("part.1"), "worker-dead").unwrap();
             join(&results, |third| {
-                let mut others = Claims::list(&results, third).unwrap();
+                let mut others = Claims::list(third).unwrap();
                 assert_eq!(standing(&others, third), Ok(Some(2)));
                 assert!(others.take("part", 2).unwrap());
             });

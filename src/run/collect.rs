@@ -3,7 +3,7 @@
 
 use crate::results::ResultsError;
 use crate::results::layout::PartName;
-use crate::results::parts::Outcome;
+use crate::results::parts::{Outcome, PartRun};
 use crate::run::take::{PartJob, Share, Taken, Work};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu};
@@ -67,6 +67,12 @@ struct OpenPart {
     measured: JobTime,
 }
 
+impl OpenPart {
+    fn run(&self) -> PartRun<'_> {
+        PartRun { part: &self.of.part, outcomes: &self.outcomes, spilled: &self.of.spilled }
+    }
+}
+
 pub(super) struct Collector<'a, 'e> {
     joined: &'a Joined<'a>,
     share: &'a Share<'a>,
@@ -123,11 +129,10 @@ impl<'a, 'e> Collector<'a, 'e> {
     /// Keeps the finished jobs of parts that are not whole.
     fn spill(&mut self) -> Result<(), ResultsError> {
         for open in std::mem::take(&mut self.open).values() {
-            let Taken { part, spilled, again, .. } = &*open.of;
-            if *again {
+            if open.of.again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(self.joined.member, part, &open.outcomes, spilled)?;
+                self.share.results.spill(self.joined.member, open.run())?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -249,8 +254,8 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
-        let Taken { part, spilled, .. } = &*whole.of;
-        self.share.results.commit(self.joined.member, part, &whole.outcomes, spilled)?;
+        let run @ PartRun { part, .. } = whole.run();
+        self.share.results.commit(self.joined.member, run)?;
         self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);

@@ -239,7 +239,7 @@ impl Joined<'_> {
     fn take_reduction(&self) -> Result<Option<(Claims<'_>, u64)>, ResultsError> {
         // In this order: who has ended has left its mark before.
         let others = self.member.others()?;
-        let mut claims = Claims::list(self.results, self.member)?;
+        let mut claims = Claims::list(self.member)?;
         let last = claims.last(REDUCTION);
         let is_taken = match claims.standing(REDUCTION, &others)? {
             Standing::Own => true,
@@ -254,7 +254,7 @@ impl Joined<'_> {
     /// Claims the reduction for one that comes after the jobs that this worker runs again: what another reduces
     /// meanwhile, or has reduced, lacks them.
     fn claim_next_reduction(&self) -> Result<(), ResultsError> {
-        let mut claims = Claims::list(self.results, self.member)?;
+        let mut claims = Claims::list(self.member)?;
         while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         Ok(())
     }

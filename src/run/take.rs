@@ -96,7 +96,7 @@ impl<'a> Share<'a> {
     /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
     /// nothing.
     pub fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
-        let (others, claims) = (member.others()?, Claims::list(self.results, member)?);
+        let (others, claims) = (member.others()?, Claims::list(member)?);
         let done = self.results.done_parts()?;
         let mut left = Left::default();
         for part in self.parts.iter().filter(|part| !done.has(part)) {
@@ -135,7 +135,7 @@ pub(super) struct Work<'a> {
 
 impl<'a> Work<'a> {
     pub fn new(share: &'a Share<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
-        let (others, claims) = (member.others()?, Claims::list(share.results, member)?);
+        let (others, claims) = (member.others()?, Claims::list(member)?);
         let parts = share.parts.iter().filter(|part| !share.pending.done.has(part) || share.may_run_again());
         let mut pass: Vec<&Outline> = parts.collect();
         if !others.is_empty() && !pass.is_empty() {

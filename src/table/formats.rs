@@ -10,7 +10,6 @@ use arrow_schema::SchemaRef;
 use clap::ValueEnum;
 use parquet::arrow::ArrowWriter;
 use parquet::errors::ParquetError;
-use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -39,27 +38,9 @@ pub struct RowWriter {
 }
 
 enum Encoder {
-    Parquet(Box<ArrowWriter<Counted>>),
-    Csv(Box<csv::Writer<Counted>>),
-    Arrow(Box<FileWriter<Counted>>),
-}
-
-/// A file that counts its bytes.
-struct Counted {
-    file: StoredFile,
-    bytes: u64,
-}
-
-impl Write for Counted {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes).map_err(|error| error.source)?;
-        self.bytes += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+    Parquet(Box<ArrowWriter<StoredFile>>),
+    Csv(Box<csv::Writer<StoredFile>>),
+    Arrow(Box<FileWriter<StoredFile>>),
 }
 
 fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
@@ -69,7 +50,6 @@ fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
 impl RowWriter {
     pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, DatasetError> {
         let path = file.path().to_owned();
-        let file = Counted { file, bytes: 0 };
         let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
                 Format::Parquet => {
@@ -97,17 +77,15 @@ impl RowWriter {
         written.map_err(DatasetError::unwritten(&self.path))
     }
 
-    /// Writes what is left and brings the file to the disk; returns its number of bytes.
-    pub fn finish(self) -> Result<u64, DatasetError> {
-        let counted = match self.encoder {
+    /// Writes what is left and brings the file to the disk.
+    pub fn finish(self) -> Result<(), DatasetError> {
+        let file = match self.encoder {
             Encoder::Parquet(writer) => writer.into_inner(),
             Encoder::Csv(writer) => writer.into_inner().map_err(|error| of_csv(error.into_error())),
             Encoder::Arrow(mut writer) => {
                 writer.finish().and_then(|()| writer.into_inner()).map_err(ParquetError::from)
             }
         };
-        let Counted { mut file, bytes } = counted.map_err(DatasetError::unwritten(&self.path))?;
-        file.sync()?;
-        Ok(bytes)
+        Ok(file.map_err(DatasetError::unwritten(&self.path))?.sync()?)
     }
 }

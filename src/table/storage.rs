@@ -51,8 +51,18 @@ impl StoredFile {
     }
 }
 
+/// As encoders write to it.
+impl Write for StoredFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.sink.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
+}
+
 /// The file operations. Every error names the operation, the path and the operating system's reason.
-#[allow(clippy::missing_errors_doc, reason = "said once for all")]
 pub trait Storage: Sync {
     /// Creates a folder within one that is there; nothing happens if it is there itself.
     fn create_folder(&self, folder: &Path) -> Result<(), StorageError>;
