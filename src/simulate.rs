@@ -17,22 +17,14 @@ const MAX_SAMPLES: f64 = 1e8;
 /// A simulation that is not one, or would record too much.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestError {
-    /// A sweep has several jobs, or none.
     #[error(
         "sweep {name}: has {jobs} jobs, and one can be simulated; give each axis one value, or use `stickslip run`"
     )]
     NotOneJob { name: String, jobs: usize },
-    /// The time between samples is no time.
     #[error("sample {0}: must be a finite number > 0, in s")]
     BadSample(f64),
-    /// A trace or a map would have too many samples.
     #[error("sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one")]
-    TooManySamples {
-        /// Time between samples, in s.
-        sample: f64,
-        /// Time of the simulation, in s.
-        time: f64,
-    },
+    TooManySamples { sample: f64, time: f64 },
 }
 
 /// Keys of a sweep file with their values as it has them.

@@ -365,6 +365,8 @@ impl SlipObserver {
             let drive = &self.at_slip;
             let modulation = Modulation::of(drive);
             let interval = self.last_onset.map(|last| onset.time - last);
+            let spent = self.last_end.map_or(Spent::default(), |end| end.spent);
+            let energies = self.recording.energies.then(|| Energies::between(spent, last.spent));
             self.slips.push(Slip {
                 number: self.slips_seen - discard,
                 onset: onset.time,
@@ -387,11 +389,7 @@ impl SlipObserver {
                 precursors: self.pending,
                 largest_precursor: self.largest_pending,
                 slow_front_speed: advance_speed(self.advances.iter().copied()),
-                energies: if self.recording.energies {
-                    Energies::between(self.last_end.map_or(Spent::default(), |end| end.spent), last.spent)
-                } else {
-                    Energies::default()
-                },
+                energies: energies.unwrap_or_default(),
                 drops: Drops::default(),
             });
         }

@@ -62,9 +62,7 @@ impl<'a> Commit<'a> {
         self.staged.clear();
         Ok(())
     }
-}
 
-impl Commit<'_> {
     /// Gives the staged files their names, if nothing has them; false, and nothing more is done, where something has.
     pub(super) fn publish_new(self) -> Result<bool, StorageError> {
         for (staged, target) in &self.staged {

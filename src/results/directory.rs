@@ -12,7 +12,6 @@ use crate::table::storage::StorageError;
 use std::collections::HashSet;
 use std::io;
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
@@ -300,7 +299,7 @@ impl<'a> Results<'a> {
     pub fn sync_names(&self) -> Result<(), StorageError> {
         for above in self.layout.root().ancestors().skip(1) {
             // Most are not ours, and who made the folders in them synced them if that is possible at all.
-            let _ = self.layout.storage.sync_folder(if above.as_os_str().is_empty() { Path::new(".") } else { above });
+            let _ = self.layout.storage.sync_folder(above);
         }
         for folder in self.layout.result_folders() {
             match self.layout.storage.sync_folder(&folder) {

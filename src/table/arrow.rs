@@ -4,7 +4,7 @@
 //! Arrow schema, where pandas finds them for `DataFrame.attrs`. Counts are signed: differences of unsigned columns wrap
 //! around in every reader.
 
-use super::columns::{Column, FromRow, Kind, Row, Value};
+use super::columns::{Column, Field as _, FromRow, Kind, Row, Value};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
@@ -141,16 +141,12 @@ impl RowBuffer {
 
 impl Cells {
     fn push(&mut self, cell: Value<'_>) {
-        match (self, cell) {
-            (Self::Real(cells), Value::Real(real)) => cells.push(Some(real)),
-            (Self::Count(cells), Value::Count(count)) => cells.push(Some(count.cast_signed())),
-            (Self::Flag(cells), Value::Flag(flag)) => cells.push(Some(flag)),
-            (Self::Text(cells), Value::Text(text)) => cells.push(Some(text.to_owned())),
-            // A missing value; a cell of another kind than its column does not exist.
-            (Self::Real(cells), _) => cells.push(None),
-            (Self::Count(cells), _) => cells.push(None),
-            (Self::Flag(cells), _) => cells.push(None),
-            (Self::Text(cells), _) => cells.push(None),
+        // What is of no kind is a missing value; a cell of another kind than its column does not exist.
+        match self {
+            Self::Real(cells) => cells.push(if let Value::Real(real) = cell { Some(real) } else { None }),
+            Self::Count(cells) => cells.push(u64::from_value(cell).map(u64::cast_signed)),
+            Self::Flag(cells) => cells.push(bool::from_value(cell)),
+            Self::Text(cells) => cells.push(if let Value::Text(text) = cell { Some(text.to_owned()) } else { None }),
         }
     }
 

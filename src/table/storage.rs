@@ -113,20 +113,12 @@ pub trait Storage: Sync {
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
     fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        if self.exists(folder)? {
-            return Ok(());
-        }
-        let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
-        if let Some(parent) = parent {
-            self.ensure_folder(parent)?;
-        }
-        self.create_folder(folder)?;
-        self.sync_folder(parent.unwrap_or(Path::new(".")))
+        self.ensure_folder_below(Path::new(""), folder)
     }
 
     /// Creates a folder below another, which must be there, and those in between; brings the new names to the disk.
     fn ensure_folder_below(&self, top: &Path, folder: &Path) -> Result<(), StorageError> {
-        if self.exists(folder)? {
+        if folder == "" || self.exists(folder)? {
             return Ok(());
         }
         let Some(parent) = folder.parent().filter(|_| folder != top) else {
@@ -248,7 +240,9 @@ fn open_regular(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
+/// Opens a folder: an empty path is that of the present one.
 fn open_folder(path: &Path) -> io::Result<File> {
+    let path = if path == "" { Path::new(".") } else { path };
     let mut options = File::options();
     options.read(true);
     #[cfg(unix)]
