@@ -13,6 +13,7 @@ use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use clap::Args;
 use serde::Serialize;
+use serde_json::{Value as Json, json};
 use std::path::PathBuf;
 
 /// Show what a sweep would run and what is done: jobs, parts, predicted cost. Nothing is written
@@ -48,7 +49,8 @@ const MEMORY_OF_A_SLIP: f64 = 600.0;
 #[derive(Serialize)]
 struct Report {
     name: String,
-    axes: Vec<Axis>,
+    /// Keys that each axis moves, and its number of points.
+    axes: Vec<Json>,
     points: u64,
     jobs: u64,
     parts: u64,
@@ -106,12 +108,6 @@ impl Directory {
     }
 }
 
-#[derive(Serialize)]
-struct Axis {
-    keys: String,
-    points: u64,
-}
-
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
     output::warn(&sweep.warnings());
@@ -120,7 +116,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {
         name: sweep.name().to_owned(),
-        axes: sweep.axes().map(|(keys, points)| Axis { keys, points }).collect(),
+        axes: sweep.axes().map(|(keys, points)| json!({ "keys": keys, "points": points })).collect(),
         points: sweep.point_count(),
         jobs: totals.jobs,
         parts: totals.parts,
@@ -136,7 +132,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     if arguments.json {
         output::json(FORMAT, &report)?;
     } else {
-        let axes: Vec<String> = report.axes.iter().map(|axis| format!("{} ({})", axis.keys, axis.points)).collect();
+        let axes: Vec<String> = sweep.axes().map(|(keys, points)| format!("{keys} ({points})")).collect();
         let directory =
             report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
         let (choice, which) = match report.at_most {

@@ -44,7 +44,6 @@ const fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// A page that is being drawn.
 struct Page<'a> {
     content: Content,
     face: Face<'a>,

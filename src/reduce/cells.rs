@@ -15,7 +15,6 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// A cell: how often it was halved, and the rows of its first corner.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CellOfGrid {
-    /// How often it was halved.
     pub level: u32,
     /// Rows of the corner with the lowest; that of the seeds is the first.
     pub origin: Vec<u64>,

@@ -22,7 +22,6 @@ use std::path::PathBuf;
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
 pub const WRITER: &str = "reduce";
 
-/// There is nothing to reduce.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: holds no jobs; is this a results directory, and has its sweep been run?", shown(tables))]
 pub struct NoJobs {

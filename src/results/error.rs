@@ -33,21 +33,13 @@ pub struct ResultsError {
 }
 
 impl ResultsError {
-    fn new(kind: ErrorKind, path: &Path, problem: impl Into<String>) -> Self {
+    pub(super) fn new(kind: ErrorKind, path: &Path, problem: impl Into<String>) -> Self {
         Self { kind, path: path.to_owned(), problem: problem.into() }
     }
 
     /// What was asked for does not fit.
     pub fn refused(path: &Path, problem: impl Into<String>) -> Self {
         Self::new(ErrorKind::Refused, path, problem)
-    }
-
-    pub fn busy(path: &Path, problem: impl Into<String>) -> Self {
-        Self::new(ErrorKind::Busy, path, problem)
-    }
-
-    pub fn stopped(path: &Path, problem: impl Into<String>) -> Self {
-        Self::new(ErrorKind::Stopped, path, problem)
     }
 
     /// It is not as it was written.

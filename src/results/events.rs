@@ -37,7 +37,6 @@ pub enum RunEvent {
     RoundBegun {
         jobs: u64,
         predicted_cost: f64,
-        /// How far the rounds are.
         #[serde(flatten)]
         rounds: RoundsSoFar,
     },
@@ -56,7 +55,6 @@ pub enum RunEvent {
     /// What other workers have committed since the run began.
     OthersDone {
         jobs: u64,
-        /// Predicted cost of these jobs.
         predicted_cost: f64,
     },
     /// A job failed; the others continue.
@@ -72,7 +70,6 @@ pub enum RunEvent {
         /// Jobs that were run for it.
         jobs: usize,
         failed: usize,
-        /// Predicted cost of these jobs.
         predicted_cost: f64,
         measured_cost: f64,
         /// Sum of their wall times.
@@ -84,7 +81,6 @@ pub enum RunEvent {
     OutOfTime,
     /// The run ends by itself.
     Finished(RunReport),
-    /// The run ends with an error.
     Error {
         error: String,
     },
@@ -127,7 +123,6 @@ impl RunEvent {
 /// Most bytes of a line: far more than any reason of a failure has.
 const MAX_LINE: u64 = 1 << 24;
 
-/// A line of a log.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Line {
     /// Seconds since 1970 UTC.
@@ -140,7 +135,6 @@ fn now() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
 }
 
-/// The log of one run.
 pub struct Log(StoredFile);
 
 impl Log {

@@ -99,7 +99,6 @@ impl<'a> Layout<'a> {
         self.storage.ensure_folder_below(&self.root, folder)
     }
 
-    /// File of a reduced table.
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
     }

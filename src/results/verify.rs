@@ -45,7 +45,6 @@ pub struct Verification {
 pub struct Problem {
     #[serde(serialize_with = "serialize_path")]
     pub path: PathBuf,
-    /// What is wrong with it.
     pub problem: String,
     /// The part that is run again for it.
     pub part: Option<String>,

@@ -10,7 +10,7 @@
 //! other, and leaves.
 
 use crate::results::commit::{Commit, own_number};
-use crate::results::error::ResultsError;
+use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
 use crate::table::checksum;
@@ -210,7 +210,6 @@ impl<'a> Member<'a> {
         &self.name
     }
 
-    /// A random number of its own.
     pub const fn number(&self) -> u64 {
         self.number
     }
@@ -262,7 +261,7 @@ impl<'a> Member<'a> {
                  directory with --out",
                 shown_text(&host)
             );
-            Err(ResultsError::busy(self.layout.root(), problem))
+            Err(ResultsError::new(ErrorKind::Busy, self.layout.root(), problem))
         })
     }
 
@@ -277,7 +276,7 @@ impl<'a> Member<'a> {
              its work; nothing that was committed is lost, and the same command goes on",
             SILENCE.as_secs()
         );
-        is_buried.then(|| ResultsError::stopped(self.layout.root(), problem))
+        is_buried.then(|| ResultsError::new(ErrorKind::Stopped, self.layout.root(), problem))
     }
 
     /// Begins to prepare files for their places.

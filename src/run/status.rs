@@ -30,16 +30,13 @@ pub struct Overview {
     pub parts_missing: u64,
     /// Cost of all jobs that are done or failed.
     pub predicted_cost_done: f64,
-    /// Cost of the failed jobs.
     pub predicted_cost_failed: f64,
-    /// Cost of the missing jobs.
     pub predicted_cost_missing: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
     pub name: String,
-    /// How far all parts are.
     #[serde(flatten)]
     pub overview: Overview,
     /// Workers that are there now.

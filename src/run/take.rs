@@ -50,7 +50,6 @@ pub(super) struct Taken {
 pub(super) struct PartJob {
     pub of: Arc<Taken>,
     pub position: usize,
-    /// Whether it has failed before.
     pub failed_before: bool,
 }
 

@@ -11,9 +11,7 @@ pub(super) const MAX_SETS: u64 = 100_000;
 /// What a sweep decides by itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rounds {
-    /// How precise statistics are to be.
     pub precision: Option<Precision>,
-    /// Where the grid is to be finer.
     pub refinement: Option<Refinement>,
 }
 

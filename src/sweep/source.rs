@@ -20,11 +20,7 @@ use toml::de::{DeTable, DeValue};
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     #[error("{}: cannot be read: {source}; check the path and its permissions", shown(path))]
-    Unreadable {
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
+    Unreadable { path: PathBuf, source: std::io::Error },
     /// The file does not say what to run.
     #[error("{}", listed(path, mistakes))]
     Invalid {

@@ -46,15 +46,6 @@ impl DatasetError {
         }
     }
 
-    pub fn path(&self) -> &Path {
-        match self {
-            Self::Storage(StorageError { path, .. })
-            | Self::Write { path, .. }
-            | Self::Damaged { path, .. }
-            | Self::Stray { path } => path,
-        }
-    }
-
     /// For `map_err`: why a file cannot be written.
     pub(super) fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> Self {
         move |source| Self::Write { path: path.to_owned(), source }
