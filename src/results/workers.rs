@@ -233,11 +233,14 @@ impl<'a> Member<'a> {
         // It always has a form as JSON: it holds texts and numbers alone.
         let text = serde_json::to_string(&worker).unwrap_or_default();
         let (storage, new) = (self.layout.storage, self.layout.workers().join(format!("{}{NEW}", self.name)));
-        let write = || storage.create(&new)?.write(text.as_bytes()).and_then(|()| storage.rename(&new, &self.file()));
-        match write() {
-            // Somebody who tidies up took it for a dead one's.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => write(),
-            written => written,
+        loop {
+            storage.create(&new)?.write(text.as_bytes())?;
+            match storage.rename(&new, &self.file()) {
+                // A worker that does not see this one yet, nor any other, took it for a dead one's, and does so each time that
+                // it tidies up: a few times in its life.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => (),
+                renamed => return renamed,
+            }
         }
     }
 
@@ -338,7 +341,8 @@ pub(crate) mod tests {
     use crate::results::claims::{Claims, Standing};
     use crate::results::directory::Results;
     use crate::sweep::Sweep;
-    use crate::table::storage::Disk;
+    use crate::table::storage::over_disk::{Access, OverDisk};
+    use crate::table::storage::{Disk, Storage};
     use std::fs::{self, File};
 
     /// Opens a directory as a run does.
@@ -465,6 +469,35 @@ pub(crate) mod tests {
         let error = suspended.unwrap_err();
         assert!(error.kind == ErrorKind::Stopped && error.to_string().contains("suspended"), "{error}");
         assert!(!target.exists());
+    }
+
+    /// A disk on which others remove what a worker has not given its name yet, so many times.
+    struct Tidied {
+        workers: PathBuf,
+        times: AtomicU64,
+    }
+
+    impl OverDisk for Tidied {
+        fn before(&self, _: Access) -> io::Result<()> {
+            for name in Disk.list(&self.workers).unwrap() {
+                if name.to_string_lossy().ends_with(NEW) && self.times.load(Ordering::Relaxed) > 0 {
+                    self.times.fetch_sub(1, Ordering::Relaxed);
+                    Disk.remove(&self.workers.join(name)).unwrap();
+                }
+            }
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_worker_joins_however_often_others_tidy_up_before_it_is_seen() {
+        let root = tempfile::tempdir().unwrap();
+        let results = results(root.path());
+        let disk = Tidied { workers: results.layout().workers(), times: AtomicU64::new(5) };
+        let joined =
+            Results::join(&Layout::new(&disk, root.path()), &sweep(), 1, |member, _| Ok(member.file().exists()));
+        assert_eq!(joined, Ok::<_, ResultsError>(true));
+        assert_eq!(disk.times.into_inner(), 0);
     }
 
     #[test]
