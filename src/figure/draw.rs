@@ -11,7 +11,7 @@ use crate::table::shown::shown;
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
 
-/// Sets that figures hold at once, some 300 bytes each; of more, no figure of sets is drawn.
+/// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
 const MAX_SETS: usize = 100_000;
 const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 

@@ -131,7 +131,7 @@ impl<'a> Layout<'a> {
 
 /// Paths below the root, each a method of its name.
 macro_rules! places {
-    ($($(#[$about:meta])* $place:ident = $path:literal;)*) => {
+    ($($(#[$about:meta])* $place:ident = $path:expr;)*) => {
         impl Layout<'_> {$(
             $(#[$about])*
             pub fn $place(&self) -> PathBuf {
@@ -147,7 +147,7 @@ places! {
     figures = "figures";
     report = "report.html";
     /// Everything that is no result.
-    run = "run";
+    run = RUN;
     claims = "run/claims";
     locks = "run/lock";
     logs = "run/log";
