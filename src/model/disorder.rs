@@ -3,13 +3,14 @@
 //! Method: `ChaCha8`; the key is the seed, the stream is the contact's index, the word position is [`WORDS_PER_DRAW`] ×
 //! generation. A threshold that is not positive is drawn again [`REDRAW_STRIDE`] words further on, so that no draw
 //! depends on another. Normal deviates come from the inverse of the normal distribution (M. J. Wichura, algorithm AS
-//! 241, Appl. Statist. 37, 477, 1988), exponential ones from a logarithm, with `libm`'s functions: the same bits on
-//! every machine. Contract: the mapping is pinned by known-answer tests; changing it changes [`RNG_SCHEME`].
+//! 241, Appl. Statist. 37, 477, 1988), exponential ones from a logarithm, both without branches, so that loops over
+//! them run in vectors; nothing is fused, so all processors give the same bits. Contract: the mapping is pinned by
+//! known-answer tests; changing it changes [`RNG_SCHEME`].
 
 use super::Parameters;
+use pulp::{Arch, Simd, WithSimd, bytemuck};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use std::array;
 
 /// Name and version of the mapping from (seed, contact, generation) to a contact; written into every result.
 pub const RNG_SCHEME: &str = "chacha8-seed-contact-generation-v1";
@@ -19,8 +20,6 @@ const WORDS_PER_DRAW: u128 = 4;
 /// Generations in one refill of 64 words, the four blocks that the generator makes at a time.
 const DRAWS_PER_REFILL: u32 = 16;
 type Draws = [Draw; DRAWS_PER_REFILL as usize];
-/// Draws that are computed side by side.
-const SIDE_BY_SIDE: usize = 4;
 /// Distance of the words of a redrawn threshold: beyond those of any generation.
 const REDRAW_STRIDE: u128 = 1 << 40;
 /// Uniform deviates lie in (0, 1): 53 random bits, shifted by half a step.
@@ -47,6 +46,8 @@ pub struct Disorder {
     threshold_deviation: f64,
     mean_stiffness: f64,
     reattachment_time: f64,
+    /// The features for which the loop over draws is compiled.
+    features: Arch,
     /// [`DRAWS_PER_REFILL`] generations of each contact, drawn side by side, and the first of them.
     buffered: Vec<Draws>,
     buffered_from: Vec<u32>,
@@ -69,6 +70,7 @@ impl Disorder {
             threshold_deviation: parameters.threshold_deviation,
             mean_stiffness: parameters.contact_stiffness,
             reattachment_time: parameters.reattachment_time,
+            features: Arch::new(),
             buffered: vec![Draws::default(); contacts],
             buffered_from: vec![u32::MAX; contacts],
         }
@@ -80,7 +82,10 @@ impl Disorder {
         if self.buffered_from[contact] != generation - ahead {
             self.refill(contact, generation - ahead);
         }
-        let Draw { threshold, delay } = self.buffered[contact][ahead as usize];
+        let Draw { mut threshold, delay } = self.buffered[contact][ahead as usize];
+        if threshold.is_nan() || threshold <= 0.0 {
+            threshold = self.final_threshold(contact, generation);
+        }
         Contact {
             threshold,
             stiffness: self.mean_stiffness * (threshold / self.mean_threshold).sqrt(),
@@ -94,54 +99,92 @@ impl Disorder {
     #[inline(never)]
     fn refill(&mut self, contact: usize, first: u32) {
         self.seek(contact, first, 0);
-        let words: [[u64; 2]; DRAWS_PER_REFILL as usize] =
-            array::from_fn(|_| array::from_fn(|_| self.generator.next_u64()));
-        let mut generation = first;
-        let mut draws = Draws::default();
-        for (draws, words) in
-            draws.as_chunks_mut::<SIDE_BY_SIDE>().0.iter_mut().zip(words.as_chunks::<SIDE_BY_SIDE>().0)
-        {
-            let quantiles = standard_normal_quantiles(words.map(|[for_threshold, _]| uniform(for_threshold)));
-            for ((draw, quantile), [_, for_delay]) in draws.iter_mut().zip(quantiles).zip(words) {
-                let threshold = self.threshold(contact, generation, quantile);
-                *draw = Draw { threshold, delay: -self.reattachment_time * libm::log(uniform(*for_delay)) };
-                generation += 1;
-            }
-        }
-        self.buffered[contact] = draws;
+        let mut words = [[0; 2]; DRAWS_PER_REFILL as usize];
+        self.generator.fill_bytes(bytemuck::bytes_of_mut(&mut words));
+        self.buffered[contact] = self.features.dispatch(SideBySide(self, &words));
         self.buffered_from[contact] = first;
     }
 
-    /// The threshold for a quantile of its distribution, or for one that is drawn again.
-    fn threshold(&mut self, contact: usize, generation: u32, mut quantile: f64) -> f64 {
+    /// The first threshold of a life that is positive, be it in the tails.
+    #[cold]
+    fn final_threshold(&mut self, contact: usize, generation: u32) -> f64 {
         let mut redraw = 0;
         loop {
-            let threshold = self.mean_threshold + self.threshold_deviation * quantile;
+            self.seek(contact, generation, redraw);
+            let quantile = standard_normal_quantile(uniform(self.generator.next_u64()));
+            let threshold = self.threshold(quantile);
             if threshold > 0.0 {
                 return threshold;
             }
             redraw += 1;
-            self.seek(contact, generation, redraw);
-            [quantile] = standard_normal_quantiles([uniform(self.generator.next_u64())]);
         }
     }
 
+    #[inline(always)]
+    fn threshold(&self, quantile: f64) -> f64 {
+        self.mean_threshold + self.threshold_deviation * quantile
+    }
+
     fn seek(&mut self, contact: usize, generation: u32, redraw: u128) {
+        // From within a block, a change of stream would compute that block of the new one.
+        self.generator.set_word_pos(0);
         self.generator.set_stream(contact as u64);
         self.generator.set_word_pos(u128::from(generation) * WORDS_PER_DRAW + redraw * REDRAW_STRIDE);
     }
 }
 
+/// Draws from the words of both deviates of each. A threshold that is not positive, or not a number, is not final.
+struct SideBySide<'a>(&'a Disorder, &'a [[u64; 2]; DRAWS_PER_REFILL as usize]);
+
+impl WithSimd for SideBySide<'_> {
+    type Output = Draws;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Draws {
+        let Self(disorder, words) = self;
+        let mut draws = Draws::default();
+        for i in 0..draws.len() {
+            let [for_threshold, for_delay] = words[i].map(|word| uniform(u64::from_le(word)));
+            draws[i] = Draw {
+                threshold: disorder.threshold(quantile_outside_tails(for_threshold)),
+                delay: -disorder.reattachment_time * logarithm(for_delay),
+            };
+        }
+        draws
+    }
+}
+
 /// A uniform deviate in (0, 1) from 64 random bits, never 0 and never 1: the last one would be rounded up to 1.
+#[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
 fn uniform(word: u64) -> f64 {
     (((word >> 11) as f64 + 0.5) * UNIFORM_STEP).min(1.0 - UNIFORM_STEP)
 }
 
-/// Quantiles of the standard normal distribution, to about 1e-16 (AS 241, PPND16). Most lie in the central part, where
-/// all are taken first, side by side.
+/// `libm::log` of a positive normal number, to the last bit: its algorithm (FreeBSD's `e_log.c`) without branches.
+#[inline(always)]
+fn logarithm(x: f64) -> f64 {
+    const EVEN: [f64; 3] = [0.399_999_999_994_094_2, 0.222_221_984_321_497_84, 0.153_138_376_992_093_73];
+    const ODD: [f64; 4] =
+        [0.666_666_666_666_673_5, 0.285_714_287_436_623_9, 0.181_835_721_616_180_5, 0.147_981_986_051_165_86];
+    const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
+    const ROOT_OF_HALF: u64 = 0x3fe6_a09e << 32;
+    // x = (1 + f) 2^exponent, where 1 + f goes from sqrt(1/2), but for its lower bits, to its double.
+    let scaled = x.to_bits() + (1_f64.to_bits() - ROOT_OF_HALF);
+    let exponent = f64::from((scaled >> 52) as i32 - 1023);
+    let f = f64::from_bits((scaled & ((1 << 52) - 1)) + ROOT_OF_HALF) - 1.0;
+    let half_square = 0.5 * f * f;
+    let s = f / (2.0 + f);
+    let z = s * s;
+    let w = z * z;
+    let series = z * polynomial(&ODD, w) + w * polynomial(&EVEN, w);
+    s * (half_square + series) + exponent * LN_2[1] - half_square + f + exponent * LN_2[0]
+}
+
+/// A quantile of the standard normal distribution, to about 1e-16 (AS 241, PPND16); not a number in its tails.
+#[inline(always)]
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
-fn standard_normal_quantiles<const COUNT: usize>(probabilities: [f64; COUNT]) -> [f64; COUNT] {
+fn quantile_outside_tails(probability: f64) -> f64 {
     const CENTRAL_NUMERATOR: [f64; 8] = [
         3.387_132_872_796_366_608_0,
         1.331_416_678_917_843_774_5e2,
@@ -162,22 +205,6 @@ fn standard_normal_quantiles<const COUNT: usize>(probabilities: [f64; COUNT]) ->
         2.872_908_573_572_194_267_4e4,
         5.226_495_278_852_854_561_0e3,
     ];
-    let offsets = probabilities.map(|probability| probability - 0.5);
-    let central = offsets.map(|offset| 0.180_625 - offset * offset);
-    let numerators = polynomials(&CENTRAL_NUMERATOR, central);
-    let denominators = polynomials(&CENTRAL_DENOMINATOR, central);
-    array::from_fn(|i| {
-        if offsets[i].abs() <= 0.425 {
-            offsets[i] * (numerators[i] / denominators[i])
-        } else {
-            outer_quantile(probabilities[i]).copysign(offsets[i])
-        }
-    })
-}
-
-/// Magnitude of a quantile that lies outside the central part.
-#[expect(clippy::excessive_precision, reason = "coefficients as published")]
-fn outer_quantile(probability: f64) -> f64 {
     const MIDDLE_NUMERATOR: [f64; 8] = [
         1.423_437_110_749_683_577_34,
         4.630_337_846_156_545_295_90,
@@ -198,6 +225,17 @@ fn outer_quantile(probability: f64) -> f64 {
         5.475_938_084_995_344_946_00e-4,
         1.050_750_071_644_416_843_24e-9,
     ];
+    let offset = probability - 0.5;
+    let central = offset * ratio(&CENTRAL_NUMERATOR, &CENTRAL_DENOMINATOR, 0.180_625 - offset * offset);
+    let depth = depth(probability);
+    let middle = ratio(&MIDDLE_NUMERATOR, &MIDDLE_DENOMINATOR, depth - 1.6).copysign(offset);
+    let outer = if depth <= 5.0 { middle } else { f64::NAN };
+    if offset.abs() <= 0.425 { central } else { outer }
+}
+
+/// A quantile of the standard normal distribution, be it in the tails.
+#[expect(clippy::excessive_precision, reason = "coefficients as published")]
+fn standard_normal_quantile(probability: f64) -> f64 {
     const TAIL_NUMERATOR: [f64; 8] = [
         6.657_904_643_501_103_777_20,
         5.463_784_911_164_114_369_90,
@@ -218,26 +256,34 @@ fn outer_quantile(probability: f64) -> f64 {
         1.421_511_758_316_445_888_70e-7,
         2.044_263_103_389_939_785_64e-15,
     ];
-    let ratio = |numerator: &[f64; 8], denominator: &[f64; 8], x: f64| {
-        let ([numerator], [denominator]) = (polynomials(numerator, [x]), polynomials(denominator, [x]));
-        numerator / denominator
-    };
-    let depth = (-libm::log(probability.min(1.0 - probability))).sqrt();
-    if depth <= 5.0 {
-        ratio(&MIDDLE_NUMERATOR, &MIDDLE_DENOMINATOR, depth - 1.6)
+    let quantile = quantile_outside_tails(probability);
+    if quantile.is_nan() {
+        ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth(probability) - 5.0).copysign(probability - 0.5)
     } else {
-        ratio(&TAIL_NUMERATOR, &TAIL_DENOMINATOR, depth - 5.0)
+        quantile
     }
 }
 
-/// A polynomial at several arguments side by side.
-fn polynomials<const COUNT: usize>(coefficients: &[f64; 8], at: [f64; COUNT]) -> [f64; COUNT] {
-    coefficients.iter().rev().fold([0.0; COUNT], |sums, c| array::from_fn(|i| sums[i] * at[i] + c))
+#[inline(always)]
+fn depth(probability: f64) -> f64 {
+    (-logarithm(probability.min(1.0 - probability))).sqrt()
+}
+
+#[inline(always)]
+fn ratio(numerator: &[f64; 8], denominator: &[f64; 8], at: f64) -> f64 {
+    polynomial(numerator, at) / polynomial(denominator, at)
+}
+
+#[inline(always)]
+fn polynomial<const COUNT: usize>(coefficients: &[f64; COUNT], at: f64) -> f64 {
+    coefficients[..COUNT - 1].iter().rev().fold(coefficients[COUNT - 1], |sum, c| sum * at + c)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(target_arch = "x86_64")]
+    use pulp::x86::{V3, V4};
 
     #[test]
     fn quantiles_of_the_normal_distribution_are_those_of_its_tables() {
@@ -248,7 +294,7 @@ mod tests {
             (1e-20, -9.262_340_089_798_408),
             (0.975, 1.959_963_984_540_054),
         ] {
-            let difference: f64 = standard_normal_quantiles([probability])[0] - quantile;
+            let difference: f64 = standard_normal_quantile(probability) - quantile;
             assert!(difference.abs() <= 4e-15 * (1.0 + quantile.abs()), "{probability}: off by {difference}");
         }
     }
@@ -258,7 +304,7 @@ mod tests {
         for word in [0, 1, u64::MAX - 1, u64::MAX] {
             let deviate = uniform(word);
             assert!(
-                deviate > 0.0 && deviate < 1.0 && standard_normal_quantiles([deviate])[0].is_finite(),
+                deviate > 0.0 && deviate < 1.0 && standard_normal_quantile(deviate).is_finite(),
                 "{word}: {deviate}"
             );
         }
@@ -283,6 +329,74 @@ mod tests {
             [0x400e_db10_6478_2565, 0x4160_0067_0233_0740, 0x3e9e_da49_c2ff_9f19, 0x3f6e_9107_75d1_543c],
         ];
         assert_eq!(bits, pinned);
+    }
+
+    /// The life of a contact from its definition: one number after the other, with branches.
+    fn draw_alone(parameters: &Parameters, contact: usize, generation: u32) -> [u64; 2] {
+        let mut generator = ChaCha8Rng::seed_from_u64(parameters.seed);
+        generator.set_stream(contact as u64);
+        let mut uniform_at = |position: u128| {
+            generator.set_word_pos(u128::from(generation) * 4 + position);
+            uniform(generator.next_u64())
+        };
+        let threshold = (0..100)
+            .map(|redraw| standard_normal_quantile(uniform_at(redraw << 40)))
+            .map(|quantile| parameters.mean_threshold + parameters.threshold_deviation * quantile)
+            .find(|threshold| *threshold > 0.0);
+        let delay = -parameters.reattachment_time * libm::log(uniform_at(2));
+        [threshold.unwrap(), delay].map(f64::to_bits)
+    }
+
+    #[test]
+    fn draws_side_by_side_are_those_of_each_alone_on_every_processor() {
+        #[cfg(target_arch = "x86_64")]
+        let more = [V3::try_new().map(Arch::V3), V4::try_new().map(Arch::V4)].into_iter().flatten();
+        #[cfg(not(target_arch = "x86_64"))]
+        let more = [Arch::new()];
+        let f_s = Parameters::default().mean_threshold;
+        for features in [Arch::Scalar].into_iter().chain(more) {
+            for threshold_deviation in [Parameters::default().threshold_deviation, 0.4 * f_s, f_s, 1.37 * f_s] {
+                let parameters = Parameters { threshold_deviation, seed: 5, ..Parameters::default() };
+                let mut disorder = Disorder { features, ..Disorder::new(&parameters) };
+                for (contact, generation) in (0..1400).flat_map(|contact| [0, 1, 17, 40].map(|g| (contact, g))) {
+                    let Contact { threshold, delay, .. } = disorder.draw(contact, generation);
+                    assert_eq!(
+                        [threshold, delay].map(f64::to_bits),
+                        draw_alone(&parameters, contact, generation),
+                        "{features:?}: deviation {threshold_deviation}, contact {contact}, generation {generation}"
+                    );
+                }
+            }
+            // The ends of each part of the distribution, which no draw may meet.
+            let words = [0, 1 << 11, 1 << 16, 1 << 27, 0x1333_3333_3333_3000, 1 << 62, (1 << 63) - 1, 1 << 63];
+            let words: [u64; 16] = std::array::from_fn(|i| if i < 8 { words[i] } else { !words[i - 8] });
+            let disorder = Disorder::new(&Parameters::default());
+            let draws = features.dispatch(SideBySide(&disorder, &words.map(|word| [word.to_le(); 2])));
+            for (word, Draw { threshold, delay }) in words.into_iter().zip(draws) {
+                let alone = disorder.threshold(standard_normal_quantile(uniform(word)));
+                let in_tail = depth(uniform(word)) > 5.0;
+                assert!(
+                    if in_tail { threshold.is_nan() } else { threshold == alone },
+                    "{features:?}, {word}: {threshold}"
+                );
+                assert_eq!(delay, -disorder.reattachment_time * libm::log(uniform(word)), "{features:?}, {word}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_logarithm_is_that_of_libm() {
+        let mut generator = ChaCha8Rng::seed_from_u64(0);
+        let drawn = (0..300_000).map(|_| generator.next_u64()).flat_map(|word| [word, word >> (word % 53)]);
+        let drawn = drawn.map(uniform).flat_map(|x| [x, x.min(1.0 - x)]);
+        // Around powers of two and where the exponent changes: by single bits of the lower half too.
+        let ends = (0..54).flat_map(|k| {
+            [1.0, 0.5_f64.sqrt(), f64::from_bits(0x3fe6_a09e << 32)].map(|x| x * 0.5_f64.powi(k)).into_iter()
+        });
+        let ends = ends.flat_map(|x| (0..4000).map(move |ulp| f64::from_bits(x.to_bits() + 2000 - ulp)));
+        for x in drawn.chain(ends).chain([UNIFORM_STEP / 2.0, 1.0 - UNIFORM_STEP, 0.5]) {
+            assert_eq!(logarithm(x).to_bits(), libm::log(x).to_bits(), "{x:e}");
+        }
     }
 
     #[test]
