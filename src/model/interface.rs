@@ -7,8 +7,10 @@
 use super::disorder::Contact;
 use super::lanes::{LANES, Row};
 use super::reattachments::{Due, Reattachments};
+use super::simd::{Simd, Vector};
 use super::{BreakOn, Disorder, Parameters};
 use crate::table::value::words;
+use pulp::Scalar512b;
 use std::array;
 
 words! {
@@ -85,11 +87,8 @@ impl Attached {
     }
 }
 
-/// Eight bytes that are 0 or 1 each, times this, hold their bits in the highest byte, in order.
-const GATHER_BITS: u64 = 0x0102_0408_1020_4080;
-
-/// The contacts of a row, side by side in memory as they are read: contact i of a block lies in row i div 8 of the
-/// block, lane i mod 8. Lanes beyond the last contact stay detached for ever.
+/// What a block feels of eight contacts, and where they break. Contact i of a block lies in row i div 8 of the block, lane
+/// i mod 8. Lanes beyond the last contact stay detached for ever.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 struct ContactRow {
@@ -99,6 +98,11 @@ struct ContactRow {
     /// Break positions a_i ± reach, infinite while detached (and below, if only tension breaks).
     upper: Row,
     lower: Row,
+}
+
+/// The lives of eight contacts, apart from their rows, which so stay in the first-level cache.
+#[derive(Clone, Debug)]
+struct Lives {
     /// The present life, or, while detached, the next.
     life: [Contact; LANES],
     generation: [u32; LANES],
@@ -107,11 +111,9 @@ struct ContactRow {
 impl ContactRow {
     /// One bit a lane: whether its contact breaks up to a displacement in m.
     #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches a row is tested in vectors")]
-    fn reached(&self, displacement: f64) -> u64 {
-        let lanes: [u8; LANES] =
-            array::from_fn(|lane| u8::from((self.upper[lane] <= displacement) | (self.lower[lane] >= displacement)));
-        u64::from_le_bytes(lanes).wrapping_mul(GATHER_BITS) >> 56
+    fn reached<S: Simd>(&self, simd: S, displacement: f64) -> u8 {
+        let x = simd.splat(displacement);
+        x.reaches(simd.load(&self.upper)) | simd.load(&self.lower).reaches(x)
     }
 }
 
@@ -124,6 +126,7 @@ pub struct Interface {
     disorder: Disorder,
     /// The rows of the first block, then of the second, and so on.
     rows: Vec<ContactRow>,
+    lives: Vec<Lives>,
     reattachments: Reattachments,
     attached: Attached,
     /// Per block: Σ k_i of the attached contacts, in N/m.
@@ -146,15 +149,16 @@ impl Interface {
             anchor: Row::filled(0.0),
             upper: Row::filled(f64::INFINITY),
             lower: Row::filled(f64::NEG_INFINITY),
-            life: [Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 }; LANES],
-            generation: [0; LANES],
         };
+        let none = Contact { threshold: 0.0, stiffness: 0.0, reach: 0.0, delay: 0.0 };
+        let unborn = Lives { life: [none; LANES], generation: [0; LANES] };
         let mut interface = Self {
             contacts_per_block: parameters.contacts_per_block,
             rows_per_block,
             break_on: parameters.break_on,
             disorder: Disorder::new(parameters),
             rows: vec![detached; blocks * rows_per_block],
+            lives: vec![unborn; blocks * rows_per_block],
             reattachments: Reattachments::new(blocks, parameters.contacts_per_block, parameters.reattachment_time),
             attached: Attached { count: (blocks * parameters.contacts_per_block) as u64, offset: 0.0 },
             block_stiffness: vec![0.0; blocks],
@@ -165,11 +169,11 @@ impl Interface {
         for block in 0..blocks {
             for contact in 0..parameters.contacts_per_block {
                 let (row, lane) = interface.place(block, contact);
-                interface.rows[row].life[lane] =
+                interface.lives[row].life[lane] =
                     interface.disorder.draw(block * parameters.contacts_per_block + contact, 0);
-                interface.attach(block, contact, 0.0);
+                interface.attach(Scalar512b, block, contact, 0.0);
             }
-            interface.gather(block);
+            interface.gather(Scalar512b, block);
         }
         interface
     }
@@ -219,93 +223,117 @@ impl Interface {
         self.reattachments.look_ahead(|due| visit(due.time(), due.block()));
     }
 
+    /// The same with stiffness in N/m and reach in m of the life that begins.
+    pub fn look_ahead_to_lives(&mut self, mut visit: impl FnMut(f64, usize, [f64; 2]) -> bool) {
+        let (lives, rows_per_block) = (&self.lives, self.rows_per_block);
+        self.reattachments.look_ahead(|due| {
+            let Contact { stiffness, reach, .. } =
+                lives[due.block() * rows_per_block + due.contact() / LANES].life[due.contact() % LANES];
+            visit(due.time(), due.block(), [stiffness, reach])
+        });
+    }
+
     /// Attaches the contact that is due next, unstressed where its block is at that moment.
     ///
     /// # Panics
     /// When nothing is due: a bug in the solver.
     #[inline(always)]
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
+        let event = self.reattach_running(Scalar512b, displacement);
+        self.sum(Scalar512b, event.block);
+        event
+    }
+
+    /// The same with the sums of the block carried on, rounded once more, and not computed again.
+    ///
+    /// # Panics
+    /// When nothing is due: a bug in the solver.
+    #[inline(always)]
+    pub(crate) fn reattach_running<S: Simd>(&mut self, simd: S, displacement: f64) -> ContactEvent {
         let due = self.reattachments.pop().expect("a reattachment is due");
         let (block, contact) = (due.block(), due.contact());
-        let [upper, lower] = self.attach(block, contact, displacement);
-        self.sum(block);
+        let [upper, lower] = self.attach(simd, block, contact, displacement);
         self.block_upper[block] = self.block_upper[block].min(upper);
         self.block_lower[block] = self.block_lower[block].max(lower);
         self.attached.change(Change::Attach, due.time());
-        self.event(block, contact, due.time(), displacement, Change::Attach)
+        let event = self.event(block, contact, due.time(), displacement, Change::Attach);
+        self.block_stiffness[block] += event.stiffness;
+        self.block_pull[block] += event.stiffness * displacement;
+        event
     }
 
     /// Breaks every contact of a block whose threshold is reached at this displacement, in the order of contacts, and
     /// passes each to `log`.
     #[inline(always)]
     pub fn break_reached(&mut self, block: usize, time: f64, displacement: f64, mut log: impl FnMut(ContactEvent)) {
-        // As many rows at a time as have a bit for each contact.
-        for start in (0..self.rows_per_block).step_by(LANES) {
-            let mut reached = 0_u64;
-            for (index, row) in self.rows_of(block)[start..].iter().take(LANES).enumerate() {
-                reached |= row.reached(displacement) << (LANES * index);
-            }
+        for row in 0..self.rows_per_block {
+            let mut reached = self.rows_of(block)[row].reached(Scalar512b, displacement);
             while reached != 0 {
-                let contact = LANES * start + reached.trailing_zeros() as usize;
+                let contact = LANES * row + reached.trailing_zeros() as usize;
                 if contact >= self.contacts_per_block {
                     // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
-                log(self.break_contact(block, contact, time, displacement).0);
+                log(self.break_contact(Scalar512b, block, contact, time, displacement).0);
                 reached &= reached - 1;
             }
         }
-        self.gather(block);
+        self.gather(Scalar512b, block);
     }
 
     /// Writes the contacts of a block that break up to a displacement in m, with their break positions in m, in the order
     /// in which the block comes to them.
     #[inline(always)]
-    pub fn reached(&self, block: usize, displacement: f64, contacts: &mut Vec<(f64, usize)>) {
+    pub(crate) fn reached<S: Simd>(&self, simd: S, block: usize, displacement: f64, contacts: &mut Vec<(f64, usize)>) {
         contacts.clear();
-        let mut is_sorted = true;
-        for (index, row) in self.rows_of(block).iter().enumerate() {
-            let mut reached = row.reached(displacement);
+        let falls = displacement <= self.block_lower[block];
+        // As many rows at a time as have a bit for each contact.
+        for (chunk, rows) in self.rows_of(block).chunks(LANES).enumerate() {
+            let mut reached = 0;
+            for (index, row) in rows.iter().enumerate() {
+                reached |= u64::from(row.reached(simd, displacement)) << (LANES * index);
+            }
             while reached != 0 {
-                let lane = reached.trailing_zeros() as usize;
-                // Further along in the direction of motion is larger.
-                let position = if row.upper[lane] <= displacement { row.upper[lane] } else { -row.lower[lane] };
+                let contact = reached.trailing_zeros() as usize;
                 reached &= reached - 1;
+                let row = &rows[contact / LANES];
+                let level = if falls { row.lower[contact % LANES] } else { row.upper[contact % LANES] };
                 // A displacement that is not finite reaches lanes beyond the last contact.
-                if position.is_finite() {
-                    is_sorted &= contacts.last().is_none_or(|(last, _)| *last <= position);
-                    contacts.push((position, LANES * index + lane));
+                if level.is_finite() {
+                    contacts.push((level, chunk * LANES * LANES + contact));
                 }
             }
         }
-        if !is_sorted {
-            contacts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        }
-        if displacement <= self.block_lower[block] {
-            for (position, _) in contacts {
-                *position = -*position;
-            }
+        if contacts.len() > 1 {
+            contacts.sort_by(|a, b| if falls { b.0.total_cmp(&a.0) } else { a.0.total_cmp(&b.0) });
         }
     }
 
     /// Breaks one contact, at a break position in m. Returns the event, and when the contact reattaches, in s. The block's
     /// sums and nearest break positions are left as they are: see [`Self::gather`].
     #[inline(always)]
-    pub fn break_contact(&mut self, block: usize, contact: usize, time: f64, displacement: f64) -> (ContactEvent, f64) {
+    pub(crate) fn break_contact<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        contact: usize,
+        time: f64,
+        displacement: f64,
+    ) -> (ContactEvent, f64) {
         self.attached.change(Change::Break, time);
         let event = self.event(block, contact, time, displacement, Change::Break);
-        (event, self.detach(block, contact, time))
+        (event, self.detach(simd, block, contact, time))
     }
 
     /// Moves the frame: subtracts `shift` m from every position.
     pub fn shift(&mut self, shift: f64) {
         for row in &mut self.rows {
-            for position in row.anchor.iter_mut().chain(row.upper.iter_mut()).chain(row.lower.iter_mut()) {
-                *position -= shift;
+            for positions in [&mut row.anchor, &mut row.upper, &mut row.lower] {
+                positions.iter_mut().for_each(|position| *position -= shift);
             }
         }
         for block in 0..self.block_stiffness.len() {
-            self.gather(block);
+            self.gather(Scalar512b, block);
         }
     }
 
@@ -341,7 +369,7 @@ impl Interface {
     #[inline(always)]
     fn event(&self, block: usize, contact: usize, time: f64, displacement: f64, change: Change) -> ContactEvent {
         let (row, lane) = self.place(block, contact);
-        let ContactRow { life, generation, anchor, .. } = &self.rows[row];
+        let Lives { life, generation } = &self.lives[row];
         let Contact { threshold, stiffness, .. } = life[lane];
         ContactEvent {
             time,
@@ -350,7 +378,7 @@ impl Interface {
             generation: generation[lane],
             change,
             displacement,
-            force: stiffness * (displacement - anchor[lane]),
+            force: stiffness * (displacement - self.rows[row].anchor[lane]),
             threshold,
             stiffness,
             attached: self.attached.count,
@@ -361,46 +389,44 @@ impl Interface {
 
     /// Begins a life of a contact. Returns the positions above and below at which it breaks.
     #[inline(always)]
-    fn attach(&mut self, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
+    fn attach<S: Simd>(&mut self, simd: S, block: usize, contact: usize, displacement: f64) -> [f64; 2] {
         let (row, lane) = self.place(block, contact);
+        let Contact { stiffness, reach, .. } = self.lives[row].life[lane];
         let row = &mut self.rows[row];
-        let Contact { stiffness, reach, .. } = row.life[lane];
         let levels = match self.break_on {
             BreakOn::Magnitude => [displacement + reach, displacement - reach],
             BreakOn::Tension => [displacement + reach, f64::NEG_INFINITY],
         };
-        row.attached_stiffness.set(lane, stiffness);
-        row.anchor.set(lane, displacement);
-        row.upper.set(lane, levels[0]);
-        row.lower.set(lane, levels[1]);
+        simd.set(&mut row.attached_stiffness, lane, stiffness);
+        simd.set(&mut row.anchor, lane, displacement);
+        simd.set(&mut row.upper, lane, levels[0]);
+        simd.set(&mut row.lower, lane, levels[1]);
         levels
     }
 
     /// Ends the life of a contact and draws the next, which begins at the time returned, in s.
     #[inline(always)]
-    fn detach(&mut self, block: usize, contact: usize, time: f64) -> f64 {
+    fn detach<S: Simd>(&mut self, simd: S, block: usize, contact: usize, time: f64) -> f64 {
         let (row, lane) = self.place(block, contact);
-        let row = &mut self.rows[row];
-        row.attached_stiffness.set(lane, 0.0);
-        row.upper.set(lane, f64::INFINITY);
-        row.lower.set(lane, f64::NEG_INFINITY);
-        row.generation[lane] += 1;
-        row.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, row.generation[lane]);
-        let due = time + row.life[lane].delay;
+        let (row, lives) = (&mut self.rows[row], &mut self.lives[row]);
+        simd.set(&mut row.attached_stiffness, lane, 0.0);
+        simd.set(&mut row.upper, lane, f64::INFINITY);
+        simd.set(&mut row.lower, lane, f64::NEG_INFINITY);
+        lives.generation[lane] += 1;
+        lives.life[lane] = self.disorder.draw(block * self.contacts_per_block + contact, lives.generation[lane]);
+        let due = time + lives.life[lane].delay;
         self.reattachments.push(Due::new(due, block, contact));
         due
     }
 
     /// Computes the sums and nearest break positions of a block again.
     #[inline(always)]
-    pub fn gather(&mut self, block: usize) {
-        self.sum(block);
-        let (mut upper, mut lower) = (Row::filled(f64::INFINITY), Row::filled(f64::NEG_INFINITY));
+    pub(crate) fn gather<S: Simd>(&mut self, simd: S, block: usize) {
+        self.sum(simd, block);
+        let (mut upper, mut lower) = (simd.splat(f64::INFINITY), simd.splat(f64::NEG_INFINITY));
         for row in self.rows_of(block) {
-            for lane in 0..LANES {
-                upper[lane] = if row.upper[lane] < upper[lane] { row.upper[lane] } else { upper[lane] };
-                lower[lane] = if row.lower[lane] > lower[lane] { row.lower[lane] } else { lower[lane] };
-            }
+            upper = upper.smaller(simd.load(&row.upper));
+            lower = lower.larger(simd.load(&row.lower));
         }
         self.block_upper[block] = upper.reduce(|a, b| if a < b { a } else { b });
         self.block_lower[block] = lower.reduce(|a, b| if a > b { a } else { b });
@@ -408,12 +434,12 @@ impl Interface {
 
     /// Computes the sums of a block again, in fixed lanes.
     #[inline(always)]
-    fn sum(&mut self, block: usize) {
-        let (mut stiffness, mut pull) = (Row::filled(0.0), Row::filled(0.0));
+    fn sum<S: Simd>(&mut self, simd: S, block: usize) {
+        let (mut stiffness, mut pull) = (simd.splat(0.0), simd.splat(0.0));
         for row in self.rows_of(block) {
-            let attached = row.attached_stiffness.0;
-            stiffness.0 = array::from_fn(|lane| stiffness[lane] + attached[lane]);
-            pull.0 = array::from_fn(|lane| pull[lane] + attached[lane] * row.anchor[lane]);
+            let attached = simd.load(&row.attached_stiffness);
+            stiffness = stiffness.plus(attached);
+            pull = pull.plus(attached.times(simd.load(&row.anchor)));
         }
         self.block_stiffness[block] = stiffness.reduce(|a, b| a + b);
         self.block_pull[block] = pull.reduce(|a, b| a + b);
@@ -440,7 +466,7 @@ mod tests {
             while interface.next_reattachment_block().is_some() {
                 let event = interface.reattach_next(0.3 * displacement);
                 let known = [interface.block_upper[event.block], interface.block_lower[event.block]];
-                interface.gather(event.block);
+                interface.gather(Scalar512b, event.block);
                 assert_eq!(known, [interface.block_upper[event.block], interface.block_lower[event.block]]);
             }
         }

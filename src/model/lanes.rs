@@ -11,31 +11,10 @@ pub(crate) const LANES: usize = 8;
 #[repr(C, align(64))]
 pub(crate) struct Row(pub [f64; LANES]);
 
-/// All bits of one lane. A blend by bits, since a conditional write is compiled to one of a piece.
-#[repr(C, align(64))]
-struct LaneMask([u64; LANES]);
-
-static LANE_MASKS: [LaneMask; LANES] = {
-    let mut masks = [const { LaneMask([0; LANES]) }; LANES];
-    let mut lane = 0;
-    while lane < LANES {
-        masks[lane].0[lane] = u64::MAX;
-        lane += 1;
-    }
-    masks
-};
-
 impl Row {
     /// The same value in every lane.
     pub const fn filled(value: f64) -> Self {
         Self([value; LANES])
-    }
-
-    /// Sets one lane by writing the whole row: reading a row after a piece of it has been written takes long.
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, value: f64) {
-        let mask = &LANE_MASKS[lane];
-        self.0 = array::from_fn(|l| f64::from_bits(self.0[l].to_bits() & !mask.0[l] | value.to_bits() & mask.0[l]));
     }
 
     /// Combines all lanes into one value, in pairs.

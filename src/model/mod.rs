@@ -9,6 +9,7 @@ mod lanes;
 mod parameters;
 mod reattachments;
 pub mod selected;
+pub(crate) mod simd;
 pub mod theory;
 
 pub use disorder::{Contact, Disorder, RNG_SCHEME};
@@ -23,4 +24,4 @@ pub type Value = crate::table::value::Value<'static>;
 
 /// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file that leaves
 /// them out, give other results.
-pub const MODEL_VERSION: u32 = 3;
+pub const MODEL_VERSION: u32 = 4;

@@ -30,6 +30,10 @@ impl Observer for Observers<'_> {
         self.lead.follows_attachments() || self.others.iter().any(|other| other.follows_attachments())
     }
 
+    fn follows_force(&self) -> bool {
+        self.lead.follows_force() || self.others.iter().any(|other| other.follows_force())
+    }
+
     fn is_satisfied(&self) -> bool {
         self.lead.is_satisfied()
     }

@@ -499,6 +499,10 @@ impl Observer for SlipObserver {
         false
     }
 
+    fn follows_force(&self) -> bool {
+        self.drops.is_some()
+    }
+
     fn is_satisfied(&self) -> bool {
         self.slips.len() as u64 >= self.recording.slips || self.has_given_up
     }

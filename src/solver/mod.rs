@@ -115,6 +115,11 @@ pub trait Observer {
         true
     }
 
+    /// Whether it asks segments for the force between their ends or for its turns, and not only for extremes and impulse.
+    fn follows_force(&self) -> bool {
+        true
+    }
+
     /// Whether the simulation may end. Asked after each segment and its events.
     fn is_satisfied(&self) -> bool {
         false

@@ -22,14 +22,18 @@ pub enum ForcePath<'a> {
     Harmonic(Harmonic),
     /// Cubics on a grid of time, from `first` in the first of them on.
     Grid {
-        /// The cubics, one a step.
+        /// The cubics, one a step, or only the first and the last; see [`super::Observer::follows_force`].
         steps: &'a [CubicStep],
+        /// Number of steps.
+        count: usize,
         /// Where in the first step the segment starts, from 0 to 1.
         first: f64,
         /// Length of a step, in s.
         spacing: f64,
         /// Extremes of F_S over all steps but the first and the last.
         inner: Extremes,
+        /// Lower and upper bound on F_S over all steps, in N.
+        bounds: [f64; 2],
         /// F_S at the end, in N.
         end: f64,
         /// Integral of F_S over the segment by steps, in N.
@@ -60,13 +64,9 @@ impl Extremes {
     /// Takes in a whole step, which begins after `begin` steps.
     #[inline(always)]
     pub(super) fn include_step(&mut self, begin: f64, step: &CubicStep) {
-        self.include(begin, step.force[0]);
-        self.include(begin + 1.0, step.force[1]);
-        if step.turns() {
-            for sign in [1.0, -1.0] {
-                let (s, value) = step.maximum(sign, 0.0, 1.0);
-                self.include(begin + s, sign * value);
-            }
+        for sign in [1.0, -1.0] {
+            let (s, value) = step.maximum(sign, 0.0, 1.0);
+            self.include(begin + s, sign * value);
         }
     }
 }
@@ -138,19 +138,15 @@ impl CubicStep {
         s * (c0 + s * (c1 / 2.0 + s * (c2 / 3.0 + s * c3 / 4.0)))
     }
 
-    /// Whether F_S has an extreme within the step: its slope changes sign, from end to end or up to where it is steepest.
+    /// Whether F_S is larger at the end.
     #[inline(always)]
-    fn turns(&self) -> bool {
-        let ([start, end], [from, to]) = (self.force, self.bend);
-        let rise = 6.0 * (end - start);
-        let [first, last] = [rise - (2.0 * from + to), rise + (from + 2.0 * to)];
-        let change = from - to;
-        first * last <= 0.0 || (from * to < 0.0 && (first * change + 3.0 * from * from) * change * first < 0.0)
+    pub(super) fn rises(&self) -> bool {
+        self.force[1] > self.force[0]
     }
 
     /// Lower and upper bound on F_S, in N.
     #[inline(always)]
-    fn bounds(&self) -> [f64; 2] {
+    pub(super) fn bounds(&self) -> [f64; 2] {
         let ([start, end], [from, to]) = (self.force, self.bend);
         let largest = |a: f64, b: f64| if a > b { a } else { b };
         let spread = 0.125 * largest(from.abs(), to.abs());
@@ -254,10 +250,7 @@ impl Segment<'_> {
                 let end = start + rate * self.duration;
                 (start.min(end) - amplitude.abs(), start.max(end) + amplitude.abs())
             }
-            ForcePath::Grid { steps, inner, .. } => {
-                let [first, last] = [&steps[0], &steps[steps.len() - 1]].map(CubicStep::bounds);
-                (inner.least.1.min(first[0]).min(last[0]), inner.largest.1.max(first[1]).max(last[1]))
-            }
+            ForcePath::Grid { bounds: [low, high], .. } => (low, high),
         }
     }
 
@@ -359,7 +352,10 @@ impl Segment<'_> {
                     },
                 )
             }
-            ForcePath::Grid { steps, first, spacing, inner, .. } => {
+            ForcePath::Grid { bounds: [low, high], .. } if (if sign > 0.0 { high } else { -low }) <= floor => {
+                return None;
+            }
+            ForcePath::Grid { steps, count, first, spacing, inner, .. } => {
                 let (at, value) = if sign > 0.0 { inner.largest } else { inner.least };
                 let (mut at, mut extreme) = (at, sign * value);
                 let mut offer = |begin: f64, cubic: &CubicStep, from: f64, to: f64| {
@@ -370,7 +366,7 @@ impl Segment<'_> {
                     }
                 };
                 // The last first, since the force mostly rises.
-                let begin = (steps.len() - 1) as f64;
+                let begin = (count - 1) as f64;
                 let to = (first + self.duration / spacing - begin).min(1.0);
                 offer(begin, &steps[steps.len() - 1], if begin > 0.0 { 0.0 } else { first }, to);
                 if begin > 0.0 {
@@ -430,7 +426,11 @@ mod tests {
             let whole: f64 = steps[..steps.len() - 1].iter().map(CubicStep::integral).sum();
             let integral = whole + steps[steps.len() - 1].integral_to(last.fract()) - steps[0].integral_to(first);
             let end = steps[steps.len() - 1].value(last - (steps.len() - 1) as f64);
-            let path = ForcePath::Grid { steps: &steps, first, spacing, inner, end, integral };
+            let bounds = steps.iter().map(CubicStep::bounds).fold([f64::MAX, f64::MIN], |[low, high], step| {
+                [low.min(step[0]), high.max(step[1])]
+            });
+            let path =
+                ForcePath::Grid { steps: &steps, count: steps.len(), first, spacing, inner, bounds, end, integral };
             let segment = Segment { start: 3.0, duration: (last - first) * spacing, path };
             assert_turns(&segment);
             let samples = || (0..=2000).map(|i| segment.force_after(segment.duration * f64::from(i) / 2000.0));

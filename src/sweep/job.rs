@@ -122,9 +122,9 @@ mod tests {
             ..Parameters::default()
         };
         let default = Identity::new(Solver::default(), &Recording::default());
-        assert_eq!(default.job(&Parameters::default()).to_string(), "a7584e1086a2c8da86d617407fbf03fd");
-        assert_eq!(identity().job(&modulated).to_string(), "a5493f970c5ea154cefee270ddc8861f");
-        assert_eq!(identity().set(&modulated).to_string(), "836a5625b1a0df818513e14874eda646");
+        assert_eq!(default.job(&Parameters::default()).to_string(), "5a03d318da4b4d433cb4649f6cb112c1");
+        assert_eq!(identity().job(&modulated).to_string(), "99900668d7355ca885476379621e7dee");
+        assert_eq!(identity().set(&modulated).to_string(), "c114d52bf333477369486ef0b16ce1dd");
     }
 
     #[test]
@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(
             (MODEL_VERSION, defaults.join(" ").as_str()),
             (
-                3,
+                4,
                 "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 FN=4000 L=0.15 break_on=magnitude seed=0 \
                 solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.discard=5 \

@@ -124,7 +124,7 @@ fn draw(number: u64) -> Draw {
     let spread = match r.next() % 4 {
         0 => 0.0,
         1 => 0.005,
-        _ => r.between(1e-4, 0.3),
+        _ => r.between(1e-4, 0.5),
     };
     if r.chance(0.25) {
         parameters.break_on = BreakOn::Tension;

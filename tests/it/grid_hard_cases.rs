@@ -35,6 +35,11 @@ fn cases() -> Vec<(String, Parameters, f64)> {
         ("hasty contacts", Parameters { reattachment_time: 1e-6, ..base() }, 0.12),
         ("slow contacts", Parameters { reattachment_time: 10.0, ..base() }, 5.0),
         ("wide thresholds", Parameters { threshold_deviation: 0.411, ..base() }, 0.5),
+        (
+            "half the threshold wide, slow",
+            Parameters { threshold_deviation: 0.685, drive_velocity: 1e-6, blocks: 9, ..base() },
+            8.0,
+        ),
         ("no damping", Parameters { damping_rate: 0.0, ..base() }, 0.3),
         ("overdamped", Parameters { damping_rate: 1e7, ..base() }, 0.1),
         ("slow drive", Parameters { drive_velocity: 1e-8, ..base() }, 8000.0),

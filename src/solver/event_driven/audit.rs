@@ -3,8 +3,9 @@
 
 use super::Integration;
 use super::chain::{Chain, State};
-use super::driven_solution::DrivenSolution;
+use super::driven_solution::BlockMotion;
 use super::kernels::Kernels;
+use super::leap::Split;
 use super::series::Series;
 use super::slider::Slider;
 use crate::solver::harmonic::Harmonic;
@@ -35,27 +36,20 @@ impl Audit {
 
     /// Enters a leap of `elapsed` s from `state`: the damping loss along the driven solution, in closed form, and
     /// the energy of the free motion that is dropped at its start.
-    pub(super) fn follow_leap(
-        &self,
-        chain: &Chain,
-        drive: &Harmonic,
-        driven: &DrivenSolution,
-        state: &State,
-        elapsed: f64,
-    ) {
+    pub(super) fn follow_leap(&self, chain: &Chain, drive: &Harmonic, split: &Split, state: &State, elapsed: f64) {
         let frequency = drive.angular_frequency;
         let coupling = chain.coupling[0][0];
         // Σ p1², Σ p1 q, Σ |q|² and Σ q²: the velocity is p1 - ω Im(q e^{iωt}).
         let (mut ramp, mut mixed, mut size, mut square) = (0.0, [0.0; 2], 0.0, [0.0; 2]);
         let (mut dropped, mut before) = (0.0, [0.0; 2]);
         for j in 0..chain.layout.blocks {
-            let (rate, [real, imaginary]) = (driven.rate[j], driven.wave[j]);
+            let BlockMotion { start, rate, wave: [real, imaginary], .. } = split.driven(chain, j);
             ramp += rate * rate;
             mixed = [mixed[0] + rate * real, mixed[1] + rate * imaginary];
             size += real * real + imaginary * imaginary;
             square = [square[0] + real * real - imaginary * imaginary, square[1] + 2.0 * real * imaginary];
             // E(x_p + y) - E(x_p) = yᵀ (S (x_p + y/2) - b - drive) + m w (v_p + w/2), with the forces per mass.
-            let (x, v) = (driven.start[j] + real, rate - frequency * imaginary);
+            let (x, v) = (start + real, rate - frequency * imaginary);
             let (y, w) = (chain.at(&state.displacement, j) - x, chain.at(&state.velocity, j) - v);
             let middle = x + 0.5 * y;
             let mut force = chain.at(&chain.diagonal, j) * middle - chain.at(&chain.pull, j);

@@ -2,19 +2,8 @@
 
 use super::layout::Layout;
 use crate::model::equation::StiffnessMatrix;
+use crate::model::simd::{Simd, Vector};
 use crate::model::{Interface, Parameters, Row};
-
-/// The coefficients that depend on contacts, one entry a block.
-#[derive(Clone, Debug)]
-pub(super) struct PerBlock {
-    /// Diagonal of S/m, in 1/s².
-    pub diagonal: Vec<f64>,
-    /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
-    pub pull: Vec<f64>,
-    /// Nearest break positions, in m.
-    pub upper: Vec<f64>,
-    pub lower: Vec<f64>,
-}
 
 /// Displacements and velocities in lanes.
 #[derive(Clone, Debug)]
@@ -42,8 +31,6 @@ pub(super) struct Chain {
     /// Nearest break positions, in m.
     pub upper: Vec<Row>,
     pub lower: Vec<Row>,
-    /// The same four for the eliminations of a leap, which go from block to block.
-    pub per_block: PerBlock,
     /// Stiffness K_d of the driving spring, in N/m.
     pub drive_stiffness: f64,
     /// Damping rate γ, in 1/s.
@@ -63,12 +50,6 @@ impl Chain {
             pull: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
             lower: layout.filled(f64::NEG_INFINITY),
-            per_block: PerBlock {
-                diagonal: vec![0.0; layout.blocks],
-                pull: vec![0.0; layout.blocks],
-                upper: vec![f64::INFINITY; layout.blocks],
-                lower: vec![f64::NEG_INFINITY; layout.blocks],
-            },
             drive_stiffness: parameters.drive_stiffness,
             damping_rate: parameters.damping_rate,
         };
@@ -78,8 +59,7 @@ impl Chain {
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
             chain.shares[row][lane] = 1.0 / layout.blocks as f64;
-            let diagonal = diagonal / chain.mass;
-            (chain.diagonal[row][lane], chain.per_block.diagonal[block]) = (diagonal, diagonal);
+            chain.diagonal[row][lane] = diagonal / chain.mass;
         }
         chain
     }
@@ -87,13 +67,10 @@ impl Chain {
     /// Updates the coefficients of a block whose contacts have changed.
     pub fn update(&mut self, block: usize, interface: &Interface) {
         let (row, lane) = self.layout.slot(block);
-        let diagonal = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
-        let pull = interface.block_pull[block] / self.mass;
-        let (upper, lower) = (interface.block_upper[block], interface.block_lower[block]);
-        (self.diagonal[row][lane], self.per_block.diagonal[block]) = (diagonal, diagonal);
-        (self.pull[row][lane], self.per_block.pull[block]) = (pull, pull);
-        (self.upper[row][lane], self.per_block.upper[block]) = (upper, upper);
-        (self.lower[row][lane], self.per_block.lower[block]) = (lower, lower);
+        self.diagonal[row][lane] = (self.bare[row][lane] + interface.block_stiffness[block]) / self.mass;
+        self.pull[row][lane] = interface.block_pull[block] / self.mass;
+        self.upper[row][lane] = interface.block_upper[block];
+        self.lower[row][lane] = interface.block_lower[block];
     }
 
     /// The entry of a block.
@@ -104,12 +81,10 @@ impl Chain {
     }
 
     /// Mean of the entries of all blocks.
-    #[inline]
-    pub fn mean(&self, rows: &[Row]) -> f64 {
-        let mut sum = Row::filled(0.0);
-        for (row, shares) in rows.iter().zip(&self.shares) {
-            sum.0 = std::array::from_fn(|lane| sum[lane] + row[lane] * shares[lane]);
-        }
-        sum.reduce(|a, b| a + b)
+    #[inline(always)]
+    pub fn mean<S: Simd>(&self, simd: S, rows: &[Row]) -> f64 {
+        let sums = rows.iter().zip(&self.shares);
+        let add = |sum: S::Vector, (row, share)| sum.plus(simd.load(row).times(simd.load(share)));
+        sums.fold(simd.splat(0.0), add).reduce(|a, b| a + b)
     }
 }

@@ -22,9 +22,10 @@
 //! beyond their argument: some θ/2 products with A carry the motion over θ, a third of what Taylor steps need, and
 //! nothing is evaluated on the way. Contract: each term left out is at most a given part of the motion.
 
-use super::chain::Chain;
+use super::chain::{Chain, State};
+use super::kernels::Kernels;
 use super::layout::Layout;
-use super::simd::{Simd, Vector};
+use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
 
 /// Terms kept beyond θ, as a multiple of θ^(1/3) and in any case: J_n(θ) has fallen under 1e-17 there.
@@ -37,9 +38,9 @@ type Pair = [Vec<Row>; 2];
 /// The propagator and its work space.
 #[derive(Clone, Debug)]
 pub(super) struct ChebyshevPropagator {
-    /// T_{k-1} and T_k, applied to u(0) and to u'(0).
+    /// T_{k-1} and T_k, applied to u(0) and to u'(0), which T_0 leaves as they are.
     before: Pair,
-    here: Pair,
+    pub here: Pair,
     /// u(t) and u'(t).
     sums: Pair,
     /// Diagonal and neighbours' entries of 2A/Λ - 1.
@@ -65,16 +66,18 @@ impl ChebyshevPropagator {
         }
     }
 
-    /// Takes u(0) and u'(0), one entry a block.
-    pub fn start(&mut self, layout: Layout, displacement: &[f64], velocity: &[f64]) {
-        layout.fold(displacement, &mut self.here[0]);
-        layout.fold(velocity, &mut self.here[1]);
-    }
-
-    /// Writes u(t) and u'(t) after [`propagate`], one entry a block.
-    pub fn end(&self, layout: Layout, displacement: &mut [f64], velocity: &mut [f64]) {
-        layout.unfold(&self.sums[0], displacement);
-        layout.unfold(&self.sums[1], velocity);
+    /// Adds the free motion `seconds` s after u(0) and u'(0), which `here` holds, to a state, y = u e^{-γt/2} and
+    /// w = u' e^{-γt/2} - γ y/2, where `left` is e^{-γt/2}. `error` is the part of it that may be left out.
+    pub fn carry(&mut self, chain: &Chain, kernels: &dyn Kernels, [seconds, left, error]: [f64; 3], state: &mut State) {
+        kernels.propagate(chain, seconds, error, self);
+        let half = 0.5 * chain.damping_rate;
+        let [displaced, moved] = &self.sums;
+        for (((x, v), u), rate) in state.displacement.iter_mut().zip(&mut state.velocity).zip(displaced).zip(moved) {
+            for lane in 0..LANES {
+                x[lane] += left * u[lane];
+                v[lane] += left * (rate[lane] - half * u[lane]);
+            }
+        }
     }
 
     /// The coefficients for a spectrum up to Λ and θ = t√Λ, as far as they exceed `error`.

@@ -5,6 +5,15 @@ use super::chain::Chain;
 use crate::solver::harmonic::Harmonic;
 use crate::solver::segment::ForcePath;
 
+/// The driven solution of one block: p0 in m, p1 in m/s, q in m and, with modulation, |q|.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockMotion {
+    pub start: f64,
+    pub rate: f64,
+    pub wave: [f64; 2],
+    pub swing: f64,
+}
+
 /// The driven solution from some instant on, one entry a block.
 #[derive(Clone, Debug)]
 pub(super) struct DrivenSolution {
@@ -33,7 +42,7 @@ impl DrivenSolution {
 
     /// Solves for p0, p1 and q with the inverse pivots and the motion of the drive from now on.
     #[inline(always)]
-    pub fn solve(&mut self, chain: &Chain, drive: &Harmonic) {
+    pub fn solve(&mut self, chain: &Chain, diagonal: &[f64], pull: &[f64], drive: &Harmonic) {
         let coupling = chain.coupling[0][0];
         let pulling = chain.drive_stiffness / chain.mass;
         // What is carried from block to block waits for one product and one sum only.
@@ -45,7 +54,7 @@ impl DrivenSolution {
         }
         // Forward from the leading edge, the right-hand side over the pivot kept in `start`, then back.
         let mut carried = 0.0;
-        let sources = chain.per_block.pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
+        let sources = pull.iter().zip(&self.rate).map(|(pull, rate)| pull - chain.damping_rate * rate);
         for ((start, inverse), own) in self.start.iter_mut().zip(&self.inverse_pivot).zip(sources).rev() {
             carried = (coupling * inverse).mul_add(carried, own * inverse);
             *start = carried;
@@ -57,7 +66,7 @@ impl DrivenSolution {
             *start = carried;
         }
         if drive.amplitude > 0.0 {
-            self.solve_wave(chain, drive, pulling * drive.amplitude);
+            self.solve_wave(chain, diagonal, drive, pulling * drive.amplitude);
         } else if self.wave[0] != [0.0; 2] {
             // A ramp has switched the modulation off.
             self.wave.fill([0.0; 2]);
@@ -66,7 +75,7 @@ impl DrivenSolution {
 
     /// q, with the drive's present phase in it.
     #[inline(always)]
-    fn solve_wave(&mut self, chain: &Chain, drive: &Harmonic, acceleration: f64) {
+    fn solve_wave(&mut self, chain: &Chain, diagonal: &[f64], drive: &Harmonic, acceleration: f64) {
         let blocks = chain.layout.blocks;
         let coupling = chain.coupling[0][0];
         let frequency = drive.angular_frequency;
@@ -74,7 +83,7 @@ impl DrivenSolution {
         let mut ahead = [0.0, 0.0];
         for j in (0..blocks).rev() {
             let squared = coupling * coupling;
-            let pivot = [chain.per_block.diagonal[j] - shift - squared * ahead[0], loss - squared * ahead[1]];
+            let pivot = [diagonal[j] - shift - squared * ahead[0], loss - squared * ahead[1]];
             let scale = 1.0 / (pivot[0] * pivot[0] + pivot[1] * pivot[1]);
             ahead = [pivot[0] * scale, -pivot[1] * scale];
             self.inverse_complex[j] = ahead;
@@ -87,52 +96,51 @@ impl DrivenSolution {
             self.wave[j] = wave;
         }
     }
+}
 
-    /// |q| of a block, in m.
-    pub fn amplitude(&self, block: usize) -> f64 {
-        let [real, imaginary] = self.wave[block];
-        libm::hypot(real, imaginary)
+impl BlockMotion {
+    /// First instant in [`from`, `until`], in s, at which the block is at or beyond a break position; if none, one that is
+    /// later or infinite.
+    pub fn reaches(&self, drive: &Harmonic, [lower, upper]: [f64; 2], [from, until]: [f64; 2]) -> f64 {
+        if drive.amplitude == 0.0 {
+            // The rate is positive, so the ramp alone only rises.
+            return if lower >= self.start { from } else { ((upper - self.start) / self.rate).max(from) };
+        }
+        let rises_before = self.start + self.rate * until + self.swing >= upper;
+        let falls_at_all = self.start + self.rate * from - self.swing <= lower;
+        if !(rises_before || falls_at_all) {
+            return f64::INFINITY;
+        }
+        let phase = libm::atan2(self.wave[1], self.wave[0]);
+        let Self { start, rate, swing: amplitude, .. } = *self;
+        let motion = Harmonic { start, rate, amplitude, phase, angular_frequency: drive.angular_frequency };
+        let rise = if rises_before { motion.first_rise_to(upper, from) } else { f64::INFINITY };
+        let fall = if falls_at_all { motion.first_fall_to(lower, from) } else { f64::INFINITY };
+        rise.min(fall)
     }
 
-    /// The motion of a block whose |q| is `amplitude`, in m.
-    pub fn of_block(&self, block: usize, amplitude: f64, angular_frequency: f64) -> Harmonic {
-        let [real, imaginary] = self.wave[block];
-        let phase = libm::atan2(imaginary, real);
-        Harmonic { start: self.start[block], rate: self.rate[block], amplitude, phase, angular_frequency }
-    }
-
-    /// F_S along the driven solution, in N.
-    pub fn force_path(&self, drive: &Harmonic, stiffness: f64) -> ForcePath<'static> {
-        let (sine, cosine) = libm::sincos(drive.phase);
-        let real = drive.amplitude * cosine - self.wave[0][0];
-        let imaginary = drive.amplitude * sine - self.wave[0][1];
-        ForcePath::Harmonic(Harmonic {
-            start: stiffness * (drive.start - self.start[0]),
-            rate: stiffness * (drive.rate - self.rate[0]),
-            amplitude: stiffness * libm::hypot(real, imaginary),
-            phase: libm::atan2(imaginary, real),
-            angular_frequency: drive.angular_frequency,
-        })
-    }
-
-    /// Displacement of a block after `elapsed` s, in m.
-    pub fn displacement(&self, drive: &Harmonic, block: usize, elapsed: f64) -> f64 {
-        let ramp = self.start[block] + self.rate[block] * elapsed;
+    /// Displacement after `elapsed` s, in m.
+    pub fn displacement(&self, drive: &Harmonic, elapsed: f64) -> f64 {
+        let ramp = self.start + self.rate * elapsed;
         if drive.amplitude == 0.0 {
             return ramp;
         }
         let (sine, cosine) = libm::sincos(drive.turn(elapsed));
-        ramp + product(self.wave[block], [cosine, sine])[0]
+        ramp + product(self.wave, [cosine, sine])[0]
     }
 
-    /// Writes displacements and velocities after `elapsed` s, in m and m/s.
-    pub fn evaluate(&self, drive: &Harmonic, elapsed: f64, displacement: &mut [f64], velocity: &mut [f64]) {
-        let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };
-        for j in 0..self.start.len() {
-            let [real, imaginary] = product(self.wave[j], [cosine, sine]);
-            displacement[j] = self.start[j] + self.rate[j] * elapsed + real;
-            velocity[j] = self.rate[j] - drive.angular_frequency * imaginary;
-        }
+    /// F_S if this is the motion of block 1, in N.
+    pub fn force_path(&self, drive: &Harmonic, stiffness: f64) -> ForcePath<'static> {
+        let (sine, cosine) = libm::sincos(drive.phase);
+        let real = drive.amplitude * cosine - self.wave[0];
+        let imaginary = drive.amplitude * sine - self.wave[1];
+        ForcePath::Harmonic(Harmonic {
+            start: stiffness * (drive.start - self.start),
+            rate: stiffness * (drive.rate - self.rate),
+            amplitude: stiffness * libm::hypot(real, imaginary),
+            phase: libm::atan2(imaginary, real),
+            angular_frequency: drive.angular_frequency,
+        })
     }
 }
 

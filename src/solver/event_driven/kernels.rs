@@ -3,11 +3,13 @@
 use super::chain::{Chain, State};
 use super::chebyshev::{ChebyshevPropagator, propagate};
 use super::free_motion::{SplitMotion, split};
+use super::grid::leap::{Reduction, split_in_lanes};
 use super::grid::{Grid, GridDrive, GridStep, advance, velocity};
+use super::leap::{Split, first_reached, follow, stays_clear};
 use super::series::{Series, evaluate, reachable};
-use super::simd::Simd;
 use super::slider::Slider;
 use super::taylor::{StepInput, expand};
+use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
 use pulp::Scalar512b;
 #[cfg(target_arch = "x86_64")]
@@ -29,6 +31,21 @@ pub(super) trait Kernels {
     fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize;
     /// Writes the velocities of a motion on the grid; see [`velocity`].
     fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State);
+    /// The same as `split` in lanes; see [`split_in_lanes`].
+    fn split_in_lanes(
+        &self,
+        chain: &Chain,
+        drive: &Harmonic,
+        state: &State,
+        reduction: &mut Reduction,
+        split: &mut Split,
+    ) -> Option<f64>;
+    /// Whether no block can reach a break position meanwhile; see [`stays_clear`].
+    fn stays_clear(&self, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool;
+    /// When the first block does, and which; see [`first_reached`].
+    fn first_reached(&self, chain: &Chain, split: &Split, drive: &Harmonic, span: [f64; 2]) -> (f64, Option<usize>);
+    /// Moves a state on along the driven solution; see [`follow`].
+    fn follow(&self, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State);
 }
 
 /// The loops compiled for the features of `S` and for `R` rows, or for any number if that is 0.
@@ -81,6 +98,41 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
         self.0.run(
             #[inline(always)]
             |simd| velocity::<S, R>(simd, chain, step, drive, state),
+        );
+    }
+
+    fn split_in_lanes(
+        &self,
+        chain: &Chain,
+        drive: &Harmonic,
+        state: &State,
+        reduction: &mut Reduction,
+        split: &mut Split,
+    ) -> Option<f64> {
+        self.0.run(
+            #[inline(always)]
+            |simd| split_in_lanes(simd, chain, drive, state, reduction, split),
+        )
+    }
+
+    fn stays_clear(&self, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
+        self.0.run(
+            #[inline(always)]
+            |simd| stays_clear(simd, chain, split, seconds, left),
+        )
+    }
+
+    fn first_reached(&self, chain: &Chain, split: &Split, drive: &Harmonic, span: [f64; 2]) -> (f64, Option<usize>) {
+        self.0.run(
+            #[inline(always)]
+            |simd| first_reached(simd, chain, split, drive, span),
+        )
+    }
+
+    fn follow(&self, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
+        self.0.run(
+            #[inline(always)]
+            |simd| follow(simd, split, drive, elapsed, state),
         );
     }
 }

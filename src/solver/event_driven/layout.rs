@@ -22,15 +22,6 @@ impl Layout {
         (block % self.rows, block / self.rows)
     }
 
-    /// Row and lane of the blocks before and after the one in a slot; after the last one there may be padding.
-    #[inline]
-    pub fn beside(self, row: usize, lane: usize) -> [Option<(usize, usize)>; 2] {
-        let last = self.rows - 1;
-        let before = if row > 0 { Some((row - 1, lane)) } else { lane.checked_sub(1).map(|lane| (last, lane)) };
-        let after = if row < last { Some((row + 1, lane)) } else { (lane + 1 < LANES).then_some((0, lane + 1)) };
-        [before, after]
-    }
-
     /// Block in a slot; beyond the last one for padding.
     pub fn block(self, row: usize, lane: usize) -> usize {
         lane * self.rows + row
@@ -46,15 +37,6 @@ impl Layout {
         for (lane, run) in blocks.chunks_mut(self.rows).enumerate() {
             for (entry, row) in run.iter_mut().zip(rows) {
                 *entry = row[lane];
-            }
-        }
-    }
-
-    /// The reverse of [`Self::unfold`]; padding keeps what it holds.
-    pub fn fold(self, blocks: &[f64], rows: &mut [Row]) {
-        for (lane, run) in blocks.chunks(self.rows).enumerate() {
-            for (entry, row) in run.iter().zip(&mut *rows) {
-                row[lane] = *entry;
             }
         }
     }

@@ -10,9 +10,13 @@
 
 use super::chain::{Chain, State};
 use super::chebyshev::ChebyshevPropagator;
+use super::driven_solution::BlockMotion;
 use super::free_motion::SplitMotion;
+use super::grid::leap::{Passing, Reduction};
 use super::kernels::Kernels;
-use super::layout::Layout;
+use super::slider::Slider;
+use crate::model::Row;
+use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
 use crate::solver::segment::Segment;
@@ -21,31 +25,28 @@ use std::f64::consts::TAU;
 /// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
 
-/// Part of the error of a leap that the reattachments passed by it may add up to.
-const PASSED_SHARE: f64 = 0.2;
-
-/// Free motion at which a contact may attach on the driven solution, in errors of a leap.
-const LOOSE: f64 = 3.0;
-
 /// Part of the error of a leap that each term which the propagator leaves out may have.
 const PROPAGATED_SHARE: f64 = 1e-3;
 
 /// Longest time to carry the free motion over, in units of the shortest time scale of the slider: some 20 MB.
 const MAX_CARRIED_ANGLE: f64 = 1e6;
 
-/// How an attempt to leap ended.
+/// A leap that may be taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Attempt {
-    /// The slider moved on by `elapsed` s; a block reached a break position if one is named. Whether the free
-    /// motion was carried over.
-    Leapt { elapsed: f64, reached: Option<usize>, is_carried: bool },
-    /// Not yet: try again after `seconds` s.
-    Wait { seconds: f64 },
+pub(super) struct Plan {
+    /// The shear force on the way, from time 0 on.
+    pub segment: Segment<'static>,
+    /// The block that reaches a break position at its end, if any.
+    pub reached: Option<usize>,
+    /// Whether it ends at the horizon.
+    pub is_whole: bool,
+    /// The part of the free motion's bound that is left then, if it must be carried over.
+    pub carried: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
-    /// Time to the next reattachment or to the end, in s.
+    /// Time to the next reattachment that is not passed or to the end, in s.
     pub horizon: f64,
     /// Time to the next cycle of a ramped modulation, in s; not before the horizon.
     pub until_cycle_end: f64,
@@ -57,238 +58,258 @@ pub(super) struct Bounds {
     pub largest_force: f64,
 }
 
-/// Leaps, and their work space.
+/// The motion at the start of a leap, split: driven solution and free motion of a row of blocks.
 #[derive(Clone, Debug)]
-pub(super) struct Leap {
-    /// The motion at the start of a leap; displacements and velocities are in the end those after it.
-    motion: SplitMotion,
-    propagator: ChebyshevPropagator,
+pub(super) struct SplitRow {
+    /// p0 in m, p1 in m/s, q in m, and |q|.
+    pub start: Row,
+    pub rate: [Row; 1],
+    pub wave: [Row; 2],
+    pub swing: Row,
+    /// Bound on |y|, in m.
+    pub bound: Row,
+    /// m (S'⁻¹)_jj, in s²: how far a force on a block displaces it, per mass; on the grid only.
+    pub compliance: Row,
 }
 
-impl Leap {
-    pub fn new(layout: Layout) -> Self {
-        Self { motion: SplitMotion::new(layout), propagator: ChebyshevPropagator::new(layout) }
-    }
+#[derive(Clone, Debug)]
+pub(super) struct Split {
+    pub rows: Vec<SplitRow>,
+    /// The rate a at which the bound on the free motion decays, in 1/s.
+    pub decay_rate: f64,
+    /// Begins with y in m and w + a y in m/s.
+    pub propagator: ChebyshevPropagator,
+}
 
-    /// Splits a state into driven solution and free motion. Returns the largest bound on the latter, in m; `None` if it
-    /// does not decay.
-    pub fn split(&mut self, chain: &Chain, kernels: &dyn Kernels, drive: &Harmonic, state: &State) -> Option<f64> {
-        chain.layout.unfold(&state.displacement, &mut self.motion.displacement);
-        chain.layout.unfold(&state.velocity, &mut self.motion.velocity);
-        kernels.split(chain, drive, &mut self.motion)
+impl Split {
+    /// The driven solution of a block.
+    pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
+        let (row, lane) = chain.layout.slot(block);
+        let SplitRow { start, rate: [rate], wave: [real, imaginary], swing, .. } = &self.rows[row];
+        BlockMotion { start: start[lane], rate: rate[lane], wave: [real[lane], imaginary[lane]], swing: swing[lane] }
     }
+}
 
-    /// After how many seconds the free motion, at most `largest` m now, is a small multiple of `error` m.
-    pub fn loose_after(&self, largest: f64, error: f64) -> f64 {
-        libm::log(largest / (LOOSE * error)) / self.motion.free.decay_rate
+/// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
+/// after how many seconds to look again.
+fn plan(
+    split: &Split,
+    chain: &Chain,
+    kernels: &dyn Kernels,
+    drive: &Harmonic,
+    largest: f64,
+    bounds: Bounds,
+) -> Result<Plan, f64> {
+    let Bounds { horizon, until_cycle_end, error, reach, largest_force } = bounds;
+    let decay_rate = split.decay_rate;
+    // Worth another try after some e-foldings of the free motion, or after the next event.
+    let wait = (0.7 / decay_rate).min(horizon);
+    let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
+    let is_short = decay >= horizon;
+    if is_short && decay_rate < 0.5 * chain.damping_rate {
+        return Err(horizon);
     }
-
-    /// Up to when a leap may pass the reattachments that `due` tells one by one, as seconds from now and block, until it
-    /// is told to stop: at most `end`, in s. None is passed in the first `loose` s.
-    ///
-    /// A contact that attaches on the way holds its block back by its stiffness times how far the block has moved since,
-    /// which the driven solution leaves out. The sum of what this displaces may be a part of `error` m.
-    pub fn pass(
-        &self,
-        chain: &Chain,
-        stiffness: f64,
-        reach: f64,
-        drive: &Harmonic,
-        [loose, error, end]: [f64; 3],
-        due: impl FnOnce(&mut dyn FnMut(f64, usize) -> bool),
-    ) -> f64 {
-        let SplitMotion { driven, free, .. } = &self.motion;
-        let allowed = PASSED_SHARE * error;
-        let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, end);
-        due(&mut |seconds, block| {
-            let gained = rate * (seconds - last);
-            if seconds >= limit || displaced + gained > allowed {
-                return false;
-            }
-            if seconds < loose {
-                limit = seconds;
-                return false;
-            }
-            displaced += gained;
-            last = seconds;
-            let speed = driven.rate[block] + drive.angular_frequency * driven.amplitude(block);
-            rate += stiffness / chain.mass * speed * free.compliance[block];
-            // Nor may it break.
-            limit = limit.min(seconds + 0.5 * reach / speed);
-            true
-        });
-        if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit }
+    let horizon = if is_short { horizon.min(max_carried_time(chain)) } else { horizon };
+    let moving = decay.min(horizon);
+    let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
+    if decay > 0.0 && !kernels.stays_clear(chain, split, moving, left) {
+        return Err(wait);
     }
-
-    /// Displacement of a block along the driven solution after `elapsed` s, in m.
-    pub fn driven_displacement(&self, drive: &Harmonic, block: usize, elapsed: f64) -> f64 {
-        self.motion.driven.displacement(drive, block, elapsed)
+    let (elapsed, reached) =
+        if is_short { (horizon, None) } else { kernels.first_reached(chain, split, drive, [decay, horizon]) };
+    if elapsed <= decay && decay > 0.0 && !is_short {
+        return Err(wait);
     }
-
-    /// Tries to leap by at most `horizon` s under a drive that moves as given, leaving out no displacement above
-    /// `error` m, and writes the state at its end. The state has been split; its free motion is at most `largest` m. Shear
-    /// forces up to `largest_force` N have been seen since the last break. `report` receives the shear force on the way,
-    /// `audit` the energies, unless the free motion was carried over.
-    #[expect(clippy::too_many_arguments, reason = "what a leap reads and what it reports")]
-    pub fn attempt(
-        &mut self,
-        chain: &Chain,
-        kernels: &dyn Kernels,
-        drive: &Harmonic,
-        largest: f64,
-        Bounds { horizon, until_cycle_end, error, reach, largest_force }: Bounds,
-        state: &mut State,
-        report: impl FnOnce(Segment<'static>),
-        audit: Option<&Audit>,
-    ) -> Attempt {
-        let layout = chain.layout;
-        // Worth another try after some e-foldings of the free motion, or after the next event.
-        let decay_rate = self.motion.free.decay_rate;
-        let max_wait = horizon;
-        let wait = |folds: f64| Attempt::Wait { seconds: (folds / decay_rate).min(max_wait) };
-        let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
-        let is_short = decay >= horizon;
-        if is_short && decay_rate < 0.5 * chain.damping_rate {
-            return Attempt::Wait { seconds: horizon };
-        }
-        let horizon = if is_short { horizon.min(max_carried_time(chain)) } else { horizon };
-        let moving = decay.min(horizon);
-        let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
-        if decay > 0.0 && !self.stays_clear(chain, drive, moving, left) {
-            return wait(0.7);
-        }
-        let (elapsed, reached) =
-            if is_short { (horizon, None) } else { self.first_reached(chain, drive, decay, horizon) };
-        if elapsed <= decay && decay > 0.0 && !is_short {
-            return wait(0.7);
-        }
-        if !elapsed.is_finite() {
-            return Attempt::Wait { seconds: f64::INFINITY };
-        }
-        let path = self.motion.driven.force_path(drive, chain.drive_stiffness);
-        let segment = Segment { start: 0.0, duration: elapsed, path };
-        // No block moves faster than the first. What attaches later breaks beyond, where nothing is known.
-        let known = until_cycle_end.min(moving + reach / self.motion.driven.rate[0]);
-        if largest > error && !self.hides_no_peak(chain, drive, &segment, [moving, known], left, largest_force) {
-            return wait(0.7);
-        }
-        report(segment);
-        let SplitMotion { displacement, velocity, driven, .. } = &mut self.motion;
-        if !is_short && let Some(audit) = audit {
-            audit.follow_leap(chain, drive, driven, state, elapsed);
-        }
-        driven.evaluate(drive, elapsed, displacement, velocity);
-        if is_short {
-            self.carry_free_motion(chain, kernels, elapsed, left, PROPAGATED_SHARE * error / largest);
-        }
-        layout.fold(&self.motion.displacement, &mut state.displacement);
-        layout.fold(&self.motion.velocity, &mut state.velocity);
-        Attempt::Leapt { elapsed, reached, is_carried: is_short }
+    if !elapsed.is_finite() {
+        return Err(f64::INFINITY);
     }
-
-    /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear
-    /// force: one as large is on record, or comes later in the segment, or comes after it, within `known` s
-    /// and before any break.
-    fn hides_no_peak(
-        &self,
-        chain: &Chain,
-        drive: &Harmonic,
-        segment: &Segment<'_>,
-        [moving, known]: [f64; 2],
-        left: f64,
-        largest_force: f64,
-    ) -> bool {
-        let swing = chain.drive_stiffness * self.motion.free.bound[0];
-        let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
-        let now = segment.force_after(0.0);
-        let later = segment.force_after(moving);
-        let highest = if drive.amplitude == 0.0 {
-            // A rising line and a decaying bound: largest at an end.
-            (now + swing).max(later + left * swing)
-        } else {
-            driven(moving).maximum_above(f64::NEG_INFINITY).map_or(f64::INFINITY, |(_, force)| force) + swing
-        };
-        if highest <= largest_force || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
-            return true;
-        }
-        let rate = chain.drive_stiffness * (drive.rate - self.motion.driven.rate[0]);
-        let further = if drive.amplitude == 0.0 {
-            3.0 * (highest - later) / rate
-        } else {
-            (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
-        };
-        let ahead = (moving + further).min(known);
-        driven(ahead).maximum_above(highest + left * swing).is_some() && self.stays_clear(chain, drive, ahead, left)
+    let first = split.driven(chain, 0);
+    let path = first.force_path(drive, chain.drive_stiffness);
+    let segment = Segment { start: 0.0, duration: elapsed, path };
+    // No block moves faster than the first. What attaches later breaks beyond, where nothing is known.
+    let known = until_cycle_end.min(moving + reach / first.rate);
+    let times = [moving, known, left];
+    if largest > error && !hides_no_peak(split, chain, kernels, drive, &segment, times, largest_force) {
+        return Err(wait);
     }
-
-    /// Carries the free motion over `elapsed` s and adds it, y = u e^{-γt/2} and w = u' e^{-γt/2} - γ y/2, where
-    /// `left` is e^{-γt/2}. At the start u = y and u' = w + γ y/2. `error` is the part of it that may be left out.
-    fn carry_free_motion(&mut self, chain: &Chain, kernels: &dyn Kernels, elapsed: f64, left: f64, error: f64) {
-        let SplitMotion { displacement, velocity, free, .. } = &mut self.motion;
-        self.propagator.start(chain.layout, &free.displacement, &free.shifted_velocity);
-        kernels.propagate(chain, elapsed, error, &mut self.propagator);
-        self.propagator.end(chain.layout, &mut free.displacement, &mut free.shifted_velocity);
-        let half = 0.5 * chain.damping_rate;
-        for j in 0..chain.layout.blocks {
-            displacement[j] += left * free.displacement[j];
-            velocity[j] += left * (free.shifted_velocity[j] - half * free.displacement[j]);
-        }
-    }
-
-    /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free
-    /// motion's bound remains.
-    fn stays_clear(&self, chain: &Chain, drive: &Harmonic, seconds: f64, left: f64) -> bool {
-        let (driven, free) = (&self.motion.driven, &self.motion.free);
-        (0..chain.layout.blocks).all(|j| {
-            let swing = if drive.amplitude > 0.0 { driven.amplitude(j) } else { 0.0 };
-            // Ramp and decaying bound together are convex in time: largest at the ends.
-            let late = driven.start[j] + driven.rate[j] * seconds + left * free.bound[j];
-            let highest = late.max(driven.start[j] + free.bound[j]) + swing;
-            let lowest = driven.start[j] - free.bound[j] - swing;
-            highest < chain.per_block.upper[j] && lowest > chain.per_block.lower[j]
-        })
-    }
-
-    /// The first instant after `decay` at which a block reaches a break position, up to `horizon`, and that block.
-    fn first_reached(&self, chain: &Chain, drive: &Harmonic, decay: f64, horizon: f64) -> (f64, Option<usize>) {
-        let driven = &self.motion.driven;
-        let mut first = (horizon, None);
-        for j in 0..chain.layout.blocks {
-            let (upper, lower) = (chain.per_block.upper[j], chain.per_block.lower[j]);
-            if drive.amplitude == 0.0 {
-                // The rate is positive, so the ramp alone only rises.
-                let elapsed = ((upper - driven.start[j]) / driven.rate[j]).max(decay);
-                if elapsed < first.0 || lower >= driven.start[j] {
-                    first = (if lower >= driven.start[j] { decay } else { elapsed }, Some(j));
-                }
-                continue;
-            }
-            let swing = driven.amplitude(j);
-            let rises_before = driven.start[j] + driven.rate[j] * first.0 + swing >= upper;
-            let falls_at_all = driven.start[j] + driven.rate[j] * decay - swing <= lower;
-            if !(rises_before || falls_at_all) {
-                continue;
-            }
-            let motion = driven.of_block(j, swing, drive.angular_frequency);
-            let rise = if rises_before { motion.first_rise_to(upper, decay) } else { f64::INFINITY };
-            let fall = if falls_at_all { motion.first_fall_to(lower, decay) } else { f64::INFINITY };
-            if rise.min(fall) < first.0 {
-                first = (rise.min(fall), Some(j));
-            }
-        }
-        first
-    }
+    Ok(Plan { segment, reached, is_whole: elapsed == bounds.horizon, carried: is_short.then_some(left) })
 }
 
 /// How long the free motion may be carried over in one leap, in s, so that work and memory are bounded.
 fn max_carried_time(chain: &Chain) -> f64 {
-    let widest = chain.per_block.diagonal.iter().fold(0.0_f64, |most, diagonal| most.max(*diagonal));
+    let widest = chain.diagonal.iter().flat_map(|row| row.iter()).fold(0.0_f64, |most, diagonal| most.max(*diagonal));
     MAX_CARRIED_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
+}
+
+/// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
+/// as large is on record, or comes later in the segment, or comes after it, within `known` s and before any break.
+fn hides_no_peak(
+    split: &Split,
+    chain: &Chain,
+    kernels: &dyn Kernels,
+    drive: &Harmonic,
+    segment: &Segment<'static>,
+    [moving, known, left]: [f64; 3],
+    largest_force: f64,
+) -> bool {
+    let swing = chain.drive_stiffness * split.rows[0].bound[0];
+    let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
+    let now = segment.force_after(0.0);
+    let later = segment.force_after(moving);
+    let highest = if drive.amplitude == 0.0 {
+        // A rising line and a decaying bound: largest at an end.
+        (now + swing).max(later + left * swing)
+    } else {
+        driven(moving).maximum_above(f64::NEG_INFINITY).map_or(f64::INFINITY, |(_, force)| force) + swing
+    };
+    if highest <= largest_force || (segment.duration > moving && segment.maximum_above(highest).is_some()) {
+        return true;
+    }
+    let rate = chain.drive_stiffness * (drive.rate - split.driven(chain, 0).rate);
+    let further = if drive.amplitude == 0.0 {
+        3.0 * (highest - later) / rate
+    } else {
+        (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
+    };
+    let ahead = (moving + further).min(known);
+    driven(ahead).maximum_above(highest + left * swing).is_some() && kernels.stays_clear(chain, split, ahead, left)
+}
+
+/// Leaps, and their work space.
+#[derive(Clone, Debug)]
+pub(super) struct Leap {
+    pub split: Split,
+    /// What splits from block to block between Taylor steps, and in lanes on the grid.
+    by_block: SplitMotion,
+    reduction: Reduction,
+}
+
+impl Leap {
+    pub fn new(chain: &Chain) -> Self {
+        let [start, swing, bound, compliance] = [Row::filled(0.0); 4];
+        let row = SplitRow { start, rate: [start], wave: [start; 2], swing, bound, compliance };
+        let propagator = ChebyshevPropagator::new(chain.layout);
+        let split = Split { rows: vec![row; chain.layout.rows], decay_rate: f64::INFINITY, propagator };
+        Self { split, by_block: SplitMotion::new(chain.layout), reduction: Reduction::new(chain) }
+    }
+
+    /// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies,
+    /// unless the free motion is carried over.
+    pub fn attempt(
+        &mut self,
+        slider: &mut Slider,
+        kernels: &dyn Kernels,
+        drive: &Harmonic,
+        mut bounds: Bounds,
+        passing: Option<Passing>,
+        audit: Option<&Audit>,
+    ) -> Result<Plan, f64> {
+        let Slider { chain, state, interface } = slider;
+        let split = &mut self.split;
+        let largest = if passing.is_some() {
+            kernels.split_in_lanes(chain, drive, state, &mut self.reduction, split)
+        } else {
+            self.by_block.split(chain, kernels, drive, state, split)
+        };
+        let largest = largest.ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
+        if let Some(passing) = passing {
+            bounds.horizon = passing.horizon(split, chain, interface, drive, [largest, bounds.error])?;
+        }
+        let plan = plan(split, chain, kernels, drive, largest, bounds)?;
+        let elapsed = plan.segment.duration;
+        if let Some(audit) = audit.filter(|_| plan.carried.is_none()) {
+            audit.follow_leap(chain, drive, split, state, elapsed);
+        }
+        kernels.follow(split, drive, elapsed, state);
+        if let Some(left) = plan.carried {
+            let error = PROPAGATED_SHARE * bounds.error / largest;
+            split.propagator.carry(chain, kernels, [elapsed, left, error], state);
+        }
+        Ok(plan)
+    }
+}
+
+/// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's
+/// bound remains.
+#[inline(always)]
+pub(super) fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
+    let (seconds, left) = (simd.splat(seconds), simd.splat(left));
+    let mut clear = u8::MAX;
+    for ((row, upper), lower) in split.rows.iter().zip(&chain.upper).zip(&chain.lower) {
+        let (start, bound, swing) = (simd.load(&row.start), simd.load(&row.bound), simd.load(&row.swing));
+        // Ramp and decaying bound together are convex in time: largest at the ends.
+        let late = start.plus(simd.load(&row.rate[0]).times(seconds)).plus(left.times(bound));
+        let highest = late.larger(start.plus(bound)).plus(swing);
+        clear &= simd.load(upper).reaches(highest);
+        clear &= start.minus(bound).minus(swing).reaches(simd.load(lower));
+    }
+    clear == u8::MAX
+}
+
+/// The first instant after `decay` at which a block reaches a break position, up to `horizon`, and that block.
+#[inline(always)]
+pub(super) fn first_reached<S: Simd>(
+    simd: S,
+    chain: &Chain,
+    split: &Split,
+    drive: &Harmonic,
+    [decay, horizon]: [f64; 2],
+) -> (f64, Option<usize>) {
+    let (mut first, mut until) = ((horizon, None), f64::NAN);
+    let (mut ends, mut bend) = ([(0.0, 0.0); 2], 0.0);
+    for (r, row) in split.rows.iter().enumerate() {
+        if until != first.0 {
+            // The cosine exceeds its ends by no more than it bends in between; over long times it is anything up to |q|.
+            until = first.0;
+            let half = 0.5 * drive.angular_frequency * (until - decay);
+            let is_short = drive.amplitude > 0.0 && half < 1.0;
+            ends = if is_short { [decay, until].map(|at| libm::sincos(drive.turn(at))) } else { [(0.0, 0.0); 2] };
+            bend = if is_short { 0.5 * half * half } else { 1.0 };
+        }
+        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        let from = start.plus(rate.times(simd.splat(decay))).plus(turned(simd, row, ends[0]));
+        let to = start.plus(rate.times(simd.splat(until))).plus(turned(simd, row, ends[1]));
+        let beyond = simd.load(&row.swing).times(simd.splat(bend));
+        let (highest, lowest) = (from.larger(to).plus(beyond), from.smaller(to).minus(beyond));
+        let mut lanes = highest.reaches(simd.load(&chain.upper[r])) | simd.load(&chain.lower[r]).reaches(lowest);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            let block = chain.layout.block(r, lane);
+            let levels = [chain.lower[r][lane], chain.upper[r][lane]];
+            let elapsed = split.driven(chain, block).reaches(drive, levels, [decay, first.0]);
+            if elapsed < first.0 {
+                first = (elapsed, Some(block));
+            }
+            lanes &= lanes - 1;
+        }
+    }
+    first
+}
+
+/// Moves a state on along the driven solution, by `elapsed` s.
+#[inline(always)]
+pub(super) fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
+    let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };
+    let (elapsed, frequency) = (simd.splat(elapsed), simd.splat(drive.angular_frequency));
+    for ((row, x), v) in split.rows.iter().zip(&mut state.displacement).zip(&mut state.velocity) {
+        let (start, rate) = (simd.load(&row.start), simd.load(&row.rate[0]));
+        start.plus(rate.times(elapsed)).plus(turned(simd, row, (sine, cosine))).store(x);
+        // -ω Im(q e^{iφ}): ω times the real part a quarter of a turn ahead.
+        rate.plus(frequency.times(turned(simd, row, (cosine, -sine)))).store(v);
+    }
+}
+
+/// Re(q e^{iφ}) from sine and cosine of φ, in m.
+#[inline(always)]
+fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Vector {
+    let [real, imaginary] = &row.wave;
+    simd.load(real).times(simd.splat(cosine)).minus(simd.load(imaginary).times(simd.splat(sine)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::kernels::fastest;
+    use super::super::layout::Layout;
     use super::*;
     use crate::model::Parameters;
 
@@ -297,29 +318,77 @@ mod tests {
         let parameters = Parameters { blocks: 1, damping_rate: 0.0, ..Parameters::default() };
         let layout = Layout::new(1);
         // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
-        let chain = Chain::new(&parameters, layout);
+        let mut slider = Slider::new(&parameters);
+        slider.chain = Chain::new(&parameters, layout);
         let kernels = fastest(layout.rows);
-        let squared = parameters.drive_stiffness / chain.mass;
+        let squared = parameters.drive_stiffness / slider.chain.mass;
         let drive = Harmonic { start: 0.0, rate: 1e-12, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
-        let mut state = State { displacement: layout.filled(0.0), velocity: layout.filled(0.0) };
         let amplitude = 1e-6;
-        state.displacement[0][0] = amplitude;
+        slider.state.displacement[0][0] = amplitude;
         let horizon = 1e9;
+        let mut leap = Leap::new(&slider.chain);
         let bounds =
             Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, reach: 1e-6, largest_force: f64::INFINITY };
-        let mut leap = Leap::new(layout);
-        let largest = leap.split(&chain, &*kernels, &drive, &state).unwrap();
-        let attempt = leap.attempt(&chain, &*kernels, &drive, largest, bounds, &mut state, |_| {}, None);
-        let Attempt::Leapt { elapsed, reached: None, is_carried: true } = attempt else { panic!("{attempt:?}") };
+        let plan = leap.attempt(&mut slider, &*kernels, &drive, bounds, None, None).unwrap();
+        assert!(plan.reached.is_none() && plan.carried.is_some(), "{plan:?}");
+        let elapsed = plan.segment.duration;
         let angle = squared.sqrt() * elapsed;
         assert!(angle > 1e5 && angle <= MAX_CARRIED_ANGLE, "{angle}");
         // A ramp that the block follows, and what is left of its start.
         let ramp = drive.rate * elapsed - drive.rate / squared.sqrt() * libm::sin(angle);
         let expected = ramp + amplitude * libm::cos(angle);
         assert!(
-            (state.displacement[0][0] - expected).abs() < 1e-8 * amplitude,
+            (slider.state.displacement[0][0] - expected).abs() < 1e-8 * amplitude,
             "{}",
-            state.displacement[0][0] - expected
+            slider.state.displacement[0][0] - expected
         );
+    }
+
+    #[test]
+    fn a_leap_ends_where_the_first_block_reaches_a_break_position() {
+        let parameters = Parameters { blocks: 21, ..Parameters::default() };
+        let plain = Harmonic { start: 3e-6, rate: 1e-4, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
+        let phases = (0..200).map(|i| 0.1 * f64::from(i));
+        let modulated = phases.map(|phase| Harmonic { amplitude: 1e-6, phase, angular_frequency: 364.0, ..plain });
+        let (mut slider, kernels) = (Slider::new(&parameters), fastest(3));
+        let mut leap = Leap::new(&slider.chain);
+        for (case, drive) in std::iter::once(plain).chain(modulated).enumerate() {
+            let close = [0.01, 0.5, 0.9, 10.0][case % 4];
+            let Slider { chain, state, .. } = &mut slider;
+            kernels.split_in_lanes(chain, &drive, state, &mut leap.reduction, &mut leap.split).unwrap();
+            let blocks: Vec<BlockMotion> = (0..21).map(|block| leap.split.driven(chain, block)).collect();
+            for (block, motion) in blocks.iter().enumerate() {
+                let (row, lane) = chain.layout.slot(block);
+                let away = close * (1.0 + (block * 8 % 21) as f64 / 42.0);
+                chain.upper[row][lane] = motion.start + away * (motion.swing + 1e-3 * motion.rate);
+                chain.lower[row][lane] = motion.start - away.max(0.999) * motion.swing - 1e-20;
+                leap.split.rows[row].bound[lane] = 0.0;
+            }
+            let is_beyond = |block: usize, seconds: f64| {
+                let (x, (row, lane)) = (blocks[block].displacement(&drive, seconds), chain.layout.slot(block));
+                x >= chain.upper[row][lane] + 1e-16 || x <= chain.lower[row][lane] - 1e-16
+            };
+            for horizon in [1e-4, 1e-3, 4e-3, 0.01, 0.1, f64::INFINITY] {
+                let (elapsed, reached) = kernels.first_reached(chain, &leap.split, &drive, [1e-6, horizon]);
+                assert!(reached.is_some() || elapsed == horizon);
+                let sample = |i: u32| 1e-6 + 0.999 * (elapsed - 1e-6) * f64::from(i) / 100.0;
+                let mut samples = (0..21).flat_map(|block| (0..100).map(move |i| (block, i)));
+                let early = samples.find(|&(block, i)| elapsed > 1e-6 && is_beyond(block, sample(i)));
+                assert_eq!(early, None, "{elapsed} s, at {drive:?}");
+                if let Some(block) = reached {
+                    assert!((1..100).any(|i| is_beyond(block, elapsed + 1e-7 * f64::from(i))), "{block} is not there");
+                    assert!(!kernels.stays_clear(chain, &leap.split, elapsed + 1e-5, 0.0));
+                }
+                if elapsed.is_finite() {
+                    kernels.follow(&leap.split, &drive, elapsed, state);
+                    for (block, motion) in blocks.iter().enumerate() {
+                        let expected = motion.displacement(&drive, elapsed);
+                        assert!(
+                            (chain.at(&state.displacement, block) - expected).abs() < 1e-15 * expected.abs().max(1e-6)
+                        );
+                    }
+                }
+            }
+        }
     }
 }

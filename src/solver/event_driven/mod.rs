@@ -20,7 +20,6 @@ mod kernels;
 mod layout;
 mod leap;
 mod series;
-mod simd;
 mod slider;
 mod step;
 mod taylor;
@@ -28,9 +27,10 @@ mod tolerances;
 
 use self::frame::Frame;
 use self::grid::Grid;
+use self::grid::leap::Passing;
 use self::kernels::Kernels;
 use self::layout::Layout;
-use self::leap::{Attempt, Bounds, Leap};
+use self::leap::{Bounds, Leap, Plan};
 use self::slider::Slider;
 use self::step::{Step, StepControl};
 use self::tolerances::Tolerances;
@@ -106,10 +106,10 @@ impl<'a> Integration<'a> {
             frame: Frame::new(Drive::new(parameters), span),
             takes_grid,
             grid: Grid::new(parameters, tolerance, &slider.chain, &slider.state),
+            leap: Leap::new(&slider.chain),
             slider,
             control: StepControl::new(tolerances.max_step),
             step: Step::new(layout),
-            leap: Leap::new(layout),
             next_leap: 0.0,
             largest_force: 0.0,
             summary: Summary::default(),
@@ -121,7 +121,7 @@ impl<'a> Integration<'a> {
     /// has nothing to drop if an observer panics.
     #[inline(never)]
     fn integrate(&mut self, observer: &mut dyn Observer) -> Result<Summary, SimulationError> {
-        self.grid.set_tells_attachments(observer.follows_attachments());
+        self.grid.set_observed(observer);
         let mut next_check = STEPS_PER_CHECK;
         for event in self.slider.interface.initial_attachments() {
             observer.contact(&event);
@@ -200,75 +200,43 @@ impl<'a> Integration<'a> {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let (start, began) = (self.frame.now(), self.frame.time);
-        let error = self.tolerances.leap_error;
-        let Slider { chain, state, interface } = &mut self.slider;
-        let Some(largest) = self.leap.split(chain, &*self.kernels, &drive, state) else {
-            let seconds = (2.0 / chain.damping_rate).min(horizon);
-            self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
-            return false;
-        };
-        let mut horizon = horizon;
-        if self.takes_grid {
-            let loose = self.leap.loose_after(largest, error);
-            let Tolerances { contact_stiffness, contact_reach, .. } = self.tolerances;
-            let passed = self.leap.pass(
-                chain,
-                contact_stiffness,
-                contact_reach,
-                &drive,
-                [loose, error, until_change],
-                |visit| interface.look_ahead(|due, block| visit(due - began, block)),
-            );
-            horizon = horizon.max(passed);
-            let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
-            if horizon < least {
-                self.next_leap = self.frame.time + loose.clamp(0.5 * least, 4.0 * least);
+        let Tolerances { leap_error: error, contact_reach: reach, max_step, .. } = self.tolerances;
+        let bounds = Bounds { horizon, until_cycle_end, error, reach, largest_force: self.largest_force };
+        let before = self.audit.is_some().then(|| self.slider.state.clone());
+        let kernels = &*self.kernels;
+        let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
+        let passing = self.takes_grid.then_some(Passing { start: began, least, most: until_change });
+        let attempt = self.leap.attempt(&mut self.slider, kernels, &drive, bounds, passing, self.audit);
+        let Plan { segment, reached, is_whole, carried } = match attempt {
+            Ok(plan) => plan,
+            Err(seconds) => {
+                self.next_leap = began + seconds.max(max_step);
                 return false;
             }
-        }
-        let bounds = Bounds {
-            horizon,
-            until_cycle_end,
-            error,
-            reach: self.tolerances.contact_reach,
-            largest_force: self.largest_force,
         };
-        let mut reported = None;
-        let report = |segment: Segment<'static>| reported = Some(Segment { start, ..segment });
-        let before = self.audit.is_some().then(|| state.clone());
-        let attempt = self.leap.attempt(chain, &*self.kernels, &drive, largest, bounds, state, report, self.audit);
-        match attempt {
-            Attempt::Wait { seconds } => {
-                self.next_leap = self.frame.time + seconds.max(self.tolerances.max_step);
-                false
-            }
-            Attempt::Leapt { elapsed, reached, is_carried } => {
-                if let Some(reported) = &reported {
-                    self.tell_leap(reported, &drive, began, observer);
-                    if let Some(before) = before.filter(|_| is_carried) {
-                        self.audit_carried_leap(before, reported);
-                    }
-                }
-                self.grid.is_on = false;
-                self.summary.steps += 1;
-                self.summary.leaps += 1;
-                self.next_leap = 0.0;
-                self.arrive(elapsed, elapsed == horizon);
-                match reached {
-                    Some(block) => {
-                        let (x, trailing) = (self.slider.displacement(block), self.slider.state.displacement[0][0]);
-                        let mean = self.slider.mean_displacement();
-                        self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
-                    }
-                    None => self.reattach_due(observer),
-                }
-                true
-            }
+        let segment = Segment { start, ..segment };
+        self.tell_leap(&segment, &drive, began, observer);
+        if let Some(before) = before.filter(|_| carried.is_some()) {
+            self.audit_carried_leap(before, &segment);
         }
+        self.grid.is_on = false;
+        self.summary.steps += 1;
+        self.summary.leaps += 1;
+        self.next_leap = 0.0;
+        self.arrive(segment.duration, is_whole);
+        match reached {
+            Some(block) => {
+                let (x, trailing) = (self.slider.displacement(block), self.slider.state.displacement[0][0]);
+                let mean = self.slider.mean_displacement();
+                self.break_block(block, [x, mean], self.frame.shear_force(trailing), observer);
+            }
+            None => self.reattach_due(observer),
+        }
+        true
     }
 
     /// Tells the shear force along a leap that began at a time in s in the frame, and attaches on the driven solution what
-    /// it passed.
+    /// it passed from the grid.
     fn tell_leap(&mut self, leap: &Segment<'static>, drive: &Harmonic, began: f64, observer: &mut dyn Observer) {
         let ForcePath::Harmonic(path) = leap.path else { unreachable!("a leap follows the driven solution") };
         let mut told = 0.0;
@@ -285,7 +253,7 @@ impl<'a> Integration<'a> {
             if self.grid.tells_attachments() {
                 tell(due - began, observer);
             }
-            let x = self.leap.driven_displacement(drive, block, due - began);
+            let x = self.leap.split.driven(&self.slider.chain, block).displacement(drive, due - began);
             self.attach_next(x, observer);
         }
         tell(leap.duration, observer);
@@ -322,7 +290,7 @@ impl<'a> Integration<'a> {
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
-        let event = self.slider.attach_next(x);
+        let event = if self.takes_grid { self.slider.attach_running(x) } else { self.slider.attach_next(x) };
         self.summary.reattachments += 1;
         if self.grid.tells_attachments() {
             observer.contact(&self.frame.absolute(event));

@@ -3,9 +3,10 @@
 
 use super::chain::{Chain, State};
 use super::layout::Layout;
-use super::simd::{Simd, Vector};
 use crate::model::Row;
+use crate::model::simd::{Simd, Vector};
 use crate::solver::polynomial::{INVERSE, MAX_COEFFICIENTS};
+use pulp::Scalar512b;
 
 /// 1/p!.
 pub(super) const INVERSE_FACTORIAL: [f64; MAX_COEFFICIENTS] = {
@@ -86,7 +87,7 @@ impl Series {
     /// Mean displacement of the blocks at s, in m, to third order: the slider as a whole moves far more slowly than its blocks.
     pub fn mean(&self, chain: &Chain, s: f64) -> f64 {
         let terms = self.terms.chunks(self.rows).take(self.order.min(3) + 1).zip(&INVERSE_FACTORIAL);
-        terms.rev().fold(0.0, |sum, (term, inverse)| sum * s + inverse * chain.mean(term))
+        terms.rev().fold(0.0, |sum, (term, inverse)| sum * s + inverse * chain.mean(Scalar512b, term))
     }
 
     /// Adds to the first coefficients Y_p/p! of one block, in m. The order is at least that of the last.

@@ -3,6 +3,7 @@
 use super::chain::{Chain, State};
 use super::layout::Layout;
 use crate::model::{ContactEvent, Interface, Parameters};
+use pulp::Scalar512b;
 
 /// Contacts, chain and motion, which change together. All displacements are those of the frame.
 #[derive(Clone, Debug)]
@@ -38,7 +39,7 @@ impl Slider {
     /// Mean displacement of the blocks, in m.
     #[inline]
     pub fn mean_displacement(&self) -> f64 {
-        self.chain.mean(&self.state.displacement)
+        self.chain.mean(Scalar512b, &self.state.displacement)
     }
 
     /// Breaks the contacts of a block that has reached a break position, at displacement `x` m.
@@ -56,6 +57,14 @@ impl Slider {
     #[inline]
     pub fn attach_next(&mut self, x: f64) -> ContactEvent {
         let event = self.interface.reattach_next(x);
+        self.chain.update(event.block, &self.interface);
+        event
+    }
+
+    /// The same with the sums of its block carried on.
+    #[inline]
+    pub fn attach_running(&mut self, x: f64) -> ContactEvent {
+        let event = self.interface.reattach_running(Scalar512b, x);
         self.chain.update(event.block, &self.interface);
         event
     }

@@ -7,8 +7,8 @@
 
 use super::chain::{Chain, State};
 use super::series::{DriveDerivatives, INVERSE_FACTORIAL, Series};
-use super::simd::{Simd, Vector};
 use crate::model::Row;
+use crate::model::simd::{Simd, Vector};
 use crate::solver::polynomial::MAX_COEFFICIENTS;
 
 /// Largest order of a step.

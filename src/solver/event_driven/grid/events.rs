@@ -1,33 +1,32 @@
 //! Contact events within a step of the grid, without redoing it.
 //!
-//! Within a step, σ from 0 to 1, a block moves as X(σ) = x + σ q + ((r³ - r) a0 + (σ³ - σ) a1)/6 with r = 1 - σ, where
-//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s changes the force on its block and so its motion by
-//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = σ - s, and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`super::super::step`], where
-//! the same terms are derived. Added at ξ = 1 - s they correct the displacement, and at ξ = -s, backwards, the increment.
+//! Within a step, s from 0 to 1, a block moves as X(s) = x + s q + ((r³ - r) a0 + (s³ - s) a1)/6 with r = 1 - s, where
+//! a0 and a1 are h² x'' at both ends: of fourth order. An event at s' changes the force on its block and so its motion by
+//! δ2 ξ² + δ3 ξ³ + δ4 ξ⁴, ξ = s - s', and that of its neighbours by h² K_int/m δ2/12 ξ⁴; see [`super::super::step`], where
+//! the same terms are derived. Added at s = 1 they correct the displacement, and at s = 0, backwards, the increment.
 
 use super::super::slider::Slider;
 use super::Grid;
-use super::step::{GridDrive, GridStep};
-use crate::model::{ContactEvent, Interface};
+use super::step::{GridDrive, GridStep, Place};
+use crate::model::simd::Simd;
+use crate::model::{ContactEvent, Interface, Row};
 
 const SIXTH: f64 = 1.0 / 6.0;
-/// A step of third order below this leaves an error of its cube, and one of Newton's an error of its square: a billionth of a
-/// step or less.
-const CUBIC: f64 = 1e-3;
-const QUADRATIC: f64 = 1e-5;
-const MAX_NEWTON_STEPS: usize = 4;
+/// A step of third order below this leaves an error of its cube: a billionth of a step of the grid.
+const ENOUGH: f64 = 1e-3;
+const MAX_HALLEY_STEPS: usize = 6;
 
-/// The motion of one block within a step, as a polynomial about its last event.
+/// The motion of one block within a step.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     block: usize,
     /// Row and lane of the block, and its entry in the diagonal of S without contacts, in N/m.
     slot: (usize, usize),
     bare: f64,
-    /// Where in the step it is expanded.
-    about: f64,
-    /// Coefficients in σ - `about`, in m.
+    /// Coefficients by s, in m.
     coefficients: [f64; 5],
+    /// Where in the step its last event is.
+    from: f64,
     /// Displacement at the end of the step and increment up to there without events, in m.
     eventless: Correction,
     /// What events add to the blocks beside.
@@ -42,84 +41,82 @@ pub(super) struct Correction {
 }
 
 impl Path {
-    /// The path of a block over the last step.
+    /// The path of a block over the last step, under the present law.
     #[inline(always)]
-    fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize, (row, lane): (usize, usize)) -> Self {
-        let layout = slider.chain.layout;
-        let x = &slider.state.displacement;
-        let end = x[row][lane];
-        let rise = step.increment[row][lane];
-        let [before, after] = layout.beside(row, lane).map(|slot| slot.map_or(0.0, |(row, lane)| x[row][lane]));
-        let mut force = step.force_on(row, lane, [before, end, after]);
-        if block == 0 {
-            force += step.pulling * drive.displacement();
-        }
+    fn new(slider: &Slider, step: &GridStep, drive: &GridDrive, block: usize) -> Self {
+        let (x, q) = (&slider.state.displacement, &step.increment);
+        let Place { slot: (row, lane), before, after, shares } = step.places[block];
+        let (end, rise) = (x[row][lane], q[row][lane]);
+        let beside = |rows: &[Row]| shares[0].mul_add(rows[before.0][before.1], shares[1] * rows[after.0][after.1]);
+        let (beside_end, beside_rise) = (beside(x), beside(q));
+        let pulls = if block == 0 { step.pulling } else { 0.0 };
+        let last_force = pulls.mul_add(drive.displacement(), step.force_on(row, lane, beside_end, end));
+        let beside_start = beside_end - beside_rise;
+        let first_force =
+            pulls.mul_add(drive.displacement_before(), step.force_on(row, lane, beside_start, end - rise));
         // x'' = φ - γh x' at both ends, with the slopes of this very path.
         let damping = step.damping;
-        let (from, to) = (step.force[row][lane] - damping * rise, force - damping * rise);
-        let inverse = step.inverse_damped;
-        let first = ((1.0 + 2.0 * SIXTH * damping) * from + SIXTH * damping * to) * inverse;
-        let last = ((1.0 - 2.0 * SIXTH * damping) * to - SIXTH * damping * from) * inverse;
-        let coefficients = [end - rise, rise - (2.0 * first + last) * SIXTH, 0.5 * first, (last - first) * SIXTH, 0.0];
-        let bare = slider.chain.bare[row][lane];
-        let eventless = Correction { displacement: end, increment: rise };
-        Self { block, slot: (row, lane), bare, about: 0.0, coefficients, eventless, beside: Correction::default() }
+        let (from, to) = (damping.mul_add(-rise, first_force), damping.mul_add(-rise, last_force));
+        let [across, along_first, along_last] = step.damped;
+        let (first, last) = (across.mul_add(to, along_first * from), across.mul_add(-from, along_last * to));
+        let slope = SIXTH.mul_add(-2.0f64.mul_add(first, last), rise);
+        let coefficients = [end - rise, slope, 0.5 * first, (last - first) * SIXTH, 0.0];
+        Self {
+            block,
+            slot: (row, lane),
+            bare: slider.chain.bare[row][lane],
+            coefficients,
+            from: 0.0,
+            eventless: Correction { displacement: end, increment: rise },
+            beside: Correction::default(),
+        }
     }
 
-    /// Displacement at a point of the step, in m.
+    /// Displacement, slope and half the curvature at s, in m.
     #[inline(always)]
-    fn at(&self, s: f64) -> f64 {
+    fn at(&self, s: f64) -> [f64; 3] {
         let [c0, c1, c2, c3, c4] = self.coefficients;
-        let beyond = s - self.about;
-        c0 + beyond * (c1 + beyond * (c2 + beyond * (c3 + beyond * c4)))
+        [
+            c4.mul_add(s, c3).mul_add(s, c2).mul_add(s, c1).mul_add(s, c0),
+            (4.0 * c4).mul_add(s, 3.0 * c3).mul_add(s, 2.0 * c2).mul_add(s, c1),
+            (6.0 * c4).mul_add(s, 3.0 * c3).mul_add(s, c2),
+        ]
     }
 
-    /// Adds δ2 ξ² + δ3 ξ³ + δ4 ξ⁴ from the point of expansion on.
+    /// Displacement at the end of the step, in m.
     #[inline(always)]
-    fn change_by(&mut self, [second, third, fourth]: [f64; 3]) {
-        self.coefficients[2] += second;
-        self.coefficients[3] += third;
-        self.coefficients[4] += fourth;
-    }
-
-    /// Expands it about another point of the step.
-    #[inline(always)]
-    fn move_to(&mut self, s: f64) {
-        let by = s - self.about;
+    fn end(&self) -> f64 {
         let [c0, c1, c2, c3, c4] = self.coefficients;
-        self.coefficients = [
-            c0 + by * (c1 + by * (c2 + by * (c3 + by * c4))),
-            c1 + by * (2.0 * c2 + by * (3.0 * c3 + by * 4.0 * c4)),
-            c2 + by * (3.0 * c3 + by * 6.0 * c4),
-            c3 + by * 4.0 * c4,
-            c4,
-        ];
-        self.about = s;
+        (c0 + c1) + ((c2 + c3) + c4)
     }
 
-    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end: two steps of Halley's,
-    /// the first from the point of expansion, and where they do not suffice Newton's.
+    /// Adds δ2 ξ² + δ3 ξ³ + δ4 ξ⁴ from an event at s on.
+    #[inline(always)]
+    fn change_by(&mut self, s: f64, [second, third, fourth]: [f64; 3]) {
+        let [c0, c1, c2, c3, c4] = &mut self.coefficients;
+        *c0 = fourth.mul_add(s, -third).mul_add(s, second).mul_add(s * s, *c0);
+        *c1 = (4.0 * fourth).mul_add(s, -3.0 * third).mul_add(s, 2.0 * second).mul_add(-s, *c1);
+        *c2 += (6.0 * fourth).mul_add(s, -3.0 * third).mul_add(s, second);
+        *c3 += (4.0 * fourth).mul_add(-s, third);
+        *c4 += fourth;
+        self.from = s;
+    }
+
+    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end, by Halley's steps.
     #[inline(always)]
     fn crossing(&self, level: f64) -> f64 {
-        let [c0, c1, c2, c3, c4] = self.coefficients;
-        let (before, left) = (c0 - level, 1.0 - self.about);
-        let within = |beyond: f64| if beyond > 0.0 { if beyond < left { beyond } else { left } } else { 0.0 };
-        let halley = |height: f64, slope: f64, half: f64| height * slope / (slope * slope - height * half);
-        let s = within(-halley(before, c1, c2));
-        let height = before + s * (c1 + s * (c2 + s * (c3 + s * c4)));
-        let slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4)));
-        let half = c2 + s * (3.0 * c3 + s * (6.0 * c4));
-        let (mut last, mut enough) = (s, CUBIC);
-        let mut s = within(s - halley(height, slope, half));
-        for _ in 0..MAX_NEWTON_STEPS {
-            if (s - last).abs() < enough {
+        let within = |s: f64| if s > self.from { if s < 1.0 { s } else { 1.0 } } else { self.from };
+        let halley = |[x, slope, half]: [f64; 3]| (x - level) * slope / slope.mul_add(slope, (level - x) * half);
+        let [c0, c1, c2, ..] = self.coefficients;
+        let mut s = within(-halley([c0, c1, c2]));
+        for _ in 0..MAX_HALLEY_STEPS {
+            let last = s;
+            s = within(last - halley(self.at(last)));
+            if (s - last).abs() < ENOUGH {
                 break;
             }
-            let height = before + s * (c1 + s * (c2 + s * (c3 + s * c4)));
-            let slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4)));
-            (s, last, enough) = (within(s - height / slope), s, QUADRATIC);
         }
-        self.about + s
+        s
     }
 }
 
@@ -132,8 +129,8 @@ pub(super) struct StepEvents {
     pub events: Vec<ContactEvent>,
     pub breaks: u64,
     pub reattachments: u64,
-    /// Paths of the blocks to which it has.
-    paths: Vec<Path>,
+    /// Means over the blocks after breaks: displacement and increment, in m.
+    pub mean: [f64; 2],
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
 }
@@ -141,34 +138,20 @@ pub(super) struct StepEvents {
 /// Breaks and attaches what the last step reaches and what is due in it, in the order of time at each block. The step began
 /// at `start` s in the frame.
 #[inline(always)]
-pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) {
+pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
     let Grid { step, drive, events, .. } = grid;
-    let StepEvents { paths, .. } = events;
-    paths.clear();
-    for &(row, lane) in &step.reached {
-        let block = slider.chain.layout.block(row, lane);
-        paths.push(Path::new(slider, step, drive, block, (row, lane)));
+    for index in 0..step.reached.len() {
+        let (row, lane) = step.reached[index];
+        let mut path = Path::new(slider, step, drive, slider.chain.layout.block(row, lane));
+        break_along(simd, &mut slider.interface, step, events, &mut path, start);
+        settle(simd, slider, step, &path);
     }
-    let end = start + step.length;
-    loop {
-        let mut paths = std::mem::take(&mut events.paths);
-        for path in &mut paths {
-            break_along(&mut slider.interface, step, events, path, start);
-        }
-        events.paths = paths;
-        // Breaks may have made something due within the step.
-        let Some((due, block)) = slider.interface.next_reattachment_by(end) else { break };
-        let known = events.paths.iter().position(|path| path.block == block);
-        let mut path = match known {
-            Some(index) => events.paths.swap_remove(index),
-            None => Path::new(slider, step, drive, block, slider.chain.layout.slot(block)),
-        };
-        path.move_to(((due - start) * step.inverse_length).clamp(0.0, 1.0));
-        attach(&mut slider.interface, step, events, &mut path);
-        events.paths.push(path);
-    }
-    for path in &events.paths {
-        settle(slider, step, path);
+    // Breaks may have made something due within the step, and what attaches lets a block reach other contacts or not.
+    while let Some((due, block)) = slider.interface.next_reattachment_by(start + step.length) {
+        let mut path = Path::new(slider, step, drive, block);
+        attach(simd, &mut slider.interface, step, events, &mut path, (due - start) * step.inverse_length);
+        break_along(simd, &mut slider.interface, step, events, &mut path, start);
+        settle(simd, slider, step, &path);
     }
     if !events.events.is_sorted_by(|a, b| a.time <= b.time) {
         events.events.sort_by(|a, b| a.time.total_cmp(&b.time));
@@ -177,14 +160,21 @@ pub(super) fn change_contacts(slider: &mut Slider, grid: &mut Grid, start: f64) 
 
 /// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach.
 #[inline(always)]
-fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, path: &mut Path, start: f64) {
+fn break_along<S: Simd>(
+    simd: S,
+    interface: &mut Interface,
+    step: &GridStep,
+    events: &mut StepEvents,
+    path: &mut Path,
+    start: f64,
+) {
     let block = path.block;
     loop {
-        let end = path.at(1.0);
+        let end = path.end();
         if end < interface.block_upper[block] && end > interface.block_lower[block] {
             return;
         }
-        interface.reached(block, end, &mut events.contacts);
+        interface.reached(simd, block, end, &mut events.contacts);
         let own = step.by_mass * (path.bare + interface.block_stiffness[block]);
         let mut until = interface.next_reattachment_at(block, start + step.length);
         let mut broken = 0;
@@ -194,17 +184,14 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
             if time > until {
                 break;
             }
-            path.move_to(s);
-            path.coefficients[0] = level;
-            let (event, due) = interface.break_contact(block, contact, time, level);
-            let [_, slope, half_curvature, ..] = path.coefficients;
+            let (event, due) = interface.break_contact(simd, block, contact, time, level);
+            let [_, slope, half_curvature] = path.at(s);
             let stiffened = -step.by_mass * event.stiffness;
             let second = 0.5 * step.by_mass * event.force;
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
             let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
-            path.change_by([second, third, fourth]);
-            let (ahead, back) = (1.0 - path.about, path.about);
-            let [ahead, back] = [ahead * ahead, back * back].map(|square| square * square);
+            path.change_by(s, [second, third, fourth]);
+            let [ahead, back] = [1.0 - s, s].map(|by| (by * by) * (by * by));
             let beside = 0.5 * SIXTH * step.coupling * second;
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);
@@ -217,15 +204,23 @@ fn break_along(interface: &mut Interface, step: &GridStep, events: &mut StepEven
             return;
         }
         events.breaks += broken;
-        interface.gather(block);
+        interface.gather(simd, block);
     }
 }
 
-/// Attaches the contact that is due where a path is expanded: unstressed there, so that its force only grows.
+/// Attaches the contact that is due next, at s: unstressed there, so that its force only grows.
 #[inline(always)]
-fn attach(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, path: &mut Path) {
-    let [x, slope, half_curvature, ..] = path.coefficients;
-    let event = interface.reattach_next(x);
+fn attach<S: Simd>(
+    simd: S,
+    interface: &mut Interface,
+    step: &GridStep,
+    events: &mut StepEvents,
+    path: &mut Path,
+    s: f64,
+) {
+    let s = s.clamp(0.0, 1.0);
+    let [x, slope, half_curvature] = path.at(s);
+    let event = interface.reattach_running(simd, x);
     if events.tells_attachments {
         events.events.push(event);
     }
@@ -233,20 +228,22 @@ fn attach(interface: &mut Interface, step: &GridStep, events: &mut StepEvents, p
     let stiffened = step.by_mass * event.stiffness;
     let third = -SIXTH * stiffened * slope;
     let fourth = -0.5 * SIXTH * stiffened * half_curvature - 0.25 * step.damping * third;
-    path.change_by([0.0, third, fourth]);
+    path.change_by(s, [0.0, third, fourth]);
 }
 
 /// Enters what has happened to a block into the motion.
 #[inline(always)]
-fn settle(slider: &mut Slider, step: &mut GridStep, path: &Path) {
-    let Slider { chain, interface, state } = slider;
-    chain.update(path.block, interface);
-    let displacement = path.at(1.0);
+fn settle<S: Simd>(simd: S, slider: &mut Slider, step: &mut GridStep, path: &Path) {
+    let Slider { interface, state, .. } = slider;
+    let block = path.block;
+    let levels = [interface.block_upper[block], interface.block_lower[block]];
+    step.update(simd, path.slot, path.bare + interface.block_stiffness[block], interface.block_pull[block], levels);
+    let displacement = path.end();
     let own = Correction {
         displacement: displacement - path.eventless.displacement,
-        increment: displacement - path.at(0.0) - path.eventless.increment,
+        increment: displacement - path.coefficients[0] - path.eventless.increment,
     };
-    step.correct(chain, path.block, path.slot, [own, path.beside], &mut state.displacement);
+    step.correct(simd, block, [own, path.beside], &mut state.displacement);
 }
 
 #[cfg(test)]
@@ -254,20 +251,30 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn path(coefficients: [f64; 5], about: f64) -> Path {
+    fn path(coefficients: [f64; 5], from: f64) -> Path {
         let none = Correction::default();
-        Path { block: 0, slot: (0, 0), bare: 0.0, about, coefficients, eventless: none, beside: none }
+        Path { block: 0, slot: (0, 0), bare: 0.0, coefficients, from, eventless: none, beside: none }
     }
 
     proptest! {
         #[test]
-        fn a_path_is_the_same_about_any_point(
-            coefficients in prop::array::uniform5(-1.0_f64..1.0), from in 0.0_f64..1.0, to in 0.0_f64..1.0, s in 0.0_f64..1.0
+        fn an_event_changes_a_path_about_where_it_is(
+            coefficients in prop::array::uniform5(-1.0_f64..1.0), change in prop::array::uniform3(-1.0_f64..1.0),
+            event in 0.0_f64..1.0, s in 0.0_f64..1.0
         ) {
-            let before = path(coefficients, from);
+            let before = path(coefficients, 0.0);
             let mut after = before;
-            after.move_to(to);
-            prop_assert!((before.at(s) - after.at(s)).abs() < 1e-14);
+            after.change_by(event, change);
+            let (by, [second, third, fourth]) = (s - event, change);
+            let expected = [
+                by * by * (second + by * (third + by * fourth)),
+                by * (2.0 * second + by * (3.0 * third + by * 4.0 * fourth)),
+                second + by * (3.0 * third + by * 6.0 * fourth),
+            ];
+            for ((after, before), expected) in after.at(s).into_iter().zip(before.at(s)).zip(expected) {
+                prop_assert!((after - before - expected).abs() < 1e-14);
+            }
+            prop_assert!((after.end() - after.at(1.0)[0]).abs() < 1e-14);
         }
 
         /// Paths that rise: a block that has passed a break position mostly came straight to it.
@@ -278,10 +285,12 @@ mod tests {
         ) {
             let sign = if falls { -1.0 } else { 1.0 };
             let path = path([0.3, sign * slope, curved[0], curved[1], curved[2]], about);
-            let level = path.at(about) + part * (path.at(1.0) - path.at(about));
+            let [from, to] = [about, 1.0].map(|s| path.at(s)[0]);
+            let level = from + part * (to - from);
             let s = path.crossing(level);
             prop_assert!((about..=1.0).contains(&s), "{}", s);
-            prop_assert!((path.at(s) - level).abs() < 1e-8, "{} at {}, not {}", path.at(s), s, level);
+            let [x, ..] = path.at(s);
+            prop_assert!((x - level).abs() < 1e-8, "{} at {}, not {}", x, s, level);
         }
     }
 

@@ -5,7 +5,12 @@ use crate::solver::segment::{CubicStep, Extremes, ForcePath, Segment};
 /// Steps of shear force, from somewhere in the first of them on.
 #[derive(Clone, Debug)]
 pub(super) struct ForceHistory {
+    /// Whether all steps are kept, or only the first and the last.
+    pub keeps_all: bool,
     steps: Vec<CubicStep>,
+    count: usize,
+    /// Whether the last step turns or lies beside one that does.
+    turns: bool,
     /// Where in the first step it begins.
     first: f64,
     /// The time there, in s in the frame.
@@ -17,40 +22,66 @@ pub(super) struct ForceHistory {
 
 impl ForceHistory {
     pub fn new() -> Self {
-        Self { steps: Vec::new(), first: 0.0, start: 0.0, inner: Extremes::NONE, integral: 0.0 }
+        Self {
+            keeps_all: true,
+            steps: Vec::new(),
+            count: 0,
+            turns: false,
+            first: 0.0,
+            start: 0.0,
+            inner: Extremes::NONE,
+            integral: 0.0,
+        }
     }
 
     /// Restarts at a time in s, with the next step.
     pub fn restart(&mut self, start: f64) {
         self.steps.clear();
-        *self = Self { steps: std::mem::take(&mut self.steps), start, ..Self::new() };
+        *self = Self { keeps_all: self.keeps_all, steps: std::mem::take(&mut self.steps), start, ..Self::new() };
     }
 
     pub fn len(&self) -> usize {
-        self.steps.len()
+        self.count
     }
 
+    /// Adds a step. Slopes are continuous, so that the force turns at most in the two steps of which one rises.
     #[inline(always)]
     pub fn push(&mut self, step: CubicStep) {
-        if let [_, .., last] = &self.steps[..] {
-            self.inner.include_step((self.steps.len() - 1) as f64, last);
-        }
         self.integral += step.integral();
-        self.steps.push(step);
+        let Some(last) = self.steps.last_mut() else {
+            (self.count, self.turns) = (1, false);
+            return self.steps.push(step);
+        };
+        let turns = last.rises() != step.rises();
+        if self.count > 1 && (self.turns || turns) {
+            self.inner.include_step((self.count - 1) as f64, last);
+        }
+        if self.count == 1 || self.keeps_all {
+            self.steps.push(step);
+        } else {
+            *last = step;
+        }
+        self.count += 1;
+        self.turns = turns;
     }
 
     /// The segment up to s in the last step, with `origin` s to add to times in the frame.
     #[inline]
     pub fn segment_to(&self, s: f64, spacing: f64, origin: f64) -> Option<Segment<'_>> {
         let (first, last) = (self.steps.first()?, self.steps.last()?);
-        let steps = (self.steps.len() - 1) as f64 + s - self.first;
+        let steps = (self.count - 1) as f64 + s - self.first;
         let before = if self.first > 0.0 { first.integral_to(self.first) } else { 0.0 };
         let beyond = if s < 1.0 { last.integral() - last.integral_to(s) } else { 0.0 };
         let path = ForcePath::Grid {
             steps: &self.steps,
+            count: self.count,
             first: self.first,
             spacing,
             inner: self.inner,
+            bounds: {
+                let ([low, high], [lowest, highest]) = (first.bounds(), last.bounds());
+                [self.inner.least.1.min(low).min(lowest), self.inner.largest.1.max(high).max(highest)]
+            },
             end: last.value(s),
             integral: self.integral - before - beyond,
         };
@@ -60,7 +91,7 @@ impl ForceHistory {
     /// Forgets all before s in the last step, which is at a time in s.
     #[inline]
     pub fn forget_to(&mut self, s: f64, time: f64) {
-        let last = self.steps.pop();
+        let last = self.steps.last().copied();
         self.restart(time);
         if let Some(last) = last.filter(|_| s < 1.0) {
             self.push(last);

@@ -5,6 +5,7 @@
 
 mod events;
 mod history;
+pub(super) mod leap;
 mod step;
 
 pub(super) use self::step::{GridDrive, GridStep, velocity};
@@ -12,13 +13,13 @@ pub(super) use self::step::{GridDrive, GridStep, velocity};
 use self::events::{StepEvents, change_contacts};
 use self::history::ForceHistory;
 use self::step::{MAX_RUN, march};
-use super::Integration;
 use super::chain::{Chain, State};
 use super::frame::{Frame, MIN_RESOLUTION};
-use super::simd::Simd;
 use super::slider::Slider;
 use super::taylor::StepInput;
+use super::{Integration, WORTHWHILE_GRID_LEAP};
 use crate::model::equation::largest_frequency;
+use crate::model::simd::Simd;
 use crate::model::{Change, ContactEvent, Parameters};
 use crate::solver::segment::CubicStep;
 use crate::solver::{Observer, SimulationError};
@@ -29,7 +30,7 @@ const MAX_STEP: f64 = 2.5;
 /// The step in units of 1/ω_s of a block on its contacts alone, by that in units of 1/ω_max.
 const CONTACT_SHARE: f64 = 0.12;
 /// Time in the frame at which it moves, in s: rounding is far below the errors of the grid.
-pub(super) const FRAME_SPAN: f64 = 0.5;
+pub(super) const FRAME_SPAN: f64 = 4.0;
 /// Steps of history after which it is told.
 const MAX_HISTORY: usize = 4 * MAX_RUN;
 
@@ -56,6 +57,10 @@ pub(super) struct Grid {
     history: ForceHistory,
     /// Shear force at the present point, in N.
     force: f64,
+    /// The last event, in s in the frame, and the pause after which a rupture may begin, in s: half of that after which it
+    /// does.
+    last_break: f64,
+    pause: f64,
     /// The state one step before an entry.
     before: State,
 }
@@ -69,6 +74,8 @@ impl Grid {
             events: StepEvents::default(),
             history: ForceHistory::new(),
             force: 0.0,
+            last_break: f64::NEG_INFINITY,
+            pause: 0.5 * parameters.wave_crossing_time(),
             before: state.clone(),
         }
     }
@@ -83,8 +90,10 @@ impl Grid {
         self.events.tells_attachments
     }
 
-    pub fn set_tells_attachments(&mut self, tells: bool) {
-        self.events.tells_attachments = tells;
+    /// Notes what the observer follows.
+    pub fn set_observed(&mut self, observer: &dyn Observer) {
+        self.events.tells_attachments = observer.follows_attachments();
+        self.history.keeps_all = observer.follows_force();
     }
 
     /// Takes over a frame that has moved.
@@ -92,6 +101,7 @@ impl Grid {
         self.step.update_all(chain);
         self.drive = frame.grid_drive(self.step.length);
         self.history.restart(frame.time);
+        self.last_break = f64::NEG_INFINITY;
     }
 
     /// Adds the last run of steps to the history, but for its last step. `before` is the shear force one step before
@@ -115,7 +125,7 @@ impl Grid {
         let (step, drive) = (&self.step, &self.drive);
         let x = |block: usize| if block < chain.layout.blocks { chain.at(&state.displacement, block) } else { 0.0 };
         let (here, rise) = (x(0), step.increment[0][0]);
-        let own = step.force_on(0, 0, [0.0, here, x(1)]) + step.pulling * drive.displacement();
+        let own = step.force_on(0, 0, x(1), here) + step.pulling * drive.displacement();
         // h² x'' at the start of the step and, from the law of motion, at its end.
         let first = start_bend - bend * step.inverse_stiffness;
         let last = (own - step.damping * (rise + first / 6.0)) * step.inverse_end;
@@ -145,7 +155,11 @@ pub(super) fn advance<S: Simd, const R: usize>(
     grid.events.events.clear();
     (grid.events.breaks, grid.events.reattachments) = (0, 0);
     if !grid.step.reached.is_empty() || slider.interface.next_reattachment() <= start + grid.step.length {
-        change_contacts(slider, grid, start);
+        change_contacts(simd, slider, grid, start);
+        if grid.events.breaks > 0 {
+            let Slider { chain, state, .. } = slider;
+            grid.events.mean = [chain.mean(simd, &state.displacement), chain.mean(simd, &grid.step.increment)];
+        }
     }
     grid.follow_last(&slider.chain, &slider.state, at_start, start_bend);
     done
@@ -187,6 +201,7 @@ impl Integration<'_> {
             self.tell_force(1.0, observer);
             let Self { kernels, slider, grid, .. } = self;
             kernels.velocity(&slider.chain, &mut grid.step, &grid.drive, &mut slider.state);
+            grid.step.hand_back(&mut slider.chain);
             self.frame.set_time(self.frame.time);
         }
     }
@@ -212,11 +227,18 @@ impl Integration<'_> {
         if !self.grid.is_on {
             self.enter_grid()?;
         }
-        let until_attach =
-            (self.slider.interface.next_reattachment() - self.frame.time) * self.grid.step.inverse_length;
-        // Casts saturate: nothing need be due.
+        let steps_until = |time: f64| {
+            // Casts saturate: nothing need be due.
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, which saturates")]
+            (((time - self.frame.time) * self.grid.step.inverse_length) as usize).saturating_add(1)
+        };
+        // To the next reattachment, and to where a leap may be tried.
+        let mut steps = steps_until(self.slider.interface.next_reattachment());
+        if self.next_leap > self.frame.time {
+            steps = steps.min(steps_until(self.next_leap));
+        }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count, which saturates")]
-        let steps = (room as usize).min((until_attach as usize).saturating_add(1));
+        let steps = steps.min(room as usize);
         let done = self.kernels.advance(&mut self.slider, &mut self.grid, self.frame.time, steps);
         self.summary.steps += done as u64;
         self.summary.grid_steps += done as u64;
@@ -224,6 +246,9 @@ impl Integration<'_> {
         self.summary.reattachments += self.grid.events.reattachments;
         let start = self.frame.time + (done - 1) as f64 * length;
         self.frame.time += done as f64 * length;
+        if self.grid.events.breaks > 0 {
+            self.next_leap = self.next_leap.max(self.frame.time + WORTHWHILE_GRID_LEAP * length);
+        }
         self.tell_events(start, observer);
         self.largest_force = self.largest_force.max(self.grid.force);
         if self.grid.history.len() > MAX_HISTORY {
@@ -244,7 +269,8 @@ impl Integration<'_> {
     }
 
     /// Tells what has happened in the last step, and the shear force up to it: event after event to an observer that
-    /// follows attachments; else up to the first break, so that a pause before it shows, and then up to the last.
+    /// follows attachments; else up to the last break, and before to those at the leading edge, at which a slip's onset is
+    /// known, and to the first if it may begin a rupture.
     fn tell_events(&mut self, start: f64, observer: &mut dyn Observer) {
         if self.grid.events.events.is_empty() {
             return;
@@ -253,12 +279,14 @@ impl Integration<'_> {
         if events.iter().any(|event| event.change == Change::Break) {
             self.largest_force = f64::NEG_INFINITY;
         }
-        let chain = &self.slider.chain;
-        let [mean, rise] = [&self.slider.state.displacement, &self.grid.step.increment].map(|rows| chain.mean(rows));
+        let [mean, rise] = self.grid.events.mean;
+        let may_begin = events[0].time - self.grid.last_break > self.grid.pause;
+        let leading = self.slider.chain.layout.blocks - 1;
         let mut rest = &events[..];
         while let [first, ..] = rest {
-            let is_alone = self.grid.tells_attachments() || rest.len() == events.len();
-            let (told, later) = rest.split_at(if is_alone { 1 } else { rest.len() });
+            let is_alone = self.grid.tells_attachments() || (may_begin && rest.len() == events.len());
+            let last = if is_alone { Some(0) } else { rest.iter().position(|event| event.block == leading) };
+            let (told, later) = rest.split_at(last.map_or(rest.len(), |last| last + 1));
             let until = told.last().unwrap_or(first).time;
             self.tell_force(((until - start) * self.grid.step.inverse_length).clamp(0.0, 1.0), observer);
             for event in told {
@@ -268,6 +296,7 @@ impl Integration<'_> {
             }
             rest = later;
         }
+        self.grid.last_break = events.last().map_or(f64::NEG_INFINITY, |event| event.time);
         self.grid.events.events = events;
     }
 }

@@ -12,8 +12,9 @@
 //! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present law.
 
 use super::super::chain::{Chain, State};
-use super::super::simd::{Simd, Vector};
+use super::super::layout::Layout;
 use super::events::Correction;
+use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
 
 /// Longest run of steps without a look at the clock.
@@ -81,6 +82,28 @@ impl GridDrive {
     }
 }
 
+/// Row and lane of a block and of those beside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub slot: (usize, usize),
+    pub before: (usize, usize),
+    pub after: (usize, usize),
+    /// 1 for each block beside that there is, else 0, and its slot is the block's own.
+    pub shares: [f64; 2],
+}
+
+impl Place {
+    fn new(layout: Layout, block: usize) -> Self {
+        let slot = layout.slot(block);
+        let beside =
+            |other: Option<usize>| other.filter(|other| *other < layout.blocks).map(|other| layout.slot(other));
+        let (before, after) = (beside(block.checked_sub(1)), beside(Some(block + 1)));
+        let share = |beside: Option<(usize, usize)>| if beside.is_some() { 1.0 } else { 0.0 };
+        let shares = [share(before), share(after)];
+        Self { slot, before: before.unwrap_or(slot), after: after.unwrap_or(slot), shares }
+    }
+}
+
 /// What a step multiplies with, in units of h².
 #[derive(Clone, Debug)]
 pub(in super::super) struct GridStep {
@@ -88,9 +111,9 @@ pub(in super::super) struct GridStep {
     pub length: f64,
     pub inverse_length: f64,
     pub square: f64,
-    /// γh, and 1/(1 - (γh)²/12).
+    /// γh, and γh/6, 1 + γh/3, 1 - γh/3 over 1 - (γh)²/12: the weights of both ends in h² x''.
     pub damping: f64,
-    pub inverse_damped: f64,
+    pub damped: [f64; 3],
     /// 1/(1 + γh/3), and 1/K_d in m/N.
     pub inverse_end: f64,
     pub inverse_stiffness: f64,
@@ -121,6 +144,8 @@ pub(in super::super) struct GridStep {
     pub trail: [f64; MAX_RUN],
     /// Row and lane of every block that reached a break position in the last step.
     pub reached: Vec<(usize, usize)>,
+    /// Where each block lies.
+    pub(super) places: Vec<Place>,
     saved_displacement: Vec<Row>,
     saved_increment: Vec<Row>,
 }
@@ -137,7 +162,8 @@ impl GridStep {
             inverse_length: 1.0 / length,
             square,
             damping: 2.0 * half,
-            inverse_damped: 1.0 / (1.0 - half * half / 3.0),
+            damped: [half / 3.0, 1.0 + 2.0 / 3.0 * half, 1.0 - 2.0 / 3.0 * half]
+                .map(|weight| weight / (1.0 - half * half / 3.0)),
             inverse_end: 1.0 / (1.0 + 2.0 / 3.0 * half),
             inverse_stiffness: 1.0 / chain.drive_stiffness,
             by_mass: square / chain.mass,
@@ -157,6 +183,7 @@ impl GridStep {
             force: layout.filled(0.0),
             trail: [0.0; MAX_RUN],
             reached: Vec::new(),
+            places: (0..layout.blocks).map(|block| Place::new(layout, block)).collect(),
             saved_displacement: layout.filled(0.0),
             saved_increment: layout.filled(0.0),
         };
@@ -169,56 +196,72 @@ impl GridStep {
         step
     }
 
-    /// The coefficients of the block in a slot: pull, diagonal, own.
-    #[inline(always)]
-    fn coefficients(&self, chain: &Chain, row: usize, lane: usize) -> [f64; 3] {
-        let diagonal = self.square * chain.diagonal[row][lane];
-        [self.square * chain.pull[row][lane], -diagonal, self.first - self.second * diagonal]
-    }
-
     /// Takes over the coefficients of all blocks.
     pub fn update_all(&mut self, chain: &Chain) {
         for row in 0..chain.layout.rows {
             for lane in 0..LANES {
-                [self.pull[row][lane], self.diagonal[row][lane], self.own[row][lane]] =
-                    self.coefficients(chain, row, lane);
+                let diagonal = self.square * chain.diagonal[row][lane];
+                self.pull[row][lane] = self.square * chain.pull[row][lane];
+                self.diagonal[row][lane] = -diagonal;
+                self.own[row][lane] = self.first - self.second * diagonal;
             }
         }
         self.upper.copy_from_slice(&chain.upper);
         self.lower.copy_from_slice(&chain.lower);
     }
 
-    /// Takes over the coefficients of a block, and the corrections to its motion and to that of the blocks beside.
+    /// Takes over what a block feels of its contacts: the diagonal of S in N/m, the pull in N, the nearest break positions
+    /// in m.
     #[inline(always)]
-    pub(super) fn correct(
+    pub(super) fn update<S: Simd>(
         &mut self,
-        chain: &Chain,
-        block: usize,
+        simd: S,
         (row, lane): (usize, usize),
+        diagonal: f64,
+        pull: f64,
+        [upper, lower]: [f64; 2],
+    ) {
+        let diagonal = self.by_mass * diagonal;
+        simd.set(&mut self.pull[row], lane, self.by_mass * pull);
+        simd.set(&mut self.diagonal[row], lane, -diagonal);
+        simd.set(&mut self.own[row], lane, self.first - self.second * diagonal);
+        simd.set(&mut self.upper[row], lane, upper);
+        simd.set(&mut self.lower[row], lane, lower);
+    }
+
+    /// Gives the chain the coefficients of all blocks.
+    pub fn hand_back(&self, chain: &mut Chain) {
+        let by_square = 1.0 / self.square;
+        for row in 0..chain.layout.rows {
+            for lane in 0..LANES {
+                chain.diagonal[row][lane] = -by_square * self.diagonal[row][lane];
+                chain.pull[row][lane] = by_square * self.pull[row][lane];
+            }
+        }
+        chain.upper.copy_from_slice(&self.upper);
+        chain.lower.copy_from_slice(&self.lower);
+    }
+
+    /// Adds the corrections to the motion of a block and of the blocks beside.
+    #[inline(always)]
+    pub(super) fn correct<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
         [own, beside]: [Correction; 2],
         displacement: &mut [Row],
     ) {
-        let [pull, diagonal, own_coefficient] = self.coefficients(chain, row, lane);
-        self.pull[row].set(lane, pull);
-        self.diagonal[row].set(lane, diagonal);
-        self.own[row].set(lane, own_coefficient);
-        self.upper[row].set(lane, chain.upper[row][lane]);
-        self.lower[row].set(lane, chain.lower[row][lane]);
-        add(displacement, row, lane, own.displacement);
-        add(&mut self.increment, row, lane, own.increment);
-        if beside.displacement != 0.0 || beside.increment != 0.0 {
-            let [before, after] = chain.layout.beside(row, lane);
-            for (row, lane) in before.into_iter().chain(after.filter(|_| block + 1 < chain.layout.blocks)) {
-                add(displacement, row, lane, beside.displacement);
-                add(&mut self.increment, row, lane, beside.increment);
-            }
+        let Place { slot, before, after, shares } = self.places[block];
+        for (slot, by, share) in [(slot, own, 1.0), (before, beside, shares[0]), (after, beside, shares[1])] {
+            add(simd, displacement, slot, share * by.displacement);
+            add(simd, &mut self.increment, slot, share * by.increment);
         }
     }
 
-    /// φ of the block in a slot at given displacements of it and of its neighbours, but for the drive, in m.
-    #[inline]
-    pub fn force_on(&self, row: usize, lane: usize, [before, here, after]: [f64; 3]) -> f64 {
-        self.coupling * (before + after) + (self.diagonal[row][lane] * here + self.pull[row][lane])
+    /// φ of the block in a slot at the displacements of it and of both blocks beside together, but for the drive, in m.
+    #[inline(always)]
+    pub fn force_on(&self, row: usize, lane: usize, beside: f64, here: f64) -> f64 {
+        self.coupling.mul_add(beside, self.diagonal[row][lane].mul_add(here, self.pull[row][lane]))
     }
 }
 
@@ -243,9 +286,9 @@ const FIRST_LANE: Row = {
 };
 
 #[inline(always)]
-fn add(rows: &mut [Row], row: usize, lane: usize, value: f64) {
+fn add<S: Simd>(simd: S, rows: &mut [Row], (row, lane): (usize, usize), value: f64) {
     let sum = rows[row][lane] + value;
-    rows[row].set(lane, sum);
+    simd.set(&mut rows[row], lane, sum);
 }
 
 /// Takes at most `steps` steps, and none after one in which a block reaches a break position. Returns how many.
@@ -258,10 +301,103 @@ pub(super) fn march<S: Simd, const R: usize>(
     displacement: &mut [Row],
     steps: usize,
 ) -> usize {
-    let rows = if R == 0 { chain.layout.rows } else { R };
-    let x = &mut displacement[..rows];
     let steps = steps.min(MAX_RUN);
     step.reached.clear();
+    let (done, reached) = if R > 0 && S::HAS_MANY_REGISTERS {
+        march_in_registers::<S, R>(simd, chain, step, drive, displacement, steps)
+    } else {
+        march_in_memory::<S, R>(simd, chain, step, drive, displacement, steps)
+    };
+    if reached {
+        note_reached(simd, [&step.upper, &step.lower], displacement, &mut step.reached);
+    }
+    done
+}
+
+/// The steps of [`march`], with the motion in registers. Whether a block reached a break position in the last.
+#[inline(always)]
+fn march_in_registers<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &mut GridDrive,
+    displacement: &mut [Row],
+    steps: usize,
+) -> (usize, bool) {
+    let displacement = &mut displacement[..R];
+    let (increment, force) = (&mut step.increment[..R], &mut step.force[..R]);
+    let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
+    let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
+    let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
+    let first_lane = simd.load(&FIRST_LANE);
+    let decay = simd.splat(step.decay);
+    let (mut x, mut q, mut f) = ([first_lane; R], [first_lane; R], [first_lane; R]);
+    for r in 0..R {
+        x[r] = simd.load(&displacement[r]);
+        q[r] = simd.load(&increment[r]);
+    }
+    let mut done = 0;
+    let mut reached = [0_u8; R];
+    let mut is_any = false;
+    while done < steps && !is_any {
+        let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
+        for r in 0..R {
+            let before = if r > 0 { x[r - 1] } else { x[R - 1].to_next_lane() };
+            let after = if r + 1 < R { x[r + 1] } else { x[0].to_lane_before() };
+            let mut own = simd.load(&pull[r]);
+            if r == 0 {
+                own = first_lane.mul_add(simd.splat(push), own);
+            }
+            let own = x[r].mul_add(simd.load(&diagonal[r]), own);
+            f[r] = before.plus(after).mul_add(simd.load(&couplings[r]), own);
+        }
+        for r in 0..R {
+            let before = if r > 0 { f[r - 1] } else { f[R - 1].to_next_lane() };
+            let after = if r + 1 < R { f[r + 1] } else { f[0].to_lane_before() };
+            let mut kept = q[r].times(decay);
+            if r == 0 {
+                kept = first_lane.mul_add(simd.splat(correction), kept);
+            }
+            let own = f[r].mul_add(simd.load(&own[r]), kept);
+            q[r] = before.plus(after).mul_add(simd.load(&second_couplings[r]), own);
+            x[r] = x[r].plus(q[r]);
+            reached[r] = x[r].reaches(simd.load(&upper[r])) | simd.load(&lower[r]).reaches(x[r]);
+        }
+        is_any = reached.iter().fold(0, |any, lanes| any | lanes) != 0;
+        drive.advance();
+        x[0].store(&mut displacement[0]);
+        step.trail[done] = chain.drive_stiffness * (drive.displacement() - displacement[0][0]);
+        done += 1;
+    }
+    for r in 0..R {
+        x[r].store(&mut displacement[r]);
+        q[r].store(&mut increment[r]);
+        f[r].store(&mut force[r]);
+    }
+    if is_any {
+        // At most sixteen rows have registers.
+        let mut bits = reached.iter().rev().fold(0_u128, |bits, lanes| bits << LANES | u128::from(*lanes));
+        while bits != 0 {
+            let first = bits.trailing_zeros() as usize;
+            step.reached.push((first / LANES, first % LANES));
+            bits &= bits - 1;
+        }
+    }
+    (done, false)
+}
+
+/// The same for any number of rows, with the motion in memory.
+#[inline(always)]
+fn march_in_memory<S: Simd, const R: usize>(
+    simd: S,
+    chain: &Chain,
+    step: &mut GridStep,
+    drive: &mut GridDrive,
+    displacement: &mut [Row],
+    steps: usize,
+) -> (usize, bool) {
+    let rows = if R == 0 { chain.layout.rows } else { R };
+    let x = &mut displacement[..rows];
     let last = rows - 1;
     let (q, force) = (&mut step.increment[..rows], &mut step.force[..rows]);
     let (pull, diagonal, own) = (&step.pull[..rows], &step.diagonal[..rows], &step.own[..rows]);
@@ -307,11 +443,10 @@ pub(super) fn march<S: Simd, const R: usize>(
         drive.advance();
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if reached != 0 {
-            note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
-            return done;
+            return (done, true);
         }
     }
-    steps
+    (steps, false)
 }
 
 /// What the drive adds to φ of block 1, and to its increment beside, in m.

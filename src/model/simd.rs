@@ -7,12 +7,12 @@
 //! `pulp` takes 1.4 % fewer instructions than intrinsics in `unsafe` blocks of our own, and the same time within 1 %.
 //! `fearless_simd` needs no code here, but has AVX-512 from Ice Lake on only, and AVX2 takes 10 to 17 % more time.
 
-use crate::model::{LANES, Row};
+use super::lanes::{LANES, Row};
 use pulp::{Scalar512b as Baseline, WithSimd, bytemuck};
 use std::array;
 
 /// A set of processor features that this processor has.
-pub(super) trait Simd: pulp::Simd {
+pub(crate) trait Simd: pulp::Simd {
     /// Eight doubles, in whatever registers there are.
     type Vector: Vector<Simd = Self>;
     /// Whether some twenty vectors fit into the registers.
@@ -26,6 +26,12 @@ pub(super) trait Simd: pulp::Simd {
     #[inline(always)]
     fn load(self, row: &Row) -> Self::Vector {
         Self::Vector::load(self, row)
+    }
+
+    /// Sets one lane by writing the whole row: reading a row after a piece of it has been written takes long.
+    #[inline(always)]
+    fn set(self, row: &mut Row, lane: usize, value: f64) {
+        self.load(row).with(lane, value).store(row);
     }
 
     /// Runs a loop, compiled for these features where it is inlined.
@@ -47,7 +53,7 @@ impl<S, T, F: FnOnce(S) -> T> WithSimd for HotLoop<S, F> {
     }
 }
 
-pub(super) trait Vector: Copy {
+pub(crate) trait Vector: Copy {
     type Simd;
     fn splat(simd: Self::Simd, value: f64) -> Self;
     fn load(simd: Self::Simd, row: &Row) -> Self;
@@ -55,11 +61,24 @@ pub(super) trait Vector: Copy {
     fn plus(self, other: Self) -> Self;
     fn minus(self, other: Self) -> Self;
     fn times(self, other: Self) -> Self;
+    fn over(self, other: Self) -> Self;
+    /// The square root.
+    fn root(self) -> Self;
     /// `self * factor + addend`, rounded once.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
     fn abs(self) -> Self;
-    /// The larger of each lane; either where one is not a number.
+    /// The larger and the smaller of each lane; either where one is not a number.
     fn larger(self, other: Self) -> Self;
+    fn smaller(self, other: Self) -> Self;
+    /// All lanes combined into one value, in pairs.
+    #[inline(always)]
+    fn reduce(self, combine: impl Fn(f64, f64) -> f64) -> f64 {
+        let mut row = Row::filled(0.0);
+        self.store(&mut row);
+        row.reduce(combine)
+    }
+    /// The same with another value in one lane.
+    fn with(self, lane: usize, value: f64) -> Self;
     /// One bit a lane: `self >= other`.
     fn reaches(self, other: Self) -> u8;
     /// Whether no lane exceeds that of `bound` or is not a number.
@@ -80,14 +99,21 @@ trait Registers<const K: usize>: pulp::Simd {
     fn to_lane_before(self, registers: [Self::f64s; K]) -> [Self::f64s; K];
 }
 
+/// The number of each lane.
+const NUMBERS: Row = Row([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+
 /// Eight doubles in `K` registers.
 #[derive(Clone, Copy)]
-pub(super) struct Lanes<S: pulp::Simd, const K: usize>(S, [S::f64s; K]);
+pub(crate) struct Lanes<S: pulp::Simd, const K: usize>(S, [S::f64s; K]);
 
 impl<S: pulp::Simd, const K: usize> Lanes<S, K> {
+    /// A loop, since closures may be compiled without the features of the token.
     #[inline(always)]
-    fn zip(self, other: Self, combine: impl Fn(S, S::f64s, S::f64s) -> S::f64s) -> Self {
-        Self(self.0, array::from_fn(|k| combine(self.0, self.1[k], other.1[k])))
+    fn zip(mut self, other: Self, combine: impl Fn(S, S::f64s, S::f64s) -> S::f64s) -> Self {
+        for k in 0..K {
+            self.1[k] = combine(self.0, self.1[k], other.1[k]);
+        }
+        self
     }
 }
 
@@ -102,7 +128,9 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     #[inline(always)]
     fn load(simd: S, row: &Row) -> Self {
         let (registers, _) = S::as_simd_f64s(&row.0);
-        Self(simd, array::from_fn(|k| registers[k]))
+        let mut lanes = [registers[0]; K];
+        lanes.copy_from_slice(registers);
+        Self(simd, lanes)
     }
 
     #[inline(always)]
@@ -127,18 +155,49 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     }
 
     #[inline(always)]
-    fn mul_add(self, factor: Self, addend: Self) -> Self {
-        Self(self.0, array::from_fn(|k| self.0.mul_add_f64s(self.1[k], factor.1[k], addend.1[k])))
+    fn over(self, other: Self) -> Self {
+        self.zip(other, S::div_f64s)
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0, self.1.map(|register| self.0.abs_f64s(register)))
+    fn root(mut self) -> Self {
+        for register in &mut self.1 {
+            *register = self.0.sqrt_f64s(*register);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn mul_add(mut self, factor: Self, addend: Self) -> Self {
+        for k in 0..K {
+            self.1[k] = self.0.mul_add_f64s(self.1[k], factor.1[k], addend.1[k]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn abs(mut self) -> Self {
+        for register in &mut self.1 {
+            *register = self.0.abs_f64s(*register);
+        }
+        self
     }
 
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         self.zip(other, S::max_f64s)
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.zip(other, S::min_f64s)
+    }
+
+    #[inline(always)]
+    fn with(self, lane: usize, value: f64) -> Self {
+        let (simd, chosen, value) = (self.0, self.0.splat_f64s(lane as f64), self.0.splat_f64s(value));
+        Self::load(simd, &NUMBERS)
+            .zip(self, |_, number, kept| simd.select_f64s(simd.equal_f64s(number, chosen), value, kept))
     }
 
     #[inline(always)]
@@ -159,6 +218,11 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
 
 impl Simd for Baseline {
     type Vector = Lanes<Self, 1>;
+
+    #[inline(always)]
+    fn set(self, row: &mut Row, lane: usize, value: f64) {
+        row[lane] = value;
+    }
 }
 
 impl Registers<1> for Baseline {
