@@ -76,6 +76,8 @@ def stick_slip(results: Path) -> Section:
     )
     ends = [0, *((low + high) / 2 for low, high in pairwise(modes)), slips["interval"].max()]
     of_modes = [slips[slips["interval"].between(low, high)] for low, high in pairwise(ends)]
+    # Slips of one seed give no interval.
+    of_modes = [rows for rows in of_modes if rows["seed"].nunique() > 1]
     large = [share(rows["largest_precursor"] >= LARGE, rows["seed"]) for rows in of_modes]
     numbers = [rows["precursors"].mean() for rows in of_modes]
     section.check(
