@@ -96,7 +96,9 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
         }
     }
 
-    for parameters in [Parameters::default(), modulated()] {
+    // The slow one moves the frame between slips.
+    let slow = Parameters { drive_velocity: 1e-6, ..Parameters::default() };
+    for parameters in [Parameters::default(), modulated(), slow] {
         let recording = Recording { slips: 8, discard: 0, drop_size: Some(20.0), ..Recording::default() };
         let limits = Limits { end_time: f64::INFINITY, events: u64::MAX, interrupt: None };
         let mut alone = SlipObserver::new(&parameters, &recording);
@@ -111,6 +113,8 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
             assert!((slip.onset - other.onset).abs() < 1e-9, "{slip:?} {other:?}");
             assert!((slip.peak_force - other.peak_force).abs() < 1e-6, "{slip:?} {other:?}");
             assert!((slip.drop - other.drop).abs() < 1e-6, "{slip:?} {other:?}");
+            // From the force at the first and at the last break.
+            assert!((slip.edge_distance / other.edge_distance - 1.0).abs() < 1e-8, "{slip:?} {other:?}");
         }
     }
 }

@@ -57,8 +57,8 @@ pub(super) struct Grid {
     history: ForceHistory,
     /// Shear force at the present point, in N.
     force: f64,
-    /// The last event, in s in the frame, and the pause after which a rupture may begin, in s: half of that after which it
-    /// does.
+    /// The last break told since an entry or a move of the frame, in s in the frame, and the pause after which a rupture
+    /// may begin, in s: half of that after which it does.
     last_break: f64,
     pause: f64,
     /// The state one step before an entry.
@@ -191,6 +191,7 @@ impl Integration<'_> {
         grid.drive = self.frame.grid_drive(length);
         grid.force = self.frame.shear_force(state.displacement[0][0]);
         grid.history.restart(self.frame.time);
+        grid.last_break = f64::NEG_INFINITY;
         grid.is_on = true;
         Ok(())
     }
