@@ -100,7 +100,7 @@ struct ContactRow {
     lower: Row,
 }
 
-/// The lives of eight contacts, apart from their rows, which so stay in the first-level cache.
+/// The lives of eight contacts, apart from their rows: of these all are read at every break, of lives one.
 #[derive(Clone, Debug)]
 struct Lives {
     /// The present life, or, while detached, the next.

@@ -471,7 +471,7 @@ pub(crate) mod tests {
         assert!(!target.exists());
     }
 
-    /// A disk on which others remove what a worker has not given its name yet, so many times.
+    /// A disk on which others tidy up so often while a worker joins, and remove its announcement each time.
     struct Tidied {
         workers: PathBuf,
         times: AtomicU64,

@@ -191,7 +191,8 @@ fn break_along<S: Simd>(
             let third = -SIXTH * (stiffened * slope + 2.0 * step.damping * second);
             let fourth = -0.5 * SIXTH * (stiffened * half_curvature + own * second) - 0.25 * step.damping * third;
             path.change_by(s, [second, third, fourth]);
-            let [ahead, back] = [1.0 - s, s].map(|by| (by * by) * (by * by));
+            let [ahead, back] = [(1.0 - s) * (1.0 - s), s * s];
+            let [ahead, back] = [ahead * ahead, back * back];
             let beside = 0.5 * SIXTH * step.coupling * second;
             path.beside.displacement += beside * ahead;
             path.beside.increment += beside * (ahead - back);

@@ -22,6 +22,7 @@
 use super::super::chain::{Chain, State};
 use super::super::free_motion::{MIN_PIVOT, find_decay};
 use super::super::leap::{Split, SplitRow};
+use super::step::FIRST_LANE;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{Interface, LANES, Row};
 use crate::solver::harmonic::Harmonic;
@@ -35,8 +36,6 @@ const LOOSE: f64 = 3.0;
 const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 /// Diagonal in padding, so large that nothing moves there.
 const FIXED: f64 = 1e150;
-/// Block 1.
-const FIRST_LANE: Row = Row([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
 /// A real (C = 1) or complex (C = 2) number in every lane.
 #[derive(Clone, Copy)]

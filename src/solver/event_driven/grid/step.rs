@@ -279,7 +279,7 @@ fn weights(half: f64) -> [f64; 2] {
 }
 
 /// Block 1, at which the drive pulls.
-const FIRST_LANE: Row = {
+pub(super) const FIRST_LANE: Row = {
     let mut row = Row::filled(0.0);
     row.0[0] = 1.0;
     row
@@ -303,18 +303,14 @@ pub(super) fn march<S: Simd, const R: usize>(
 ) -> usize {
     let steps = steps.min(MAX_RUN);
     step.reached.clear();
-    let (done, reached) = if R > 0 && S::HAS_MANY_REGISTERS {
+    if R > 0 && S::HAS_MANY_REGISTERS {
         march_in_registers::<S, R>(simd, chain, step, drive, displacement, steps)
     } else {
         march_in_memory::<S, R>(simd, chain, step, drive, displacement, steps)
-    };
-    if reached {
-        note_reached(simd, [&step.upper, &step.lower], displacement, &mut step.reached);
     }
-    done
 }
 
-/// The steps of [`march`], with the motion in registers. Whether a block reached a break position in the last.
+/// The steps of [`march`], with the motion in registers.
 #[inline(always)]
 fn march_in_registers<S: Simd, const R: usize>(
     simd: S,
@@ -323,7 +319,7 @@ fn march_in_registers<S: Simd, const R: usize>(
     drive: &mut GridDrive,
     displacement: &mut [Row],
     steps: usize,
-) -> (usize, bool) {
+) -> usize {
     let displacement = &mut displacement[..R];
     let (increment, force) = (&mut step.increment[..R], &mut step.force[..R]);
     let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
@@ -383,7 +379,7 @@ fn march_in_registers<S: Simd, const R: usize>(
             bits &= bits - 1;
         }
     }
-    (done, false)
+    done
 }
 
 /// The same for any number of rows, with the motion in memory.
@@ -395,7 +391,7 @@ fn march_in_memory<S: Simd, const R: usize>(
     drive: &mut GridDrive,
     displacement: &mut [Row],
     steps: usize,
-) -> (usize, bool) {
+) -> usize {
     let rows = if R == 0 { chain.layout.rows } else { R };
     let x = &mut displacement[..rows];
     let last = rows - 1;
@@ -443,10 +439,11 @@ fn march_in_memory<S: Simd, const R: usize>(
         drive.advance();
         step.trail[done - 1] = chain.drive_stiffness * (drive.displacement() - x[0][0]);
         if reached != 0 {
-            return (done, true);
+            note_reached(simd, [&step.upper, &step.lower], x, &mut step.reached);
+            return done;
         }
     }
-    (steps, false)
+    steps
 }
 
 /// What the drive adds to φ of block 1, and to its increment beside, in m.
