@@ -107,14 +107,19 @@ impl Path {
     fn crossing(&self, level: f64) -> f64 {
         let within = |s: f64| if s > self.from { if s < 1.0 { s } else { 1.0 } } else { self.from };
         let halley = |[x, slope, half]: [f64; 3]| (x - level) * slope / slope.mul_add(slope, (level - x) * half);
-        let [c0, c1, c2, ..] = self.coefficients;
-        let mut s = within(-halley([c0, c1, c2]));
-        for _ in 0..MAX_HALLEY_STEPS {
-            let last = s;
+        let [c0, c1, c2, c3, c4] = self.coefficients;
+        // The inverse of the path by Hermite's cubic, from both ends and slopes.
+        let rise = self.end() - c0;
+        let part = (level - c0) / rise;
+        let [first, last] = [rise / c1, rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4))];
+        let rest = 1.0 - part;
+        let mut last = within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * first - part * last)));
+        let mut s = within(last - halley(self.at(last)));
+        let mut left = MAX_HALLEY_STEPS;
+        while (s - last).abs() >= ENOUGH && left > 0 {
+            last = s;
             s = within(last - halley(self.at(last)));
-            if (s - last).abs() < ENOUGH {
-                break;
-            }
+            left -= 1;
         }
         s
     }
@@ -131,6 +136,7 @@ pub(super) struct StepEvents {
     pub reattachments: u64,
     /// Means over the blocks after breaks: displacement and increment, in m.
     pub mean: [f64; 2],
+    paths: Vec<(Path, f64)>,
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
 }
@@ -140,17 +146,26 @@ pub(super) struct StepEvents {
 #[inline(always)]
 pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
     let Grid { step, drive, events, .. } = grid;
-    for index in 0..step.reached.len() {
-        let (row, lane) = step.reached[index];
-        let mut path = Path::new(slider, step, drive, slider.chain.layout.block(row, lane));
-        break_along(simd, &mut slider.interface, step, events, &mut path, start);
-        settle(simd, slider, step, &path);
+    // Stage by stage over all blocks: each stage waits for what it computes, and other blocks fill the time.
+    let mut paths = std::mem::take(&mut events.paths);
+    paths.clear();
+    for &(row, lane) in &step.reached {
+        paths.push((Path::new(slider, step, drive, slider.chain.layout.block(row, lane)), 0.0));
     }
+    for (path, first) in &mut paths {
+        let [upper, lower] = [slider.interface.block_upper[path.block], slider.interface.block_lower[path.block]];
+        *first = path.crossing(if path.eventless.displacement >= upper { upper } else { lower });
+    }
+    for (path, first) in &mut paths {
+        break_along(simd, &mut slider.interface, step, events, path, Some(*first), start);
+        settle(simd, slider, step, path);
+    }
+    events.paths = paths;
     // Breaks may have made something due within the step, and what attaches lets a block reach other contacts or not.
     while let Some((due, block)) = slider.interface.next_reattachment_by(start + step.length) {
         let mut path = Path::new(slider, step, drive, block);
         attach(simd, &mut slider.interface, step, events, &mut path, (due - start) * step.inverse_length);
-        break_along(simd, &mut slider.interface, step, events, &mut path, start);
+        break_along(simd, &mut slider.interface, step, events, &mut path, None, start);
         settle(simd, slider, step, &path);
     }
     if !events.events.is_sorted_by(|a, b| a.time <= b.time) {
@@ -166,6 +181,7 @@ fn break_along<S: Simd>(
     step: &GridStep,
     events: &mut StepEvents,
     path: &mut Path,
+    mut first: Option<f64>,
     start: f64,
 ) {
     let block = path.block;
@@ -179,7 +195,7 @@ fn break_along<S: Simd>(
         let mut until = interface.next_reattachment_at(block, start + step.length);
         let mut broken = 0;
         for &(level, contact) in &events.contacts {
-            let s = path.crossing(level);
+            let s = first.take().unwrap_or_else(#[inline(always)] || path.crossing(level));
             let time = start + s * step.length;
             if time > until {
                 break;

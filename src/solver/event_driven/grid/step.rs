@@ -321,7 +321,7 @@ fn march_in_registers<S: Simd, const R: usize>(
     steps: usize,
 ) -> usize {
     let displacement = &mut displacement[..R];
-    let (increment, force) = (&mut step.increment[..R], &mut step.force[..R]);
+    let increment = &mut step.increment[..R];
     let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
     let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
     let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
@@ -368,7 +368,6 @@ fn march_in_registers<S: Simd, const R: usize>(
     for r in 0..R {
         x[r].store(&mut displacement[r]);
         q[r].store(&mut increment[r]);
-        f[r].store(&mut force[r]);
     }
     if is_any {
         // At most sixteen rows have registers.
@@ -480,7 +479,7 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
     step.saved_displacement.copy_from_slice(&state.displacement);
     step.saved_increment.copy_from_slice(&step.increment);
     let mut ahead = *drive;
-    march::<S, R>(simd, chain, step, &mut ahead, &mut state.displacement, 1);
+    march_in_memory::<S, R>(simd, chain, step, &mut ahead, &mut state.displacement, 1);
     state.displacement.copy_from_slice(&step.saved_displacement);
     // Central differences, in the place of the displacements after the step.
     let central = &mut step.saved_displacement[..rows];
