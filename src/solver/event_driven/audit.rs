@@ -3,11 +3,10 @@
 
 use super::Integration;
 use super::chain::{Chain, State};
-use super::driven_solution::BlockMotion;
 use super::kernels::Kernels;
-use super::leap::Split;
 use super::series::Series;
 use super::slider::Slider;
+use super::split::{BlockMotion, Split};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::{Audit, work};
 use crate::solver::segment::Segment;

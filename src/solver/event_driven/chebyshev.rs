@@ -23,7 +23,6 @@
 //! nothing is evaluated on the way. Contract: each term left out is at most a given part of the motion.
 
 use super::chain::{Chain, State};
-use super::kernels::Kernels;
 use super::layout::Layout;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Row};
@@ -68,8 +67,9 @@ impl ChebyshevPropagator {
 
     /// Adds the free motion `seconds` s after u(0) and u'(0), which `here` holds, to a state, y = u e^{-γt/2} and
     /// w = u' e^{-γt/2} - γ y/2, where `left` is e^{-γt/2}. `error` is the part of it that may be left out.
-    pub fn carry(&mut self, chain: &Chain, kernels: &dyn Kernels, [seconds, left, error]: [f64; 3], state: &mut State) {
-        kernels.propagate(chain, seconds, error, self);
+    #[inline(always)]
+    pub fn carry<S: Simd>(&mut self, simd: S, chain: &Chain, [seconds, left, error]: [f64; 3], state: &mut State) {
+        self.propagate(simd, chain, seconds, error);
         let half = 0.5 * chain.damping_rate;
         let [displaced, moved] = &self.sums;
         for (((x, v), u), rate) in state.displacement.iter_mut().zip(&mut state.velocity).zip(displaced).zip(moved) {
@@ -77,6 +77,43 @@ impl ChebyshevPropagator {
                 x[lane] += left * u[lane];
                 v[lane] += left * (rate[lane] - half * u[lane]);
             }
+        }
+    }
+
+    /// Carries u and u' over `seconds` s; `error` is the part of them that may be left out.
+    #[inline(always)]
+    fn propagate<S: Simd>(&mut self, simd: S, chain: &Chain, seconds: f64, error: f64) {
+        let rows = self.diagonal.len();
+        let shift = 0.25 * chain.damping_rate * chain.damping_rate;
+        let mut widest = 0.0_f64;
+        for (diagonal, coupling) in chain.diagonal.iter().zip(&chain.coupling) {
+            for l in 0..LANES {
+                widest = widest.max(diagonal[l] + 2.0 * coupling[l]);
+            }
+        }
+        let scale = 2.0 / widest;
+        for r in 0..rows {
+            for l in 0..LANES {
+                // In padding both are zero there, and zeros stay zero.
+                self.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
+                self.coupling[r][l] = -scale * chain.coupling[r][l];
+            }
+        }
+        self.update_weights(widest, seconds * widest.sqrt(), error);
+        for pair in [&mut self.before, &mut self.sums] {
+            for rows in pair {
+                rows.fill(Row::filled(0.0));
+            }
+        }
+        add_terms(simd, &self.here, &mut self.sums, self.weights[0]);
+        for k in 1..self.weights.len() {
+            // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
+            let twice = simd.splat(if k == 1 { 1.0 } else { 2.0 });
+            for (here, before) in self.here.iter().zip(&mut self.before) {
+                recur(simd, [&self.diagonal, &self.coupling], here, before, twice);
+            }
+            add_terms(simd, &self.before, &mut self.sums, self.weights[k]);
+            std::mem::swap(&mut self.before, &mut self.here);
         }
     }
 
@@ -106,49 +143,6 @@ impl ChebyshevPropagator {
             self.weights[k][2] = 0.5 * widest * (here + 0.5 * (below + self.weights[k + 1][1]));
         }
         self.weights.truncate(terms);
-    }
-}
-
-/// Carries u and u' over `seconds` s; `error` is the part of them that may be left out.
-#[inline(always)]
-pub(super) fn propagate<S: Simd>(
-    simd: S,
-    chain: &Chain,
-    seconds: f64,
-    error: f64,
-    propagator: &mut ChebyshevPropagator,
-) {
-    let rows = propagator.diagonal.len();
-    let shift = 0.25 * chain.damping_rate * chain.damping_rate;
-    let mut widest = 0.0_f64;
-    for (diagonal, coupling) in chain.diagonal.iter().zip(&chain.coupling) {
-        for l in 0..LANES {
-            widest = widest.max(diagonal[l] + 2.0 * coupling[l]);
-        }
-    }
-    let scale = 2.0 / widest;
-    for r in 0..rows {
-        for l in 0..LANES {
-            // In padding both are zero there, and zeros stay zero.
-            propagator.diagonal[r][l] = scale * (chain.diagonal[r][l] - shift) - 1.0;
-            propagator.coupling[r][l] = -scale * chain.coupling[r][l];
-        }
-    }
-    propagator.update_weights(widest, seconds * widest.sqrt(), error);
-    for pair in [&mut propagator.before, &mut propagator.sums] {
-        for rows in pair {
-            rows.fill(Row::filled(0.0));
-        }
-    }
-    add_terms(simd, &propagator.here, &mut propagator.sums, propagator.weights[0]);
-    for k in 1..propagator.weights.len() {
-        // T_1 = x T_0, then T_{k+1} = 2x T_k - T_{k-1}, written over T_{k-1}.
-        let twice = simd.splat(if k == 1 { 1.0 } else { 2.0 });
-        for (here, before) in propagator.here.iter().zip(&mut propagator.before) {
-            recur(simd, [&propagator.diagonal, &propagator.coupling], here, before, twice);
-        }
-        add_terms(simd, &propagator.before, &mut propagator.sums, propagator.weights[k]);
-        std::mem::swap(&mut propagator.before, &mut propagator.here);
     }
 }
 

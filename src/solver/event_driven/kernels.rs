@@ -1,16 +1,15 @@
 //! The hot loops, compiled for each set of processor features and chosen at run time.
 
 use super::chain::{Chain, State};
-use super::chebyshev::{ChebyshevPropagator, propagate};
-use super::free_motion::{SplitMotion, split};
-use super::grid::leap::{Reduction, split_in_lanes};
 use super::grid::{Grid, GridDrive, GridStep, advance, velocity};
-use super::leap::{Split, first_reached, follow, stays_clear};
+use super::leap::{Bounds, Plan, leap};
 use super::series::{Series, evaluate, reachable};
 use super::slider::Slider;
+use super::split::Split;
 use super::taylor::{StepInput, expand};
 use crate::model::simd::Simd;
 use crate::solver::harmonic::Harmonic;
+use crate::solver::ledger::Audit;
 use pulp::Scalar512b;
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
@@ -23,29 +22,19 @@ pub(super) trait Kernels {
     fn evaluate(&self, series: &Series, s: f64, length: f64, state: &mut State);
     /// Row and lane of every block that may reach a break position within the step.
     fn reachable(&self, chain: &Chain, series: &mut Series, blocks: &mut Vec<(usize, usize)>);
-    /// Splits the motion into driven solution and free motion; see [`split`].
-    fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64>;
-    /// Carries the free motion over `seconds` s; see [`propagate`].
-    fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator);
     /// Takes up to `steps` steps of the grid; see [`advance`].
     fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize;
     /// Writes the velocities of a motion on the grid; see [`velocity`].
     fn velocity(&self, chain: &Chain, step: &mut GridStep, drive: &GridDrive, state: &mut State);
-    /// The same as `split` in lanes; see [`split_in_lanes`].
-    fn split_in_lanes(
+    /// Tries to leap; see [`leap`].
+    fn leap(
         &self,
-        chain: &Chain,
-        drive: &Harmonic,
-        state: &State,
-        reduction: &mut Reduction,
         split: &mut Split,
-    ) -> Option<f64>;
-    /// Whether no block can reach a break position meanwhile; see [`stays_clear`].
-    fn stays_clear(&self, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool;
-    /// When the first block does, and which; see [`first_reached`].
-    fn first_reached(&self, chain: &Chain, split: &Split, drive: &Harmonic, span: [f64; 2]) -> (f64, Option<usize>);
-    /// Moves a state on along the driven solution; see [`follow`].
-    fn follow(&self, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State);
+        slider: &mut Slider,
+        drive: &Harmonic,
+        bounds: Bounds,
+        audit: Option<&Audit>,
+    ) -> Result<Plan, f64>;
 }
 
 /// The loops compiled for the features of `S` and for `R` rows, or for any number if that is 0.
@@ -73,20 +62,6 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
         );
     }
 
-    fn split(&self, chain: &Chain, drive: &Harmonic, motion: &mut SplitMotion) -> Option<f64> {
-        self.0.run(
-            #[inline(always)]
-            |_| split(chain, drive, motion),
-        )
-    }
-
-    fn propagate(&self, chain: &Chain, seconds: f64, error: f64, propagator: &mut ChebyshevPropagator) {
-        self.0.run(
-            #[inline(always)]
-            |simd| propagate(simd, chain, seconds, error, propagator),
-        );
-    }
-
     fn advance(&self, slider: &mut Slider, grid: &mut Grid, time: f64, steps: usize) -> usize {
         self.0.run(
             #[inline(always)]
@@ -101,39 +76,18 @@ impl<S: Simd, const R: usize> Kernels for Compiled<S, R> {
         );
     }
 
-    fn split_in_lanes(
+    fn leap(
         &self,
-        chain: &Chain,
-        drive: &Harmonic,
-        state: &State,
-        reduction: &mut Reduction,
         split: &mut Split,
-    ) -> Option<f64> {
+        slider: &mut Slider,
+        drive: &Harmonic,
+        bounds: Bounds,
+        audit: Option<&Audit>,
+    ) -> Result<Plan, f64> {
         self.0.run(
             #[inline(always)]
-            |simd| split_in_lanes(simd, chain, drive, state, reduction, split),
+            |simd| leap(simd, split, slider, drive, bounds, audit),
         )
-    }
-
-    fn stays_clear(&self, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
-        self.0.run(
-            #[inline(always)]
-            |simd| stays_clear(simd, chain, split, seconds, left),
-        )
-    }
-
-    fn first_reached(&self, chain: &Chain, split: &Split, drive: &Harmonic, span: [f64; 2]) -> (f64, Option<usize>) {
-        self.0.run(
-            #[inline(always)]
-            |simd| first_reached(simd, chain, split, drive, span),
-        )
-    }
-
-    fn follow(&self, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
-        self.0.run(
-            #[inline(always)]
-            |simd| follow(simd, split, drive, elapsed, state),
-        );
     }
 }
 

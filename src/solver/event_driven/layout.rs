@@ -5,6 +5,13 @@
 
 use crate::model::{LANES, Row};
 
+/// Block 1, at which the drive pulls, in the first row.
+pub(super) const FIRST_BLOCK: Row = {
+    let mut row = Row::filled(0.0);
+    row.0[0] = 1.0;
+    row
+};
+
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     pub blocks: usize,
@@ -30,14 +37,5 @@ impl Layout {
     /// Rows for all blocks, filled with one value.
     pub fn filled(self, value: f64) -> Vec<Row> {
         vec![Row::filled(value); self.rows]
-    }
-
-    /// Writes the entries of all blocks, one after the other.
-    pub fn unfold(self, rows: &[Row], blocks: &mut [f64]) {
-        for (lane, run) in blocks.chunks_mut(self.rows).enumerate() {
-            for (entry, row) in run.iter_mut().zip(rows) {
-                *entry = row[lane];
-            }
-        }
     }
 }

@@ -1,7 +1,6 @@
 //! Leaps over quiet time along the driven solution.
 //!
-//! Between events the motion is a driven solution ([`super::driven_solution`]) and a free motion about it, which decays
-//! and is bounded for each block ([`super::free_motion`]). A leap may therefore start while the free motion is still
+//! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`super::split`]). A leap may therefore start while the free motion is still
 //! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
 //! will be larger than it can be meanwhile. If the free motion has fallen under the tolerance when the next event
 //! comes, it is dropped; if not, and no mode is overdamped, it is carried over in one go ([`super::chebyshev`]).
@@ -9,13 +8,9 @@
 //! and no largest shear force.
 
 use super::chain::{Chain, State};
-use super::chebyshev::ChebyshevPropagator;
-use super::driven_solution::BlockMotion;
-use super::free_motion::SplitMotion;
-use super::grid::leap::{Passing, Reduction};
-use super::kernels::Kernels;
 use super::slider::Slider;
-use crate::model::Row;
+use super::split::{Split, SplitRow};
+use crate::model::Interface;
 use crate::model::simd::{Simd, Vector};
 use crate::solver::harmonic::Harmonic;
 use crate::solver::ledger::Audit;
@@ -27,6 +22,14 @@ const LOOK_AHEAD: f64 = 10.0;
 
 /// Part of the error of a leap that each term which the propagator leaves out may have.
 const PROPAGATED_SHARE: f64 = 1e-3;
+
+/// Part of the error of a leap that the reattachments passed by it may add up to.
+const PASSED_SHARE: f64 = 0.2;
+/// Free motion at which a contact may attach on the driven solution, in errors of a leap.
+const LOOSE: f64 = 3.0;
+/// How far a passed contact may be astray, in errors of a leap: by free motion where it attaches and later, and by what the
+/// others displace.
+const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
 
 /// Longest time to carry the free motion over, in units of the shortest time scale of the slider: some 20 MB.
 const MAX_CARRIED_ANGLE: f64 = 1e6;
@@ -56,51 +59,70 @@ pub(super) struct Bounds {
     pub reach: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
     pub largest_force: f64,
+    /// On the grid a leap passes reattachments.
+    pub passing: Option<Passing>,
 }
 
-/// The motion at the start of a leap, split: driven solution and free motion of a row of blocks.
-#[derive(Clone, Debug)]
-pub(super) struct SplitRow {
-    /// p0 in m, p1 in m/s, q in m, and |q|.
-    pub start: Row,
-    pub rate: [Row; 1],
-    pub wave: [Row; 2],
-    pub swing: Row,
-    /// Bound on |y|, in m.
-    pub bound: Row,
-    /// m (S'⁻¹)_jj, in s²: how far a force on a block displaces it, per mass; on the grid only.
-    pub compliance: Row,
+/// A leap over reattachments. A contact that attaches on the way holds its block back by its stiffness times how far the
+/// block has moved since, which the driven solution leaves out; what all displace may be a part of the error of a leap.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passing {
+    /// When it starts, in the frame, how long it must be and may be, in s.
+    pub start: f64,
+    pub least: f64,
+    pub most: f64,
 }
 
-#[derive(Clone, Debug)]
-pub(super) struct Split {
-    pub rows: Vec<SplitRow>,
-    /// The rate a at which the bound on the free motion decays, in 1/s.
-    pub decay_rate: f64,
-    /// Begins with y in m and w + a y in m/s.
-    pub propagator: ChebyshevPropagator,
-}
-
-impl Split {
-    /// The driven solution of a block.
-    pub fn driven(&self, chain: &Chain, block: usize) -> BlockMotion {
-        let (row, lane) = chain.layout.slot(block);
-        let SplitRow { start, rate: [rate], wave: [real, imaginary], swing, .. } = &self.rows[row];
-        BlockMotion { start: start[lane], rate: rate[lane], wave: [real[lane], imaginary[lane]], swing: swing[lane] }
+impl Passing {
+    /// How long the leap may be, in s, if it is allowed to leave out `error` m, with free motion of at most `largest` m now;
+    /// if that is too short, after how many seconds to look again.
+    fn horizon(
+        &self,
+        split: &Split,
+        chain: &Chain,
+        interface: &mut Interface,
+        drive: &Harmonic,
+        [largest, error]: [f64; 2],
+    ) -> Result<f64, f64> {
+        let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
+        let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
+        let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, self.most);
+        interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
+            let seconds = due - self.start;
+            let by_then = displaced + rate * (seconds - last);
+            if seconds >= limit || by_then > allowed {
+                return false;
+            }
+            if seconds < loose {
+                limit = seconds;
+                return false;
+            }
+            (displaced, last) = (by_then, seconds);
+            let (r, lane) = chain.layout.slot(block);
+            let SplitRow { rate: [speeds], swing, compliance, .. } = &split.rows[r];
+            let speed = speeds[lane] + drive.angular_frequency * swing[lane];
+            rate += per_mass * stiffness * speed * compliance[lane];
+            // Nor may it break.
+            limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
+            true
+        });
+        let horizon = if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit };
+        if horizon < self.least { Err(loose.clamp(0.5 * self.least, 4.0 * self.least)) } else { Ok(horizon) }
     }
 }
 
 /// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
 /// after how many seconds to look again.
-fn plan(
+#[inline(always)]
+fn plan<S: Simd>(
+    simd: S,
     split: &Split,
     chain: &Chain,
-    kernels: &dyn Kernels,
     drive: &Harmonic,
     largest: f64,
     bounds: Bounds,
 ) -> Result<Plan, f64> {
-    let Bounds { horizon, until_cycle_end, error, reach, largest_force } = bounds;
+    let Bounds { horizon, until_cycle_end, error, reach, largest_force, .. } = bounds;
     let decay_rate = split.decay_rate;
     // Worth another try after some e-foldings of the free motion, or after the next event.
     let wait = (0.7 / decay_rate).min(horizon);
@@ -112,11 +134,11 @@ fn plan(
     let horizon = if is_short { horizon.min(max_carried_time(chain)) } else { horizon };
     let moving = decay.min(horizon);
     let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
-    if decay > 0.0 && !kernels.stays_clear(chain, split, moving, left) {
+    if decay > 0.0 && !stays_clear(simd, chain, split, moving, left) {
         return Err(wait);
     }
     let (elapsed, reached) =
-        if is_short { (horizon, None) } else { kernels.first_reached(chain, split, drive, [decay, horizon]) };
+        if is_short { (horizon, None) } else { first_reached(simd, chain, split, drive, [decay, horizon]) };
     if elapsed <= decay && decay > 0.0 && !is_short {
         return Err(wait);
     }
@@ -129,7 +151,7 @@ fn plan(
     // No block moves faster than the first. What attaches later breaks beyond, where nothing is known.
     let known = until_cycle_end.min(moving + reach / first.rate);
     let times = [moving, known, left];
-    if largest > error && !hides_no_peak(split, chain, kernels, drive, &segment, times, largest_force) {
+    if largest > error && !hides_no_peak(simd, split, chain, drive, &segment, times, largest_force) {
         return Err(wait);
     }
     Ok(Plan { segment, reached, is_whole: elapsed == bounds.horizon, carried: is_short.then_some(left) })
@@ -143,10 +165,11 @@ fn max_carried_time(chain: &Chain) -> f64 {
 
 /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
 /// as large is on record, or comes later in the segment, or comes after it, within `known` s and before any break.
-fn hides_no_peak(
+#[inline(always)]
+fn hides_no_peak<S: Simd>(
+    simd: S,
     split: &Split,
     chain: &Chain,
-    kernels: &dyn Kernels,
     drive: &Harmonic,
     segment: &Segment<'static>,
     [moving, known, left]: [f64; 3],
@@ -172,67 +195,41 @@ fn hides_no_peak(
         (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
     };
     let ahead = (moving + further).min(known);
-    driven(ahead).maximum_above(highest + left * swing).is_some() && kernels.stays_clear(chain, split, ahead, left)
+    driven(ahead).maximum_above(highest + left * swing).is_some() && stays_clear(simd, chain, split, ahead, left)
 }
 
-/// Leaps, and their work space.
-#[derive(Clone, Debug)]
-pub(super) struct Leap {
-    pub split: Split,
-    /// What splits from block to block between Taylor steps, and in lanes on the grid.
-    by_block: SplitMotion,
-    reduction: Reduction,
-}
-
-impl Leap {
-    pub fn new(chain: &Chain) -> Self {
-        let [start, swing, bound, compliance] = [Row::filled(0.0); 4];
-        let row = SplitRow { start, rate: [start], wave: [start; 2], swing, bound, compliance };
-        let propagator = ChebyshevPropagator::new(chain.layout);
-        let split = Split { rows: vec![row; chain.layout.rows], decay_rate: f64::INFINITY, propagator };
-        Self { split, by_block: SplitMotion::new(chain.layout), reduction: Reduction::new(chain) }
+/// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies,
+/// unless the free motion is carried over.
+#[inline(always)]
+pub(super) fn leap<S: Simd>(
+    simd: S,
+    split: &mut Split,
+    Slider { chain, state, interface }: &mut Slider,
+    drive: &Harmonic,
+    mut bounds: Bounds,
+    audit: Option<&Audit>,
+) -> Result<Plan, f64> {
+    let largest = split.update(simd, chain, drive, state).ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
+    if let Some(passing) = bounds.passing {
+        bounds.horizon = passing.horizon(split, chain, interface, drive, [largest, bounds.error])?;
     }
-
-    /// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies,
-    /// unless the free motion is carried over.
-    pub fn attempt(
-        &mut self,
-        slider: &mut Slider,
-        kernels: &dyn Kernels,
-        drive: &Harmonic,
-        mut bounds: Bounds,
-        passing: Option<Passing>,
-        audit: Option<&Audit>,
-    ) -> Result<Plan, f64> {
-        let Slider { chain, state, interface } = slider;
-        let split = &mut self.split;
-        let largest = if passing.is_some() {
-            kernels.split_in_lanes(chain, drive, state, &mut self.reduction, split)
-        } else {
-            self.by_block.split(chain, kernels, drive, state, split)
-        };
-        let largest = largest.ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
-        if let Some(passing) = passing {
-            bounds.horizon = passing.horizon(split, chain, interface, drive, [largest, bounds.error])?;
-        }
-        let plan = plan(split, chain, kernels, drive, largest, bounds)?;
-        let elapsed = plan.segment.duration;
-        if let Some(audit) = audit.filter(|_| plan.carried.is_none()) {
-            audit.follow_leap(chain, drive, split, state, elapsed);
-        }
-        kernels.follow(split, drive, elapsed, state);
-        if let Some(left) = plan.carried {
-            let error = PROPAGATED_SHARE * bounds.error / largest;
-            split.propagator.carry(chain, kernels, [elapsed, left, error], state);
-        }
-        Ok(plan)
+    let plan = plan(simd, split, chain, drive, largest, bounds)?;
+    let elapsed = plan.segment.duration;
+    if let Some(audit) = audit.filter(|_| plan.carried.is_none()) {
+        audit.follow_leap(chain, drive, split, state, elapsed);
     }
+    follow(simd, split, drive, elapsed, state);
+    if let Some(left) = plan.carried {
+        let error = PROPAGATED_SHARE * bounds.error / largest;
+        split.propagator.carry(simd, chain, [elapsed, left, error], state);
+    }
+    Ok(plan)
 }
 
 /// Whether no block can reach a break position within `seconds`, at the end of which a part `left` of the free motion's
 /// bound remains.
 #[inline(always)]
-pub(super) fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
+fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, seconds: f64, left: f64) -> bool {
     let (seconds, left) = (simd.splat(seconds), simd.splat(left));
     let mut clear = u8::MAX;
     for ((row, upper), lower) in split.rows.iter().zip(&chain.upper).zip(&chain.lower) {
@@ -248,7 +245,7 @@ pub(super) fn stays_clear<S: Simd>(simd: S, chain: &Chain, split: &Split, second
 
 /// The first instant after `decay` at which a block reaches a break position, up to `horizon`, and that block.
 #[inline(always)]
-pub(super) fn first_reached<S: Simd>(
+fn first_reached<S: Simd>(
     simd: S,
     chain: &Chain,
     split: &Split,
@@ -288,7 +285,7 @@ pub(super) fn first_reached<S: Simd>(
 
 /// Moves a state on along the driven solution, by `elapsed` s.
 #[inline(always)]
-pub(super) fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
+fn follow<S: Simd>(simd: S, split: &Split, drive: &Harmonic, elapsed: f64, state: &mut State) {
     let (sine, cosine) = if drive.amplitude > 0.0 { libm::sincos(drive.turn(elapsed)) } else { (0.0, 1.0) };
     let (elapsed, frequency) = (simd.splat(elapsed), simd.splat(drive.angular_frequency));
     for ((row, x), v) in split.rows.iter().zip(&mut state.displacement).zip(&mut state.velocity) {
@@ -308,10 +305,11 @@ fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Ve
 
 #[cfg(test)]
 mod tests {
-    use super::super::kernels::fastest;
     use super::super::layout::Layout;
+    use super::super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
+    use pulp::Scalar512b as Baseline;
 
     #[test]
     fn a_leap_carries_an_undamped_oscillation_over_for_a_bounded_time() {
@@ -320,16 +318,15 @@ mod tests {
         // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
         let mut slider = Slider::new(&parameters);
         slider.chain = Chain::new(&parameters, layout);
-        let kernels = fastest(layout.rows);
         let squared = parameters.drive_stiffness / slider.chain.mass;
         let drive = Harmonic { start: 0.0, rate: 1e-12, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
         let amplitude = 1e-6;
         slider.state.displacement[0][0] = amplitude;
         let horizon = 1e9;
-        let mut leap = Leap::new(&slider.chain);
-        let bounds =
-            Bounds { horizon, until_cycle_end: f64::INFINITY, error: 1e-12, reach: 1e-6, largest_force: f64::INFINITY };
-        let plan = leap.attempt(&mut slider, &*kernels, &drive, bounds, None, None).unwrap();
+        let mut split = Split::new(&slider.chain);
+        let (until_cycle_end, largest_force) = (f64::INFINITY, f64::INFINITY);
+        let bounds = Bounds { horizon, until_cycle_end, error: 1e-12, reach: 1e-6, largest_force, passing: None };
+        let plan = leap(Baseline, &mut split, &mut slider, &drive, bounds, None).unwrap();
         assert!(plan.reached.is_none() && plan.carried.is_some(), "{plan:?}");
         let elapsed = plan.segment.duration;
         let angle = squared.sqrt() * elapsed;
@@ -350,26 +347,26 @@ mod tests {
         let plain = Harmonic { start: 3e-6, rate: 1e-4, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
         let phases = (0..200).map(|i| 0.1 * f64::from(i));
         let modulated = phases.map(|phase| Harmonic { amplitude: 1e-6, phase, angular_frequency: 364.0, ..plain });
-        let (mut slider, kernels) = (Slider::new(&parameters), fastest(3));
-        let mut leap = Leap::new(&slider.chain);
+        let mut slider = Slider::new(&parameters);
+        let mut split = Split::new(&slider.chain);
         for (case, drive) in std::iter::once(plain).chain(modulated).enumerate() {
             let close = [0.01, 0.5, 0.9, 10.0][case % 4];
             let Slider { chain, state, .. } = &mut slider;
-            kernels.split_in_lanes(chain, &drive, state, &mut leap.reduction, &mut leap.split).unwrap();
-            let blocks: Vec<BlockMotion> = (0..21).map(|block| leap.split.driven(chain, block)).collect();
+            split.update(Baseline, chain, &drive, state).unwrap();
+            let blocks: Vec<BlockMotion> = (0..21).map(|block| split.driven(chain, block)).collect();
             for (block, motion) in blocks.iter().enumerate() {
                 let (row, lane) = chain.layout.slot(block);
                 let away = close * (1.0 + (block * 8 % 21) as f64 / 42.0);
                 chain.upper[row][lane] = motion.start + away * (motion.swing + 1e-3 * motion.rate);
                 chain.lower[row][lane] = motion.start - away.max(0.999) * motion.swing - 1e-20;
-                leap.split.rows[row].bound[lane] = 0.0;
+                split.rows[row].bound[lane] = 0.0;
             }
             let is_beyond = |block: usize, seconds: f64| {
                 let (x, (row, lane)) = (blocks[block].displacement(&drive, seconds), chain.layout.slot(block));
                 x >= chain.upper[row][lane] + 1e-16 || x <= chain.lower[row][lane] - 1e-16
             };
             for horizon in [1e-4, 1e-3, 4e-3, 0.01, 0.1, f64::INFINITY] {
-                let (elapsed, reached) = kernels.first_reached(chain, &leap.split, &drive, [1e-6, horizon]);
+                let (elapsed, reached) = first_reached(Baseline, chain, &split, &drive, [1e-6, horizon]);
                 assert!(reached.is_some() || elapsed == horizon);
                 let sample = |i: u32| 1e-6 + 0.999 * (elapsed - 1e-6) * f64::from(i) / 100.0;
                 let mut samples = (0..21).flat_map(|block| (0..100).map(move |i| (block, i)));
@@ -377,10 +374,10 @@ mod tests {
                 assert_eq!(early, None, "{elapsed} s, at {drive:?}");
                 if let Some(block) = reached {
                     assert!((1..100).any(|i| is_beyond(block, elapsed + 1e-7 * f64::from(i))), "{block} is not there");
-                    assert!(!kernels.stays_clear(chain, &leap.split, elapsed + 1e-5, 0.0));
+                    assert!(!stays_clear(Baseline, chain, &split, elapsed + 1e-5, 0.0));
                 }
                 if elapsed.is_finite() {
-                    kernels.follow(&leap.split, &drive, elapsed, state);
+                    follow(Baseline, &split, &drive, elapsed, state);
                     for (block, motion) in blocks.iter().enumerate() {
                         let expected = motion.displacement(&drive, elapsed);
                         assert!(

@@ -12,26 +12,26 @@ mod audit;
 mod chain;
 mod chebyshev;
 mod crossing;
-mod driven_solution;
+mod elimination;
 mod frame;
-mod free_motion;
 mod grid;
 mod kernels;
 mod layout;
 mod leap;
 mod series;
 mod slider;
+mod split;
 mod step;
 mod taylor;
 mod tolerances;
 
 use self::frame::Frame;
 use self::grid::Grid;
-use self::grid::leap::Passing;
 use self::kernels::Kernels;
 use self::layout::Layout;
-use self::leap::{Bounds, Leap, Plan};
+use self::leap::{Bounds, Passing, Plan};
 use self::slider::Slider;
+use self::split::Split;
 use self::step::{Step, StepControl};
 use self::tolerances::Tolerances;
 use super::harmonic::Harmonic;
@@ -75,7 +75,7 @@ struct Integration<'a> {
     slider: Slider,
     control: StepControl,
     step: Step,
-    leap: Leap,
+    split: Split,
     /// Whether motion is resolved on the grid, and not in Taylor steps.
     takes_grid: bool,
     grid: Grid,
@@ -106,7 +106,7 @@ impl<'a> Integration<'a> {
             frame: Frame::new(Drive::new(parameters), span),
             takes_grid,
             grid: Grid::new(parameters, tolerance, &slider.chain, &slider.state),
-            leap: Leap::new(&slider.chain),
+            split: Split::new(&slider.chain),
             slider,
             control: StepControl::new(tolerances.max_step),
             step: Step::new(layout),
@@ -201,12 +201,11 @@ impl<'a> Integration<'a> {
         let drive = self.frame.drive_motion();
         let (start, began) = (self.frame.now(), self.frame.time);
         let Tolerances { leap_error: error, contact_reach: reach, max_step, .. } = self.tolerances;
-        let bounds = Bounds { horizon, until_cycle_end, error, reach, largest_force: self.largest_force };
         let before = self.audit.is_some().then(|| self.slider.state.clone());
-        let kernels = &*self.kernels;
         let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
         let passing = self.takes_grid.then_some(Passing { start: began, least, most: until_change });
-        let attempt = self.leap.attempt(&mut self.slider, kernels, &drive, bounds, passing, self.audit);
+        let bounds = Bounds { horizon, until_cycle_end, error, reach, largest_force: self.largest_force, passing };
+        let attempt = self.kernels.leap(&mut self.split, &mut self.slider, &drive, bounds, self.audit);
         let Plan { segment, reached, is_whole, carried } = match attempt {
             Ok(plan) => plan,
             Err(seconds) => {
@@ -253,7 +252,7 @@ impl<'a> Integration<'a> {
             if self.grid.tells_attachments() {
                 tell(due - began, observer);
             }
-            let x = self.leap.split.driven(&self.slider.chain, block).displacement(drive, due - began);
+            let x = self.split.driven(&self.slider.chain, block).displacement(drive, due - began);
             self.attach_next(x, observer);
         }
         tell(leap.duration, observer);

@@ -6,6 +6,7 @@
 //! step.
 
 use super::chain::{Chain, State};
+use super::layout::FIRST_BLOCK;
 use super::series::{DriveDerivatives, INVERSE_FACTORIAL, Series};
 use crate::model::Row;
 use crate::model::simd::{Simd, Vector};
@@ -119,7 +120,7 @@ impl<S: Simd> Recurrence<'_, S> {
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            self.simd.load(&FIRST_LANE).mul_add(self.simd.splat(push), self.simd.load(&next[0])).store(&mut next[0]);
+            self.simd.load(&FIRST_BLOCK).mul_add(self.simd.splat(push), self.simd.load(&next[0])).store(&mut next[0]);
         }
     }
 
@@ -150,7 +151,7 @@ impl<S: Simd> Recurrence<'_, S> {
         }
         let push = self.pulling * self.drive.next_order();
         if push != 0.0 {
-            next[0] = self.simd.load(&FIRST_LANE).mul_add(self.simd.splat(push), next[0]);
+            next[0] = self.simd.load(&FIRST_BLOCK).mul_add(self.simd.splat(push), next[0]);
         }
         let rows = &mut rows[..R];
         for r in 0..R {
@@ -232,13 +233,6 @@ fn sweep<S: Simd>(simd: S, coupling: &[Row], diagonal: &[Row], damping: S::Vecto
     let forced = here.mul_add(simd.load(&diagonal[last]), coupled);
     simd.load(&rate[last]).mul_add(damping, forced).store(&mut next[last]);
 }
-
-/// Block 1, at which the drive pulls.
-const FIRST_LANE: Row = {
-    let mut row = Row::filled(0.0);
-    row.0[0] = 1.0;
-    row
-};
 
 /// Whether the rows of the last two orders, weighted as terms and taken times the last order, are within the error
 /// allowed.

@@ -195,7 +195,10 @@ fn break_along<S: Simd>(
         let mut until = interface.next_reattachment_at(block, start + step.length);
         let mut broken = 0;
         for &(level, contact) in &events.contacts {
-            let s = first.take().unwrap_or_else(#[inline(always)] || path.crossing(level));
+            let s = first.take().unwrap_or_else(
+                #[inline(always)]
+                || path.crossing(level),
+            );
             let time = start + s * step.length;
             if time > until {
                 break;

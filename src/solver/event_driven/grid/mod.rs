@@ -5,7 +5,6 @@
 
 mod events;
 mod history;
-pub(super) mod leap;
 mod step;
 
 pub(super) use self::step::{GridDrive, GridStep, velocity};

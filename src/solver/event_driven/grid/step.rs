@@ -12,7 +12,7 @@
 //! The state is x_n and the increment q_n = x_n - x̃_{n-1}, where x̃ is the motion continued back under the present law.
 
 use super::super::chain::{Chain, State};
-use super::super::layout::Layout;
+use super::super::layout::{FIRST_BLOCK, Layout};
 use super::events::Correction;
 use crate::model::simd::{Simd, Vector};
 use crate::model::{LANES, Parameters, Row};
@@ -278,13 +278,6 @@ fn weights(half: f64) -> [f64; 2] {
     }
 }
 
-/// Block 1, at which the drive pulls.
-pub(super) const FIRST_LANE: Row = {
-    let mut row = Row::filled(0.0);
-    row.0[0] = 1.0;
-    row
-};
-
 #[inline(always)]
 fn add<S: Simd>(simd: S, rows: &mut [Row], (row, lane): (usize, usize), value: f64) {
     let sum = rows[row][lane] + value;
@@ -325,7 +318,7 @@ fn march_in_registers<S: Simd, const R: usize>(
     let (pull, diagonal, own) = (&step.pull[..R], &step.diagonal[..R], &step.own[..R]);
     let (couplings, second_couplings) = (&step.couplings[..R], &step.second_couplings[..R]);
     let (upper, lower) = (&step.upper[..R], &step.lower[..R]);
-    let first_lane = simd.load(&FIRST_LANE);
+    let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
     let (mut x, mut q, mut f) = ([first_lane; R], [first_lane; R], [first_lane; R]);
     for r in 0..R {
@@ -398,7 +391,7 @@ fn march_in_memory<S: Simd, const R: usize>(
     let (pull, diagonal, own) = (&step.pull[..rows], &step.diagonal[..rows], &step.own[..rows]);
     let (couplings, second_couplings) = (&step.couplings[..rows], &step.second_couplings[..rows]);
     let (upper, lower) = (&step.upper[..rows], &step.lower[..rows]);
-    let first_lane = simd.load(&FIRST_LANE);
+    let first_lane = simd.load(&FIRST_BLOCK);
     let decay = simd.splat(step.decay);
     for done in 1..=steps {
         let [push, correction] = pushes(step.pulling, step.second, step.damping, drive);
@@ -487,7 +480,7 @@ pub(in super::super) fn velocity<S: Simd, const R: usize>(
         simd.load(before).plus(simd.load(after)).times(simd.splat(0.5)).store(central);
     }
     step.increment.copy_from_slice(&step.saved_increment);
-    let first_lane = simd.load(&FIRST_LANE);
+    let first_lane = simd.load(&FIRST_BLOCK);
     let damping = simd.splat(-step.damping);
     let mut before = simd.load(&central[last]).to_next_lane();
     let mut here = simd.load(&central[0]);
