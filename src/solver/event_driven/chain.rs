@@ -22,8 +22,6 @@ pub(super) struct Chain {
     pub bare: Vec<Row>,
     /// K_int/m, in 1/s²; 0 in padding.
     pub coupling: Vec<Row>,
-    /// Share of a block in a mean, 1/N; 0 in padding.
-    shares: Vec<Row>,
     /// Diagonal of S/m, in 1/s².
     pub diagonal: Vec<Row>,
     /// Contact force at displacement zero, Σ k_i a_i/m, in m/s².
@@ -45,7 +43,6 @@ impl Chain {
             mass: parameters.block_mass(),
             bare: layout.filled(0.0),
             coupling: layout.filled(0.0),
-            shares: layout.filled(0.0),
             diagonal: layout.filled(0.0),
             pull: layout.filled(0.0),
             upper: layout.filled(f64::INFINITY),
@@ -58,7 +55,6 @@ impl Chain {
             let (row, lane) = layout.slot(block);
             chain.coupling[row][lane] = parameters.coupling_stiffness() / chain.mass;
             chain.bare[row][lane] = *diagonal;
-            chain.shares[row][lane] = 1.0 / layout.blocks as f64;
             chain.diagonal[row][lane] = diagonal / chain.mass;
         }
         chain
@@ -80,11 +76,13 @@ impl Chain {
         rows[row][lane]
     }
 
-    /// Mean of the entries of all blocks.
+    /// Mean of the entries of all blocks, where those of padding are 0.
     #[inline(always)]
     pub fn mean<S: Simd>(&self, simd: S, rows: &[Row]) -> f64 {
-        let sums = rows.iter().zip(&self.shares);
-        let add = |sum: S::Vector, (row, share)| sum.plus(simd.load(row).times(simd.load(share)));
-        sums.fold(simd.splat(0.0), add).reduce(|a, b| a + b)
+        let mut sums = simd.splat(0.0);
+        for row in rows {
+            sums = sums.plus(simd.load(row));
+        }
+        sums.reduce(|a, b| a + b) / self.layout.blocks as f64
     }
 }

@@ -49,14 +49,14 @@ pub(super) struct Plan {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
+    /// When it starts, in s in the frame.
+    pub start: f64,
     /// Time to the next reattachment that is not passed or to the end, in s.
     pub horizon: f64,
     /// Time to the next cycle of a ramped modulation, in s; not before the horizon.
     pub until_cycle_end: f64,
     /// Displacement that may be left out, in m.
     pub error: f64,
-    /// Mean contact reach, in m: how far a contact that attaches later moves until it breaks.
-    pub reach: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
     pub largest_force: f64,
     /// On the grid a leap passes reattachments.
@@ -67,8 +67,7 @@ pub(super) struct Bounds {
 /// block has moved since, which the driven solution leaves out; what all displace may be a part of the error of a leap.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Passing {
-    /// When it starts, in the frame, how long it must be and may be, in s.
-    pub start: f64,
+    /// How long it must be and may be, in s.
     pub least: f64,
     pub most: f64,
 }
@@ -82,13 +81,14 @@ impl Passing {
         chain: &Chain,
         interface: &mut Interface,
         drive: &Harmonic,
-        [largest, error]: [f64; 2],
+        Bounds { start, error, .. }: Bounds,
+        largest: f64,
     ) -> Result<f64, f64> {
         let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
         let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
         let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, self.most);
         interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
-            let seconds = due - self.start;
+            let seconds = due - start;
             let by_then = displaced + rate * (seconds - last);
             if seconds >= limit || by_then > allowed {
                 return false;
@@ -98,10 +98,8 @@ impl Passing {
                 return false;
             }
             (displaced, last) = (by_then, seconds);
-            let (r, lane) = chain.layout.slot(block);
-            let SplitRow { rate: [speeds], swing, compliance, .. } = &split.rows[r];
-            let speed = speeds[lane] + drive.angular_frequency * swing[lane];
-            rate += per_mass * stiffness * speed * compliance[lane];
+            let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
+            rate += per_mass * stiffness * speed * compliance;
             // Nor may it break.
             limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
             true
@@ -118,11 +116,12 @@ fn plan<S: Simd>(
     simd: S,
     split: &Split,
     chain: &Chain,
+    interface: &mut Interface,
     drive: &Harmonic,
     largest: f64,
     bounds: Bounds,
 ) -> Result<Plan, f64> {
-    let Bounds { horizon, until_cycle_end, error, reach, largest_force, .. } = bounds;
+    let Bounds { horizon, error, .. } = bounds;
     let decay_rate = split.decay_rate;
     // Worth another try after some e-foldings of the free motion, or after the next event.
     let wait = (0.7 / decay_rate).min(horizon);
@@ -145,13 +144,9 @@ fn plan<S: Simd>(
     if !elapsed.is_finite() {
         return Err(f64::INFINITY);
     }
-    let first = split.driven(chain, 0);
-    let path = first.force_path(drive, chain.drive_stiffness);
+    let path = split.driven(chain, 0).force_path(drive, chain.drive_stiffness);
     let segment = Segment { start: 0.0, duration: elapsed, path };
-    // No block moves faster than the first. What attaches later breaks beyond, where nothing is known.
-    let known = until_cycle_end.min(moving + reach / first.rate);
-    let times = [moving, known, left];
-    if largest > error && !hides_no_peak(simd, split, chain, drive, &segment, times, largest_force) {
+    if largest > error && !hides_no_peak(simd, split, chain, interface, drive, &segment, [moving, left], bounds) {
         return Err(wait);
     }
     Ok(Plan { segment, reached, is_whole: elapsed == bounds.horizon, carried: is_short.then_some(left) })
@@ -164,16 +159,17 @@ fn max_carried_time(chain: &Chain) -> f64 {
 }
 
 /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
-/// as large is on record, or comes later in the segment, or comes after it, within `known` s and before any break.
+/// as large is on record, or comes later in the segment, or comes after it, in this cycle and before any break.
 #[inline(always)]
 fn hides_no_peak<S: Simd>(
     simd: S,
     split: &Split,
     chain: &Chain,
+    interface: &mut Interface,
     drive: &Harmonic,
     segment: &Segment<'static>,
-    [moving, known, left]: [f64; 3],
-    largest_force: f64,
+    [moving, left]: [f64; 2],
+    Bounds { start, horizon, until_cycle_end, largest_force, .. }: Bounds,
 ) -> bool {
     let swing = chain.drive_stiffness * split.rows[0].bound[0];
     let driven = |seconds: f64| Segment { duration: seconds, ..*segment };
@@ -194,7 +190,14 @@ fn hides_no_peak<S: Simd>(
     } else {
         (LOOK_AHEAD / chain.damping_rate).min(TAU / drive.angular_frequency)
     };
-    let ahead = (moving + further).min(known);
+    let mut ahead = (moving + further).min(until_cycle_end);
+    if ahead > horizon {
+        // Nor does a contact break that attaches on the way.
+        interface.look_ahead_to_lives(|due, block, [_, reach]| {
+            ahead = ahead.min(due - start + reach / split.speed_and_compliance(chain, drive, block)[0]);
+            due - start < ahead
+        });
+    }
     driven(ahead).maximum_above(highest + left * swing).is_some() && stays_clear(simd, chain, split, ahead, left)
 }
 
@@ -211,9 +214,9 @@ pub(super) fn leap<S: Simd>(
 ) -> Result<Plan, f64> {
     let largest = split.update(simd, chain, drive, state).ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
     if let Some(passing) = bounds.passing {
-        bounds.horizon = passing.horizon(split, chain, interface, drive, [largest, bounds.error])?;
+        bounds.horizon = passing.horizon(split, chain, interface, drive, bounds, largest)?;
     }
-    let plan = plan(simd, split, chain, drive, largest, bounds)?;
+    let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     let elapsed = plan.segment.duration;
     if let Some(audit) = audit.filter(|_| plan.carried.is_none()) {
         audit.follow_leap(chain, drive, split, state, elapsed);
@@ -325,7 +328,7 @@ mod tests {
         let horizon = 1e9;
         let mut split = Split::new(&slider.chain);
         let (until_cycle_end, largest_force) = (f64::INFINITY, f64::INFINITY);
-        let bounds = Bounds { horizon, until_cycle_end, error: 1e-12, reach: 1e-6, largest_force, passing: None };
+        let bounds = Bounds { horizon, until_cycle_end, error: 1e-12, start: 0.0, largest_force, passing: None };
         let plan = leap(Baseline, &mut split, &mut slider, &drive, bounds, None).unwrap();
         assert!(plan.reached.is_none() && plan.carried.is_some(), "{plan:?}");
         let elapsed = plan.segment.duration;

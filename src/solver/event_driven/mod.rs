@@ -200,11 +200,12 @@ impl<'a> Integration<'a> {
         self.update_velocities(observer);
         let drive = self.frame.drive_motion();
         let (start, began) = (self.frame.now(), self.frame.time);
-        let Tolerances { leap_error: error, contact_reach: reach, max_step, .. } = self.tolerances;
+        let Tolerances { leap_error: error, max_step, .. } = self.tolerances;
         let before = self.audit.is_some().then(|| self.slider.state.clone());
         let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
-        let passing = self.takes_grid.then_some(Passing { start: began, least, most: until_change });
-        let bounds = Bounds { horizon, until_cycle_end, error, reach, largest_force: self.largest_force, passing };
+        let passing = self.takes_grid.then_some(Passing { least, most: until_change });
+        let largest_force = self.largest_force;
+        let bounds = Bounds { start: began, horizon, until_cycle_end, error, largest_force, passing };
         let attempt = self.kernels.leap(&mut self.split, &mut self.slider, &drive, bounds, self.audit);
         let Plan { segment, reached, is_whole, carried } = match attempt {
             Ok(plan) => plan,
@@ -289,7 +290,7 @@ impl<'a> Integration<'a> {
 
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     fn attach_next(&mut self, x: f64, observer: &mut dyn Observer) {
-        let event = if self.takes_grid { self.slider.attach_running(x) } else { self.slider.attach_next(x) };
+        let event = self.slider.attach_next(x);
         self.summary.reattachments += 1;
         if self.grid.tells_attachments() {
             observer.contact(&self.frame.absolute(event));

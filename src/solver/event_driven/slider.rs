@@ -56,14 +56,6 @@ impl Slider {
     /// Attaches the contact that is due next, at displacement `x` m of its block.
     #[inline]
     pub fn attach_next(&mut self, x: f64) -> ContactEvent {
-        let event = self.interface.reattach_next(x);
-        self.chain.update(event.block, &self.interface);
-        event
-    }
-
-    /// The same with the sums of its block carried on.
-    #[inline]
-    pub fn attach_running(&mut self, x: f64) -> ContactEvent {
         let event = self.interface.reattach_running(Scalar512b, x);
         self.chain.update(event.block, &self.interface);
         event

@@ -45,8 +45,8 @@ pub(super) struct SplitRow {
     pub swing: Row,
     /// Bound on |y|, in m.
     pub bound: Row,
-    /// m (S'⁻¹)_jj, in s²: how far a force on a block displaces it, per mass; on the grid only.
-    pub compliance: Row,
+    /// m (S'⁻¹)_jj, in s².
+    compliance: Row,
 }
 
 #[derive(Clone, Debug)]
@@ -88,6 +88,15 @@ impl Split {
         let (row, lane) = chain.layout.slot(block);
         let SplitRow { start, rate: [rate], wave: [real, imaginary], swing, .. } = &self.rows[row];
         BlockMotion { start: start[lane], rate: rate[lane], wave: [real[lane], imaginary[lane]], swing: swing[lane] }
+    }
+
+    /// Largest speed of a block on the driven solution, in m/s, and how far a force on it displaces it at most, per mass, in
+    /// s².
+    #[inline(always)]
+    pub fn speed_and_compliance(&self, chain: &Chain, drive: &Harmonic, block: usize) -> [f64; 2] {
+        let (row, lane) = chain.layout.slot(block);
+        let SplitRow { rate: [rate], swing, compliance, .. } = &self.rows[row];
+        [rate[lane] + drive.angular_frequency * swing[lane], compliance[lane]]
     }
 
     /// Splits a state, and bounds the free motion. Returns the largest bound on a displacement, in m; `None` if the free
@@ -234,7 +243,7 @@ impl BlockMotion {
             return ramp;
         }
         let (sine, cosine) = libm::sincos(drive.turn(elapsed));
-        ramp + product(self.wave, [cosine, sine])[0]
+        ramp + self.wave[0] * cosine - self.wave[1] * sine
     }
 
     /// F_S if this is the motion of block 1, in N.
@@ -250,11 +259,6 @@ impl BlockMotion {
             angular_frequency: drive.angular_frequency,
         })
     }
-}
-
-#[inline(always)]
-fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -24,8 +24,6 @@ pub(super) struct Tolerances {
     pub step_error: f64,
     /// Largest displacement left out by one leap, in m.
     pub leap_error: f64,
-    /// Mean reach of a contact, in m.
-    pub contact_reach: f64,
 }
 
 impl Tolerances {
@@ -38,7 +36,6 @@ impl Tolerances {
             max_step,
             step_error: truncation_share(parameters, max_step) * tolerance * parameters.contact_reach(),
             leap_error: tolerance * parameters.contact_reach(),
-            contact_reach: parameters.contact_reach(),
         }
     }
 

@@ -102,24 +102,23 @@ impl Path {
         self.from = s;
     }
 
-    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end, by Halley's steps.
+    /// Where in the rest of the step the block reaches `level` m, which it has passed at the end, by Halley's steps from where
+    /// Hermite's cubic has it, that of s by displacement with the slopes at both ends of the step.
     #[inline(always)]
     fn crossing(&self, level: f64) -> f64 {
         let within = |s: f64| if s > self.from { if s < 1.0 { s } else { 1.0 } } else { self.from };
         let halley = |[x, slope, half]: [f64; 3]| (x - level) * slope / slope.mul_add(slope, (level - x) * half);
         let [c0, c1, c2, c3, c4] = self.coefficients;
-        // The inverse of the path by Hermite's cubic, from both ends and slopes.
         let rise = self.end() - c0;
-        let part = (level - c0) / rise;
-        let [first, last] = [rise / c1, rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4))];
+        let [part, at_start, at_end] = [(level - c0) / rise, rise / c1, rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4))];
         let rest = 1.0 - part;
-        let mut last = within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * first - part * last)));
+        let mut last = within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * at_start - part * at_end)));
         let mut s = within(last - halley(self.at(last)));
-        let mut left = MAX_HALLEY_STEPS;
-        while (s - last).abs() >= ENOUGH && left > 0 {
-            last = s;
-            s = within(last - halley(self.at(last)));
-            left -= 1;
+        for _ in 1..MAX_HALLEY_STEPS {
+            if (s - last).abs() < ENOUGH {
+                break;
+            }
+            (last, s) = (s, within(s - halley(self.at(s))));
         }
         s
     }
@@ -136,6 +135,7 @@ pub(super) struct StepEvents {
     pub reattachments: u64,
     /// Means over the blocks after breaks: displacement and increment, in m.
     pub mean: [f64; 2],
+    /// Blocks that reach a break position, and where in the step.
     paths: Vec<(Path, f64)>,
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
@@ -146,7 +146,7 @@ pub(super) struct StepEvents {
 #[inline(always)]
 pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut Grid, start: f64) {
     let Grid { step, drive, events, .. } = grid;
-    // Stage by stage over all blocks: each stage waits for what it computes, and other blocks fill the time.
+    // Stage after stage over all blocks: one alone would wait for its own results.
     let mut paths = std::mem::take(&mut events.paths);
     paths.clear();
     for &(row, lane) in &step.reached {
@@ -173,7 +173,8 @@ pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut 
     }
 }
 
-/// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach.
+/// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach. `first` is
+/// where it reaches the nearest break position, if that is known.
 #[inline(always)]
 fn break_along<S: Simd>(
     simd: S,
