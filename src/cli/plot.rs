@@ -3,7 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::run::no_standing_figure;
-use crate::figure::{Format, Limits, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
+use crate::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
@@ -22,36 +22,6 @@ pub struct Arguments {
     /// List the columns that can be drawn, with units and meanings
     #[arg(long)]
     list: bool,
-    /// Column on the x axis of a figure of your own
-    #[arg(long, value_name = "COLUMN", requires = "y", help_heading = OWN)]
-    x: Option<String>,
-    /// Column on the y axis, with error bars if it has an interval
-    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
-    y: Option<String>,
-    /// Column that colours show: up to six values in the legend, more on a scale
-    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
-    colour: Option<String>,
-    /// Column whose values get a panel each, up to nine
-    #[arg(long, value_name = "COLUMN", requires = "x", help_heading = OWN)]
-    panels: Option<String>,
-    /// Logarithmic axes
-    #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy"], help_heading = OWN)]
-    log: Option<String>,
-    /// Ends of the x axis; either may be left out
-    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true, help_heading = OWN)]
-    xlim: Option<Limits>,
-    /// Ends of the y axis
-    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true, help_heading = OWN)]
-    ylim: Option<Limits>,
-    /// Label of the x axis [default: meaning, name and unit of the column]
-    #[arg(long, value_name = "TEXT", requires = "x", help_heading = OWN)]
-    xlabel: Option<String>,
-    /// Label of the y axis
-    #[arg(long, value_name = "TEXT", requires = "x", help_heading = OWN)]
-    ylabel: Option<String>,
-    /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
-    #[arg(short, long, value_name = "FILE", requires = "x", conflicts_with = "format", help_heading = OWN)]
-    out: Option<PathBuf>,
     /// Formats, separated by commas [default: svg,png]
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<Format>,
@@ -61,9 +31,20 @@ pub struct Arguments {
     /// Style
     #[arg(long, value_enum, default_value_t = Style::Screen)]
     style: Style,
+    #[command(flatten)]
+    own: OwnFigure,
+    /// File of your own figure; its ending is the format [default: DIR/figures/Y-X.svg and .png]
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        requires = "x",
+        conflicts_with = "format",
+        help_heading = "A figure of your own"
+    )]
+    out: Option<PathBuf>,
 }
 
-const OWN: &str = "A figure of your own";
 const EXAMPLES: &str = "\
 Examples:
   stickslip plot results/fig3                                          the standing figures, as SVG and PNG
@@ -74,35 +55,7 @@ Examples:
   stickslip plot results/friction --x Delta --y mean_friction --colour T --xlim 0:4e-6 \\
     --size 86mmx60mm --style print --format pdf";
 
-fn limits(text: &str) -> Result<Limits, &'static str> {
-    const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
-    let end = |text: &str| match text.trim() {
-        "" => Ok(None),
-        number => number.parse().ok().filter(|end: &f64| end.is_finite()).map(Some).ok_or(WANTED),
-    };
-    match text.split_once(':') {
-        Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
-        _ => Err(WANTED),
-    }
-}
-
 impl Arguments {
-    fn own(&self) -> Option<OwnFigure> {
-        let is_log = |axis| self.log.as_ref().is_some_and(|axes| axes.contains(axis));
-        Some(OwnFigure {
-            x: self.x.clone()?,
-            y: self.y.clone()?,
-            colour: self.colour.clone(),
-            panels: self.panels.clone(),
-            is_log_x: is_log('x'),
-            is_log_y: is_log('y'),
-            x_limits: self.xlim.unwrap_or_default(),
-            y_limits: self.ylim.unwrap_or_default(),
-            x_label: self.xlabel.clone(),
-            y_label: self.ylabel.clone(),
-        })
-    }
-
     fn look(&self, results: &Results<'_>) -> Look {
         Look { style: self.style, size: self.size, ..Look::of_sweep(results.sweep().name()) }
     }
@@ -119,20 +72,19 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
     let results = Results::read(&Layout::new(&Disk, directory))?;
     let (layout, look) = (results.layout(), arguments.look(&results));
-    let files = match arguments.own() {
-        None => draw_all(layout, &look, arguments.formats())?,
-        Some(figure) => {
-            let picture = draw_own(layout, &figure, &look)?;
-            if look.style == Style::Print {
-                output::report(&format!("for the caption: {}", picture.note()));
-            }
-            match &arguments.out {
-                None => write_own(layout, picture, &look, arguments.formats())?,
-                Some(file) => {
-                    let format = format_of(file)?;
-                    output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
-                    vec![file.clone()]
-                }
+    let files = if arguments.own.x.is_none() {
+        draw_all(layout, &look, arguments.formats())?
+    } else {
+        let picture = draw_own(layout, &arguments.own, &look)?;
+        if look.style == Style::Print {
+            output::report(&format!("for the caption: {}", picture.note()));
+        }
+        match &arguments.out {
+            None => write_own(layout, picture, &look, arguments.formats())?,
+            Some(file) => {
+                let format = format_of(file)?;
+                output::replace(file, |draft| Ok(std::fs::write(draft, picture.encoded(format)?)?))?;
+                vec![file.clone()]
             }
         }
     };
@@ -160,19 +112,4 @@ fn list() -> Result<()> {
     columns.iter().try_for_each(|column| {
         output::print(&format!("{:name$}  {:unit$}  {}\n", column.name, column.unit, column.meaning))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn either_end_of_an_axis_may_be_left_out() {
-        let ends = |text: &str| limits(text).map(|limits| (limits.0, limits.1));
-        assert_eq!(ends("1e-6:1e-3"), Ok((Some(1e-6), Some(1e-3))));
-        assert_eq!((ends("-1:"), ends(":5")), (Ok((Some(-1.0), None)), Ok((None, Some(5.0)))));
-        for wrong in ["", ":", "1", "a:b", "1:nan", "1:2:3", "inf:"] {
-            assert!(ends(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -2,8 +2,9 @@
 
 use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
 use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Cell, Layout, RIGHT};
+use super::frame::{Layout, OVERLAP, RIGHT};
 use super::legend::{Entry, Mark, entry};
+use super::panel::{self, Cell, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Picture, Stroke};
 use super::sets::{ETA, Grid};
 use super::style::{BAR_WIDTH, BLACK, BLUE, GREY, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
@@ -56,45 +57,43 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         entry(Mark::Line(REFERENCE), "η = 1"),
     ]);
     let right = if density.is_some() { COLOUR_BAR } else { RIGHT };
-    let (page, mut sheet) = Layout::column(WIDTH, HEIGHTS, 0.0, right).page("phi-eta", look, &entries);
     let x = Axis::logarithmic(ETA, low, high);
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
-    let frame = page.frame(0, 0, x, Axis::angle("Phase φ (rad)", low, high));
-
-    frame.clipped(&mut sheet, |sheet| {
-        match &density {
-            Some(Density { shades, cells }) => {
-                frame.cells(sheet, cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density)))));
-            }
-            None => {
-                for (is_locked, dot) in [(false, OTHER), (true, LOCKED)] {
-                    let slips = placed.iter().filter(|slip| slip.0.is_locked == is_locked);
-                    frame.points(sheet, slips.map(|slip| slip.1), dot);
-                }
-            }
+    let curve = |phase: fn(f64) -> Option<f64>| {
+        let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
+        modulated.filter_map(|eta| Some((eta, phase(eta)?))).collect()
+    };
+    let mut layers = match &density {
+        Some(Density { shades, cells }) => {
+            let cells = cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density))));
+            vec![Layer::Cells(cells.collect(), OVERLAP)]
         }
-        frame.upright(sheet, 1.0, REFERENCE);
-        let modulated = || frame.x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
-        frame.curve(sheet, modulated().map(|eta| (eta, minimum_phase_asymptote(eta))), ASYMPTOTE);
-        frame.curve(sheet, modulated().filter_map(|eta| Some((eta, minimum_phase(eta)?))), EXACT);
-        for &(eta, _, ends) in &averages {
-            if let Some(ends) = ends {
-                frame.error_bar(sheet, eta, ends, Stroke::solid(BLUE, BAR_WIDTH));
-            }
-        }
-        let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean));
-        frame.points(sheet, means(), EDGE);
-        frame.points(sheet, means(), AVERAGE);
-    });
-    frame.axes(&mut sheet);
-    if let Some(density) = &density {
-        ColourBar::of_axis("density (1/rad)", &density.shades).draw(&mut sheet, &frame);
-    }
-    Some(sheet.finish())
+        None => [(false, OTHER), (true, LOCKED)]
+            .map(|(is_locked, dot)| {
+                let slips = placed.iter().filter(|slip| slip.0.is_locked == is_locked);
+                Layer::Dots(slips.map(|slip| slip.1).collect(), dot)
+            })
+            .into(),
+    };
+    let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
+    layers.extend([
+        Layer::Upright(1.0, REFERENCE),
+        Layer::Curve(curve(|eta| Some(minimum_phase_asymptote(eta))), ASYMPTOTE),
+        Layer::Curve(curve(minimum_phase), EXACT),
+        Layer::Bars(
+            averages.iter().filter_map(|&(eta, _, ends)| Some((eta, ends?))).collect(),
+            Stroke::solid(BLUE, BAR_WIDTH),
+        ),
+        Layer::Dots(means(), EDGE),
+        Layer::Dots(means(), AVERAGE),
+    ]);
+    let bar = density.as_ref().map(|density| ColourBar::of_axis("density (1/rad)", &density.shades));
+    let panel = Panel::new(x, Axis::angle("Phase φ (rad)", low, high), vec![Layer::Inside(layers)]).with_bar(bar);
+    Some(panel::draw("phi-eta", look, &Layout::column(WIDTH, HEIGHTS, 0.0, right), &entries, vec![panel]))
 }
 
 /// η, mean phase in rad, and the ends of its interval.
-type Average = (f64, f64, Option<(f64, f64)>);
+type Average = (f64, f64, Option<Ends>);
 
 /// Mean phases of the locked sets of each bin, at the mean η of these sets, with their intervals.
 fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
@@ -107,9 +106,6 @@ fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
     };
     bins.iter().filter_map(average).collect()
 }
-
-/// η and φ of a slip.
-type Place = (f64, f64);
 
 /// How slips at each η are spread over the phase.
 struct Density {

@@ -2,11 +2,12 @@
 //! for each modulation.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
-use super::legend::{Mark, entry};
-use super::picture::{Picture, Sheet};
+use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::legend::{Entry, Mark, entry};
+use super::panel::{self, Layer, Panel, Place};
+use super::picture::{Dot, Picture};
 use super::sets::{Grid, distinct, modulation, parameter, swept};
-use super::style::{INKS, Look, RADIUS, curve, dot};
+use super::style::{INKS, Look, RADIUS, WHITE, curve, dot};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetRow, Statistic};
 
@@ -46,34 +47,24 @@ const QUANTITIES: [Quantity; 4] = [
 pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let [symbol] = swept(&sets.iter())[..] else { return None };
     let min_values = if symbol == Symbol::BreakOn { 2 } else { MIN_VALUES };
-    let lines = lines(sets.iter())?;
-    if lines.iter().any(|line| line.len() < min_values) {
+    let lines = Lines::of(sets, symbol)?;
+    if lines.lines.iter().any(|line| line.len() < min_values) {
         return None;
     }
     let x = match symbol {
         Symbol::BreakOn => Axis::categories("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
-        _ => Grid::of(distinct(sets.iter(), |parameters| number(parameters, symbol))).wider_axis(&label(symbol)),
+        _ => lines.axis(),
     };
-    let present: Vec<Quantity> =
-        QUANTITIES.into_iter().filter(|quantity| sets.iter().any(|set| quantity.1(set).is_some())).collect();
-    if present.is_empty() {
-        return None;
-    }
-    let names = lines.iter().map(|line| modulation(&line[0].parameters));
-    let entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
-    let columns = present.len().min(2);
-    let heights = HEIGHTS.get(..present.len().div_ceil(2))?;
+    let panel =
+        |quantity: Quantity| Some(Panel::new(x.clone(), y_axis(quantity, sets)?, lines.layers(quantity.1, |_| false)));
+    let panels: Vec<Panel<'_>> = QUANTITIES.into_iter().filter_map(panel).collect();
+    let columns = panels.len().min(2);
+    let heights = HEIGHTS.get(..panels.len().div_ceil(2)).filter(|heights| !heights.is_empty())?;
     let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, heights, ROW_GAP, RIGHT) };
-    let (page, mut sheet) = layout.page("dependence", look, &entries);
-    for (index, quantity) in present.into_iter().enumerate() {
-        let frame = page.frame(index / columns, index % columns, x.clone(), y_axis(quantity, sets)?);
-        draw(&mut sheet, &frame, &lines, symbol, quantity.1);
-        frame.axes(&mut sheet);
-    }
-    Some(sheet.finish())
+    Some(panel::draw("dependence", look, &layout, &lines.legend(), panels))
 }
 
-/// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much.
+/// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much; `None` if no set has a value.
 fn y_axis((label, value, is_share): Quantity, sets: &[SetRow]) -> Option<Axis> {
     let ends = sets.iter().filter_map(value).flat_map(Statistic::ends);
     if !is_share {
@@ -83,34 +74,56 @@ fn y_axis((label, value, is_share): Quantity, sets: &[SetRow]) -> Option<Axis> {
     Some(Axis::linear(label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
 }
 
-fn draw(sheet: &mut Sheet, frame: &Frame, lines: &[Vec<&SetRow>], symbol: Symbol, value: Getter) {
-    for (line, ink) in lines.iter().zip(INKS) {
-        let points = line.iter().filter_map(|set| Some((number(&set.parameters, symbol)?, value(set)?)));
-        frame.statistics(sheet, &points.collect::<Vec<_>>(), curve(ink), RADIUS);
-    }
+/// Sets along a parameter: a line for each modulation.
+pub(super) struct Lines<'a> {
+    symbol: Symbol,
+    pub(super) lines: Vec<Vec<&'a SetRow>>,
 }
 
-/// The sets of each modulation, in their order, if there are enough inks.
-pub(super) fn lines<'a>(sets: impl Iterator<Item = &'a SetRow>) -> Option<Vec<Vec<&'a SetRow>>> {
-    let modulation = |set: &SetRow| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
-    let mut lines: Vec<Vec<&SetRow>> = Vec::new();
-    for set in sets {
-        match lines.iter_mut().find(|line| modulation(line[0]) == modulation(set)) {
-            Some(line) => line.push(set),
-            None => lines.push(vec![set]),
+impl<'a> Lines<'a> {
+    /// `None` for more modulations than there are inks.
+    pub(super) fn of(sets: &'a [SetRow], symbol: Symbol) -> Option<Self> {
+        let modulation = |set: &SetRow| (set.parameters.modulation_amplitude, set.parameters.modulation_period);
+        let mut lines: Vec<Vec<&SetRow>> = Vec::new();
+        for set in sets {
+            match lines.iter_mut().find(|line| modulation(line[0]) == modulation(set)) {
+                Some(line) => line.push(set),
+                None => lines.push(vec![set]),
+            }
         }
+        (lines.len() <= INKS.len()).then_some(Self { symbol, lines })
     }
-    (lines.len() <= INKS.len()).then_some(lines)
+
+    pub(super) fn axis(&self) -> Axis {
+        let values = distinct(self.lines.iter().flatten().copied(), |parameters| number(parameters, self.symbol));
+        Grid::of(values).wider_axis(&label(self.symbol))
+    }
+
+    pub(super) fn legend(&self) -> Vec<Entry> {
+        let names = self.lines.iter().map(|line| modulation(&line[0].parameters));
+        names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect()
+    }
+
+    /// A statistic of all sets, some of them as open circles.
+    pub(super) fn layers<'l>(&self, value: Getter, is_open: fn(&SetRow) -> bool) -> Vec<Layer<'l>> {
+        let place = |set: &&SetRow| Some((number(&set.parameters, self.symbol)?, value(set)?));
+        let mut layers = Vec::new();
+        for (line, ink) in self.lines.iter().zip(INKS) {
+            layers.extend(Layer::statistics(&line.iter().filter_map(place).collect::<Vec<_>>(), curve(ink), RADIUS));
+            let open = line.iter().filter(|set| is_open(set)).filter_map(place);
+            let open: Vec<Place> = open.map(|(x, statistic)| (x, statistic.value)).collect();
+            layers.push(Layer::Dots(open, Dot::solid(WHITE, RADIUS - 1.6)));
+        }
+        layers
+    }
 }
 
 /// Where a parameter stands on the axis: its value, the spread of thresholds over their mean, the place of a rule.
 pub(super) fn number(parameters: &Parameters, symbol: Symbol) -> Option<f64> {
     match (symbol, parameters.get(symbol)) {
         (Symbol::Dfs, _) => Some(parameters.threshold_deviation / parameters.mean_threshold),
-        (_, Value::Real(real)) => Some(real),
-        (_, Value::Count(count)) => Some(count as f64),
         (_, Value::Text(word)) => Some(if word == BreakOn::Magnitude.word() { 0.0 } else { 1.0 }),
-        (_, Value::Flag(_) | Value::Null) => None,
+        (_, value) => value.number(),
     }
 }
 

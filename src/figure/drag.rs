@@ -1,10 +1,12 @@
 //! Drag: τ on a ramp of the modulation, on the way there and on the way back, with the lines τ = nT, and τ/T in bins.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Frame, Layout, ROW_GAP, tag};
+use super::font;
+use super::frame::{Frame, Layout, ROW_GAP};
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Anchor, Dot, Ink, Picture, Sheet, Stroke};
-use super::style::{GRID, INKS, LEGEND_TEXT, Look};
+use super::panel::{self, Ends, Layer, Panel, Place};
+use super::picture::{Anchor, Dot, Fill, Ink, Picture, Sheet, Stroke};
+use super::style::{GRID, INKS, LEGEND_TEXT, Look, WHITE};
 use crate::reduce::{Point, RampStage, quantile};
 
 /// Space right of the frames for the numbers of lines.
@@ -61,73 +63,66 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
         STAGES.map(|(_, name, ink)| entry(Mark::Bar(Dot::solid(ink, 4.5)), format!("median and quartiles, {name}")));
     let entries: Vec<Entry> =
         slip_entries.into_iter().chain([entry(Mark::Line(GRID), "τ = nT")]).chain(medians).collect();
-    let (page, mut sheet) = LAYOUT.page("drag", look, &entries);
-    let upper = page.frame(0, 0, x.clone(), upper);
-    let lower = page.frame(1, 0, x, Axis::linear("Median interval in periods, τ / T", least - 0.3, most + 0.3));
-    draw_intervals(&mut sheet, &upper, &slips, &multiples, is_period);
-    draw_medians(&mut sheet, &lower, &slips, &multiples, (low, high));
-    Some(sheet.finish())
+    let lower = Axis::linear("Median interval in periods, τ / T", least - 0.3, most + 0.3);
+    // τ = nT is a curve in T, and level in Δ.
+    let period = slips.first().map_or(0.0, |slip| slip.period);
+    let line = |n: f64| [x.low, x.high].map(|x| (x, n * if is_period { x } else { period }));
+    let lines = multiples.iter().map(|&n| Layer::Curve(line(n).into(), GRID));
+    // Slip by slip, so that neither stage covers the other.
+    let dots =
+        slips.iter().map(|slip| Layer::Dots(vec![(slip.modulation, slip.interval)], slip_dot(STAGES[slip.stage].2)));
+    let numbers: Vec<(f64, [Place; 2])> = multiples.iter().map(|&n| (n, line(n))).collect();
+    let mut upper = Panel::new(x.clone(), upper, vec![Layer::Inside(lines.chain(dots).collect())]);
+    upper.notes = vec![Layer::Drawn(Box::new(move |sheet, frame| {
+        numbers.into_iter().for_each(|(n, line)| number_line(sheet, frame, n, line));
+    }))];
+    let levels = multiples.iter().map(|&n| Layer::Level(n, GRID));
+    let lower = Panel::new(x, lower, vec![Layer::Inside(levels.chain(medians_of(&slips, (low, high))).collect())]);
+    Some(panel::draw("drag", look, &LAYOUT, &entries, vec![upper, lower]))
 }
 
 const fn slip_dot(ink: Ink) -> Dot {
     Dot { ink, radius: 2.0, opacity: 0.45 }
 }
 
-/// Slips over the lines τ = nT, which are curves in T and level in Δ.
-fn draw_intervals(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f64], is_period: bool) {
-    let period = slips.first().map_or(0.0, |slip| slip.period);
-    let line = |n: f64| [frame.x.low, frame.x.high].map(|x| (x, n * if is_period { x } else { period }));
-    frame.clipped(sheet, |sheet| {
-        for &n in multiples {
-            frame.curve(sheet, line(n), GRID);
-        }
-        // Slip by slip, so that neither stage covers the other.
-        for slip in slips {
-            frame.points(sheet, [(slip.modulation, slip.interval)], slip_dot(STAGES[slip.stage].2));
-        }
-    });
-    frame.axes(sheet);
-    // Where a line leaves the frame: at its right edge, or in it, under the upper edge.
-    for &n in multiples {
-        let [(left, start), (right, end)] = line(n);
-        let top = frame.y.high;
-        let text = format!("n = {n}");
-        if frame.y.contains(end) {
-            let place = (frame.x_of(right) + 6.0, frame.y_of(end));
-            sheet.centred_text(place, &text, LEGEND_TEXT, Anchor::Start);
-        } else if end > top && start < top {
-            let x = frame.x_of(left + (right - left) * (top - start) / (end - start));
-            tag(sheet, (x.max(frame.left + 26.0) - 18.0, frame.top + 16.0), &text, Anchor::Middle);
-        }
+/// The number of a line τ = nT where it leaves the frame: at its right edge, or in it, under the upper edge.
+fn number_line(sheet: &mut Sheet, frame: &Frame, n: f64, [(left, start), (right, end)]: [Place; 2]) {
+    let (text, top) = (format!("n = {n}"), frame.y.high);
+    if frame.y.contains(end) {
+        let place = (frame.x_of(right) + 6.0, frame.y_of(end));
+        sheet.centred_text(place, &text, LEGEND_TEXT, Anchor::Start);
+    } else if end > top && start < top {
+        let x = frame.x_of(left + (right - left) * (top - start) / (end - start)).max(frame.left + 26.0) - 18.0;
+        let (y, size, width) = (frame.top + 16.0, f64::from(LEGEND_TEXT), font::width(&text, LEGEND_TEXT));
+        // The ground that it needs to be read.
+        let ground = [x - 0.5 * width - 2.0, y - 0.6 * size, width + 4.0, 1.2 * size];
+        sheet.rectangle(ground, Fill { ink: WHITE, opacity: 0.8 });
+        sheet.centred_text((x, y), &text, LEGEND_TEXT, Anchor::Middle);
     }
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.
-fn draw_medians(sheet: &mut Sheet, frame: &Frame, slips: &[Slip], multiples: &[f64], (low, high): (f64, f64)) {
+fn medians_of<'a>(slips: &[Slip], (low, high): Ends) -> Vec<Layer<'a>> {
     let width = (high - low) / f64::from(BINS);
-    frame.clipped(sheet, |sheet| {
-        for &n in multiples {
-            frame.level(sheet, n, GRID);
-        }
-        for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
-            for bin in 0..BINS {
-                let start = low + f64::from(bin) * width;
-                let end = if bin + 1 == BINS { f64::INFINITY } else { start + width };
-                let is_within = |slip: &&Slip| slip.stage == stage && (start..end).contains(&slip.modulation);
-                let ratios = ratios(slips.iter().filter(is_within));
-                let [Some(first), Some(median), Some(third)] = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share))
-                else {
-                    continue;
-                };
-                if ratios.len() >= MIN_INTERVALS {
-                    let x = start + (0.5 + OFFSETS[stage]) * width;
-                    frame.curve(sheet, [(x, first), (x, third)], Stroke::solid(ink, 2.0));
-                    frame.points(sheet, [(x, median)], Dot::solid(ink, 4.5));
-                }
+    let mut layers = Vec::new();
+    for (stage, (_, _, ink)) in STAGES.into_iter().enumerate() {
+        for bin in 0..BINS {
+            let start = low + f64::from(bin) * width;
+            let end = if bin + 1 == BINS { f64::INFINITY } else { start + width };
+            let is_within = |slip: &&Slip| slip.stage == stage && (start..end).contains(&slip.modulation);
+            let ratios = ratios(slips.iter().filter(is_within));
+            let [Some(first), Some(median), Some(third)] = [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share))
+            else {
+                continue;
+            };
+            if ratios.len() >= MIN_INTERVALS {
+                let x = start + (0.5 + OFFSETS[stage]) * width;
+                layers.push(Layer::Curve(vec![(x, first), (x, third)], Stroke::solid(ink, 2.0)));
+                layers.push(Layer::Dots(vec![(x, median)], Dot::solid(ink, 4.5)));
             }
         }
-    });
-    frame.axes(sheet);
+    }
+    layers
 }
 
 /// τ/T of some slips, ascending.

@@ -4,11 +4,9 @@
 use super::axis::Axis;
 use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
-use super::picture::{Anchor, Dot, Fill, Sheet, Stroke, snapped};
-use super::style::{
-    AXIS, BAR_WIDTH, DARK_GREY, HALF_DIGIT, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT, WHITE, ink_on,
-};
-use crate::reduce::Statistic;
+use super::panel::Cell;
+use super::picture::{Anchor, Sheet, snapped};
+use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
 use kuva::render::color::Color;
 
 const TICK_LENGTH: f64 = 7.0;
@@ -157,9 +155,6 @@ impl Page<'_> {
     }
 }
 
-/// A rectangle of data: its ends along x and along y.
-pub(super) type Cell = ((f64, f64), (f64, f64));
-
 pub(super) struct Frame {
     pub(super) left: f64,
     pub(super) top: f64,
@@ -199,79 +194,10 @@ impl Frame {
     }
 
     /// Left edge, upper edge, width and height of a rectangle of data, on whole pixels.
-    pub(super) fn box_of(&self, x: (f64, f64), y: (f64, f64)) -> [f64; 4] {
+    pub(super) fn box_of(&self, (x, y): Cell) -> [f64; 4] {
         let [left, right] = [x.0, x.1].map(|value| snapped(self.x_of(value)));
         let [top, bottom] = [y.1, y.0].map(|value| snapped(self.y_of(value)));
         [left, top, right - left, bottom - top]
-    }
-
-    /// Cells of data, each in its own colour.
-    pub(super) fn cells(&self, sheet: &mut Sheet, cells: impl IntoIterator<Item = (Cell, Color)>) {
-        sheet.rectangles(cells.into_iter().map(|((x, y), colour)| {
-            let [left, top, width, height] = self.box_of(x, y);
-            ([left, top, width + OVERLAP, height + OVERLAP], colour)
-        }));
-    }
-
-    /// A short text in the middle of a cell of this shade.
-    pub(super) fn name_cell(&self, sheet: &mut Sheet, (x, y): Cell, text: &str, share: f64) {
-        let (x, y) = self.place((self.x.middle(x.0, x.1), self.y.middle(y.0, y.1)));
-        let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
-        sheet.coloured_text(place, text, LEGEND_TEXT, Anchor::Middle, Some(ink_on(share)));
-    }
-
-    /// Shows what `draw` draws inside the frame only.
-    pub(super) fn clipped(&self, sheet: &mut Sheet, draw: impl FnOnce(&mut Sheet)) {
-        sheet.clipped([self.left, self.top, self.width, self.height], draw);
-    }
-
-    pub(super) fn curve(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, stroke: Stroke) {
-        sheet.line(points.into_iter().map(|point| self.place(point)).collect(), stroke);
-    }
-
-    /// A level line from edge to edge.
-    pub(super) fn level(&self, sheet: &mut Sheet, y: f64, stroke: Stroke) {
-        self.curve(sheet, [(self.x.low, y), (self.x.high, y)], stroke);
-    }
-
-    /// A vertical line from edge to edge.
-    pub(super) fn upright(&self, sheet: &mut Sheet, x: f64, stroke: Stroke) {
-        self.curve(sheet, [(x, self.y.low), (x, self.y.high)], stroke);
-    }
-
-    /// The data points that lie inside.
-    pub(super) fn points(&self, sheet: &mut Sheet, points: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
-        let inside = points.into_iter().filter(|&(x, y)| self.x.contains(x) && self.y.contains(y));
-        sheet.discs(inside.map(|point| self.place(point)), dot);
-    }
-
-    /// Statistics, with a bar for each confidence interval that is known, joined by a line.
-    pub(super) fn statistics(&self, sheet: &mut Sheet, points: &[(f64, Statistic)], stroke: Stroke, radius: f64) {
-        let values = || points.iter().map(|&(x, statistic)| (x, statistic.value));
-        self.clipped(sheet, |sheet| {
-            self.curve(sheet, values(), stroke);
-            for &(x, statistic) in points {
-                if let Some(ends) = statistic.interval {
-                    self.error_bar(sheet, x, ends, Stroke::solid(stroke.ink, BAR_WIDTH));
-                }
-            }
-        });
-        self.points(sheet, values(), Dot::solid(stroke.ink, radius));
-    }
-
-    /// An upright bar between two values; what lies under a logarithmic axis runs out of the frame.
-    pub(super) fn error_bar(&self, sheet: &mut Sheet, x: f64, (low, high): (f64, f64), stroke: Stroke) {
-        let bottom =
-            if self.y.place(low).is_finite() { self.y_of(low).min(2.0 * self.bottom()) } else { self.bottom() };
-        sheet.line(vec![(self.x_of(x), bottom), (self.x_of(x), self.y_of(high))], stroke);
-    }
-
-    /// A vertical stripe between two values of x.
-    pub(super) fn stripe(&self, sheet: &mut Sheet, low: f64, high: f64, fill: Fill) {
-        let (left, right) = (self.x_of(low.max(self.x.low)), self.x_of(high.min(self.x.high)));
-        if right > left {
-            sheet.rectangle([left, self.top, right - left, self.height], fill);
-        }
     }
 
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
@@ -372,19 +298,6 @@ fn fitted_label(letter: &str, axis: &Axis, room: f64) -> (String, u32) {
     let [long, short] = [&axis.label, axis.short_label()].map(|label| format!("{letter}{label}"));
     let label = if font::width(&long, LABEL_TEXT) <= room { long } else { short };
     fitted(label.trim_end(), LABEL_TEXT, room)
-}
-
-/// A short text in a frame, on the ground that it needs to be read.
-pub(super) fn tag(sheet: &mut Sheet, (x, y): (f64, f64), text: &str, anchor: Anchor) {
-    let (size, width) = (f64::from(LEGEND_TEXT), font::width(text, LEGEND_TEXT));
-    let left = match anchor {
-        Anchor::Start => x,
-        Anchor::Middle => x - 0.5 * width,
-        Anchor::End => x - width,
-    };
-    let ground = [left - 2.0, y - 0.6 * size, width + 4.0, 1.2 * size];
-    sheet.rectangle(ground, Fill { ink: WHITE, opacity: 0.8 });
-    sheet.centred_text((x, y), text, LEGEND_TEXT, anchor);
 }
 
 /// Values at the ticks of an axis, and their lengths.

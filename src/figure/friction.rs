@@ -3,6 +3,7 @@
 use super::axis::{Axis, bounds};
 use super::frame::{Layout, RIGHT};
 use super::legend::{Entry, Mark, entry};
+use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
 use super::sets::{Modulations, frequency};
 use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, STRIPE, curve, dot};
@@ -42,22 +43,18 @@ pub(super) fn friction(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let lines: Vec<_> = modulated.chain(units.map(|_| (None, BLACK, "Δ = 0".to_owned()))).collect();
     let mut entries: Vec<Entry> = lines.iter().map(|(_, ink, name)| entry(Mark::Bar(dot(ink)), name)).collect();
     entries.extend(units.map(|_| entry(Mark::Patch(STRIPE), "0.2 to 0.3: reduction begins, according to the paper")));
-    let (page, mut sheet) = LAYOUT.page("friction", look, &entries);
-    let frame = page.frame(0, 0, x, Axis::rounded(y_label, least.min(0.0), most));
+    let mut layers = Vec::new();
     if units.is_some() {
-        frame.clipped(&mut sheet, |sheet| {
-            frame.stripe(sheet, REDUCTION.0, REDUCTION.1, STRIPE);
-            frame.level(sheet, 1.0, REFERENCE);
-        });
+        layers.push(Layer::Inside(vec![Layer::Stripe(REDUCTION, STRIPE), Layer::Level(1.0, REFERENCE)]));
     }
     for (period, ink, _) in lines {
         let of_period = sets.iter().filter(|set| set.parameters.modulation_period == period);
         let mut points: Vec<(f64, Statistic)> = of_period.filter_map(point).collect();
         points.sort_by(|left, right| left.0.total_cmp(&right.0));
-        frame.statistics(&mut sheet, &points, curve(ink), RADIUS);
+        layers.extend(Layer::statistics(&points, curve(ink), RADIUS));
     }
-    frame.axes(&mut sheet);
-    Some(sheet.finish())
+    let panel = Panel::new(x, Axis::rounded(y_label, least.min(0.0), most), layers);
+    Some(panel::draw("friction", look, &LAYOUT, &entries, vec![panel]))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::axis::{Axis, bounds};
 use super::font;
 use super::frame::{Frame, Layout, OVERLAP, RIGHT};
 use super::legend::{Entry, Mark, entry};
+use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
 use super::sets::{modulation, setting, swept, thousands};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
@@ -14,6 +15,7 @@ use crate::reduce::{HistogramBin, SetRow};
 const MAX_PANELS: usize = 4;
 /// Sets that may fit: each panel can hold a second one, of identical contacts.
 pub(super) const MAX_SETS: usize = 2 * MAX_PANELS;
+const NAME: &str = "tau-histograms";
 const WIDTH: f64 = 558.0;
 const HEIGHTS: [f64; MAX_PANELS] = [150.0; MAX_PANELS];
 /// Multiples of T that are marked; more would be a grey area.
@@ -42,6 +44,20 @@ impl<'a> Panel<'a> {
         self.bars.iter().chain(self.overlay.iter().flatten()).copied()
     }
 
+    fn layers(&self, multiples: Vec<f64>) -> Vec<Layer<'a>> {
+        let (period, bars) = (self.period.unwrap_or(1.0), self.bars.clone());
+        let fills = Layer::Drawn(Box::new(move |sheet, frame| {
+            for bar in bars {
+                let (left, top) = (frame.x_of(bar.low), frame.y_of(bar.density));
+                sheet.rectangle([left, top, frame.x_of(bar.high) - left + OVERLAP, frame.y_of(0.0) - top], BAR);
+            }
+        }));
+        let outlines = outline(&self.bars).into_iter().map(|line| Layer::Curve(line, OUTLINE));
+        let overlay = self.overlay.iter().flat_map(|bars| outline(bars)).map(|line| Layer::Curve(line, OVERLAY));
+        let numbered = Layer::Drawn(Box::new(move |sheet, frame| draw_multiples(sheet, frame, multiples, period)));
+        vec![numbered, Layer::Inside(std::iter::once(fills).chain(outlines).chain(overlay).collect())]
+    }
+
     /// The size of the sample.
     fn amount(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
@@ -52,25 +68,26 @@ impl<'a> Panel<'a> {
 
 /// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more
 /// sets or none.
-pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
+pub(super) fn histograms<'a>(sets: &[SetRow], bins: &'a [HistogramBin], look: &Look) -> Option<Picture> {
     let panels = panels(sets, bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
     let layout = Layout { has_headings: true, ..Layout::column(WIDTH, HEIGHTS.get(..panels.len())?, 10.0, RIGHT) };
-    let (page, mut sheet) = layout.page("tau-histograms", look, &legend(&panels));
+    let legend = legend(&panels);
+    let (page, _) = layout.page(NAME, look, &legend);
     let margin = 0.04 * (high - low);
-    for (row, panel) in panels.iter().enumerate() {
+    let of_set = |panel: &Panel<'a>, height: f64| {
         let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
         let multiples = panel.period.map_or_else(Vec::new, |period| x.multiples_of(period, MAX_MULTIPLES));
-        let y_label = if row == 0 { "Probability density (1/s)" } else { "" };
+        let y_label = if *panel == panels[0] { "Probability density (1/s)" } else { "" };
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         // The numbers cover no bar.
-        let free = page.heights[row] - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
-        let frame = page.frame(row, 0, x, Axis::sparse(y_label, 0.0, highest * page.heights[row] / free));
-        draw(&mut sheet, &frame, panel, &multiples);
-        frame.axes(&mut sheet);
-        frame.heading(&mut sheet, &panel.title, &panel.amount());
-    }
-    Some(sheet.finish())
+        let free = height - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
+        let y = Axis::sparse(y_label, 0.0, highest * height / free);
+        let heading = Some((panel.title.clone(), panel.amount()));
+        panel::Panel { heading, ..panel::Panel::new(x, y, panel.layers(multiples)) }
+    };
+    let drawn = panels.iter().zip(page.heights).map(|(panel, height)| of_set(panel, height)).collect();
+    Some(panel::draw(NAME, look, &layout, &legend, drawn))
 }
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it
@@ -110,10 +127,10 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
     [entry(Mark::Patch(BAR), "slips of all seeds")].into_iter().chain(overlay).chain(multiples).collect()
 }
 
-fn draw(sheet: &mut Sheet, frame: &Frame, panel: &Panel<'_>, multiples: &[f64]) {
-    let period = panel.period.unwrap_or(1.0);
+/// The multiples of a period, with the numbers for which there is room.
+fn draw_multiples(sheet: &mut Sheet, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
-    for &multiple in multiples {
+    for multiple in multiples {
         let (x, n) = (frame.x_of(multiple), (multiple / period).round());
         let text = if free == f64::NEG_INFINITY { format!("n = {n}") } else { format!("{n}") };
         let half = 0.5 * font::width(&text, LEGEND_TEXT);
@@ -125,22 +142,10 @@ fn draw(sheet: &mut Sheet, frame: &Frame, panel: &Panel<'_>, multiples: &[f64]) 
         }
         sheet.line(vec![(x, frame.bottom()), (x, top)], REFERENCE);
     }
-    frame.clipped(sheet, |sheet| {
-        for bar in &panel.bars {
-            let (left, top) = (frame.x_of(bar.low), frame.y_of(bar.density));
-            sheet.rectangle([left, top, frame.x_of(bar.high) - left + OVERLAP, frame.y_of(0.0) - top], BAR);
-        }
-        for line in outline(&panel.bars) {
-            frame.curve(sheet, line, OUTLINE);
-        }
-        for line in panel.overlay.iter().flat_map(|bars| outline(bars)) {
-            frame.curve(sheet, line, OVERLAY);
-        }
-    });
 }
 
 /// The upper edge of bars, down to zero where some are left out.
-fn outline(bars: &[&HistogramBin]) -> Vec<Vec<(f64, f64)>> {
+fn outline(bars: &[&HistogramBin]) -> Vec<Vec<Place>> {
     // Edges of neighbours differ by rounding only.
     let are_neighbours =
         |left: &&HistogramBin, right: &&HistogramBin| right.low - left.high < 0.01 * (left.high - left.low);

@@ -1,10 +1,11 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which locked intervals fall.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Frame, Layout, ROW_GAP};
+use super::frame::{Layout, ROW_GAP};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Dot, Picture, Sheet};
+use super::panel::{self, Layer, Panel, Place};
+use super::picture::{Dot, Picture};
 use super::sets::three_digits;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::Point;
@@ -23,7 +24,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         let (period, interval) = (point.period?, point.interval?);
         Some((period, interval / period))
     };
-    let slips: Vec<Slip> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let slips: Vec<(&Point, Place)> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
     let x = Axis::logarithmic("Modulation period T (s)", low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
@@ -41,31 +42,17 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
-    let (page, mut sheet) = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, hues.right()).page("tau-T", look, &entries);
-    for (row, y) in [all, few].into_iter().enumerate() {
-        let frame = page.frame(row, 0, x.clone(), y);
-        let lines = if row == 0 { 1 } else { LINES };
-        draw(&mut sheet, &frame, &slips, &hues, lines);
-        frame.axes(&mut sheet);
-        if let Some(bar) = hues.bar() {
-            bar.draw(&mut sheet, &frame);
-        }
-    }
-    Some(sheet.finish())
-}
-
-/// A slip and its place.
-type Slip<'a> = (&'a Point, (f64, f64));
-
-fn draw(sheet: &mut Sheet, frame: &Frame, slips: &[Slip<'_>], hues: &Hues, lines: u32) {
-    frame.clipped(sheet, |sheet| {
-        (1..=lines).for_each(|n| frame.level(sheet, f64::from(n), GRID));
+    let layout = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, hues.right());
+    let panels = [(all, 1), (few, LINES)].map(|(y, lines)| {
+        let mut layers: Vec<Layer<'_>> = (1..=lines).map(|n| Layer::Level(f64::from(n), GRID)).collect();
         let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
-        frame.points(sheet, others, OTHER);
-        for &(point, place) in slips.iter().filter(|slip| slip.0.is_locked) {
-            frame.points(sheet, [place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 });
-        }
+        layers.push(Layer::Dots(others.collect(), OTHER));
+        layers.extend(slips.iter().filter(|slip| slip.0.is_locked).map(|&(point, place)| {
+            Layer::Dots(vec![place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 })
+        }));
+        Panel::new(x.clone(), y, vec![Layer::Inside(layers)]).with_bar(hues.bar())
     });
+    Some(panel::draw("tau-T", look, &layout, &entries, panels.into()))
 }
 
 #[cfg(test)]

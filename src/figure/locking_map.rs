@@ -5,9 +5,10 @@ use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Layout, ROW_GAP};
 use super::legend::{Mark, entry};
+use super::map::Map;
+use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Fill, Ink, Picture, Stroke};
-use super::regions::middles;
-use super::sets::{Grid, MICROMETRES, Modulations, Periods, is_modulated};
+use super::sets::{MICROMETRES, Modulations, Periods, is_modulated};
 use super::style::{BLACK, Look, WHITE, shade};
 use crate::reduce::SetRow;
 use kuva::render::color::Color;
@@ -30,58 +31,39 @@ const FREE: Ink = "#f2f2f0";
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.
 pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
-    let Modulations { modulated, amplitudes, periods, .. } =
-        Modulations::of(sets.iter().filter(|set| is_modulated(set)))?;
-    let cells = amplitudes.len() * periods.len();
-    if amplitudes.len().min(periods.len()) < MIN_VALUES || 2 * modulated.len() < cells {
-        return None;
-    }
+    let Modulations { modulated, periods, .. } = Modulations::of(sets.iter().filter(|set| is_modulated(set)))?;
     let periods = Periods::of(&periods, None);
-    let amplitudes = Grid::of(amplitudes.into_iter().map(|amplitude| MICROMETRES * amplitude).collect());
+    let place = |set: &SetRow| set.parameters.modulation_period.map(|period| periods.place(period));
+    let map =
+        Map::of(&modulated, [&place, &|set| Some(MICROMETRES * set.parameters.modulation_amplitude)], MIN_VALUES)?;
+    let (x, y) = map.axes(periods.label, "Amplitude Δ (µm)");
     let drive_velocity = modulated[0].parameters.drive_velocity;
     let critical_amplitude = |place: f64| MICROMETRES * drive_velocity * periods.period(place) / TAU;
+    let lines = || {
+        let places: Vec<Place> = x.evenly_placed(200).map(|place| (place, critical_amplitude(place))).collect();
+        [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke))
+    };
     let numbers = Numbers::of(&modulated);
-    let indices = Axis::linear("", 0.0, 1.0);
-    let cell_colours: [&CellColour<'_>; 2] = [
-        &|set| Some(if set.is_locked { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) }),
-        &|set| set.locking_index.map(shade),
+    let colour =
+        |set: &SetRow| Some(if set.is_locked { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) });
+    let words = map.words(|set| whole_periods(set).filter(|_| set.is_locked), |n| (n.to_string(), numbers.share(n)));
+    let indices = ColourBar::of_axis("locking index", &Axis::linear("", 0.0, 1.0));
+    let panels = [
+        (map.coloured(colour), words, numbers.bar()),
+        (map.coloured(|set| set.locking_index.map(shade)), Vec::new(), indices),
     ];
-    let bars = [numbers.bar(), ColourBar::of_axis("locking index", &indices)];
+    let panels = panels.map(|(cells, words, bar)| {
+        let inside = Layer::Inside(std::iter::once(cells).chain(lines()).collect());
+        let layers = std::iter::once(inside).chain(words).collect();
+        Panel::new(x.clone(), y.clone(), layers).with_bar(Some(bar))
+    });
     let legend = [
         entry(Mark::Line(LINE), "η = 1; locking is expected above"),
         entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "not locked"),
     ];
-
-    let (page, mut sheet) = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, COLOUR_BAR).page("locking-map", look, &legend);
-    for (panel, (cell_colour, bar)) in cell_colours.into_iter().zip(bars).enumerate() {
-        let frame = page.frame(panel, 0, periods.grid.axis(periods.label), amplitudes.axis("Amplitude Δ (µm)"));
-        let cell = |set: &SetRow| {
-            let period = periods.grid.index_of(periods.place(set.parameters.modulation_period?));
-            Some((period, amplitudes.index_of(MICROMETRES * set.parameters.modulation_amplitude)))
-        };
-        let ends = |(column, row)| (periods.grid.cell(column), amplitudes.cell(row));
-        frame.clipped(&mut sheet, |sheet| {
-            frame.cells(sheet, modulated.iter().filter_map(|set| Some((ends(cell(set)?), cell_colour(set)?))));
-            for stroke in [CASING, LINE] {
-                let places = frame.x.evenly_placed(200);
-                frame.curve(sheet, places.map(|place| (place, critical_amplitude(place))), stroke);
-            }
-        });
-        if panel == 0 {
-            let locked = modulated.iter().filter(|set| set.is_locked);
-            let locked = locked.filter_map(|set| Some((cell(set)?, whole_periods(set)?))).collect();
-            for (cell, n) in middles(&locked) {
-                frame.name_cell(&mut sheet, ends(cell), &n.to_string(), numbers.share(n));
-            }
-        }
-        frame.axes(&mut sheet);
-        bar.draw(&mut sheet, &frame);
-    }
-    Some(sheet.finish())
+    let layout = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, COLOUR_BAR);
+    Some(panel::draw("locking-map", look, &layout, &legend, panels.into()))
 }
-
-/// The colour of a set in a panel, if it has one.
-type CellColour<'a> = dyn Fn(&SetRow) -> Option<Color> + 'a;
 
 /// n of τ = nT.
 fn whole_periods(set: &SetRow) -> Option<usize> {

@@ -4,7 +4,8 @@
 //! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
 //! own.rs  -> any column of the sets against any other
 //!            sets.rs                 in what sets differ, and the grid on which they lie
-//!            frame.rs, axis.rs       panels on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
+//!            panel.rs                panels as data: axes, layers between them; map.rs makes layers of sets on a grid
+//!            frame.rs, axis.rs       frames on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
 //!            style.rs                sizes, strokes and colours of all figures
 //!            picture.rs, pdf.rs      lines, discs, text -> SVG, PNG, PDF
 //! ```
@@ -23,12 +24,13 @@ mod hues;
 mod intervals;
 mod legend;
 mod locking_map;
+mod map;
 mod own;
+mod panel;
 mod pdf;
 mod picture;
 mod refined;
 mod regimes;
-mod regions;
 mod sets;
 mod simulation;
 mod staircase;
@@ -37,7 +39,7 @@ mod values;
 mod work_precision;
 
 pub use draw::{draw_all, draw_own, write_own};
-pub use own::{Limits, OwnFigure, columns};
+pub use own::{OwnFigure, columns};
 pub use picture::{Format, Picture};
 pub use simulation::simulation;
 pub use style::{Look, Size, Style};

@@ -2,16 +2,18 @@
 
 use super::BadOption;
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::frame::{Frame, LEFT, Layout, RIGHT};
+use super::frame::{LEFT, Layout, RIGHT};
 use super::hues::Hues;
 use super::legend::{Mark, entry};
-use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::{Dot, Picture, Stroke};
 use super::sets::ascending;
 use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
 pub use super::values::columns;
 use super::values::{FREQUENCY_COLUMN, Values};
 use crate::model::Symbol;
 use crate::reduce::SetRow;
+use clap::Args;
 use std::cmp::Ordering;
 
 const WIDTH: f64 = 560.0;
@@ -32,56 +34,82 @@ const SMALL_RADIUS: f64 = 2.5;
 /// The ends of an axis.
 pub type Limits = (Option<f64>, Option<f64>);
 
-/// What a figure shows: columns by name.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Args)]
+#[command(next_help_heading = "A figure of your own")]
 pub struct OwnFigure {
-    pub x: String,
-    pub y: String,
+    /// Column on the x axis of a figure of your own
+    #[arg(long, value_name = "COLUMN", requires = "y")]
+    pub x: Option<String>,
+    /// Column on the y axis, with error bars if it has an interval
+    #[arg(long, value_name = "COLUMN", requires = "x")]
+    pub y: Option<String>,
+    /// Column that colours show: up to six values in the legend, more on a scale
+    #[arg(long, value_name = "COLUMN", requires = "x")]
     pub colour: Option<String>,
-    /// Column of which each value has a panel.
+    /// Column whose values get a panel each, up to nine
+    #[arg(long, value_name = "COLUMN", requires = "x")]
     pub panels: Option<String>,
-    pub is_log_x: bool,
-    pub is_log_y: bool,
-    /// Ends of the x axis, those of the data if they are not given.
-    pub x_limits: Limits,
-    pub y_limits: Limits,
-    /// Label of the x axis in the place of that of its column.
-    pub x_label: Option<String>,
-    pub y_label: Option<String>,
+    /// Logarithmic axes
+    #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy"])]
+    pub log: Option<String>,
+    /// Ends of the x axis; either may be left out
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
+    pub xlim: Option<Limits>,
+    /// Ends of the y axis
+    #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
+    pub ylim: Option<Limits>,
+    /// Label of the x axis [default: meaning, name and unit of the column]
+    #[arg(long, value_name = "TEXT", requires = "x")]
+    pub xlabel: Option<String>,
+    /// Label of the y axis
+    #[arg(long, value_name = "TEXT", requires = "x")]
+    pub ylabel: Option<String>,
+}
+
+fn limits(text: &str) -> Result<Limits, &'static str> {
+    const WANTED: &str = "must be LOW:HIGH with finite numbers, such as 1e-6:1e-3, 0: or :5";
+    let end = |text: &str| match text.trim() {
+        "" => Ok(None),
+        number => number.parse().ok().filter(|end: &f64| end.is_finite()).map(Some).ok_or(WANTED),
+    };
+    match text.split_once(':') {
+        Some((low, high)) if text.trim() != ":" => Ok((end(low)?, end(high)?)),
+        _ => Err(WANTED),
+    }
 }
 
 /// An axis as it is asked for.
 struct Asked<'a> {
-    option: &'static str,
-    values: &'a Values,
+    values: Values,
     is_log: bool,
     limits: Limits,
-    label: &'a Option<String>,
+    label: Option<&'a str>,
 }
 
 /// Draws a dot for each set; sets that differ in a parameter on the x axis alone are joined by a line.
 pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, BadOption> {
-    let [x, y] = [("x", &figure.x), ("y", &figure.y)].map(|(option, name)| Values::of(rows, option, name));
-    let (x, y) = (x?, y?);
+    let asked = |option, name: &Option<String>, limits: Option<Limits>, label| -> Result<Asked<'_>, BadOption> {
+        let values = Values::of(rows, option, name.as_deref().unwrap_or_default())?;
+        let is_log = figure.log.as_ref().is_some_and(|axes| axes.contains(option));
+        Ok(Asked { values, is_log, limits: limits.unwrap_or_default(), label })
+    };
+    let x = asked("x", &figure.x, figure.xlim, figure.xlabel.as_deref())?;
+    let y = asked("y", &figure.y, figure.ylim, figure.ylabel.as_deref())?;
     let colour = figure.colour.as_ref().map(|name| Values::of(rows, "colour", name)).transpose()?;
     let panels = figure.panels.as_ref().map(|name| Values::of(rows, "panels", name)).transpose()?;
-    let asked = |option, values, is_log, limits, label| Asked { option, values, is_log, limits, label };
-    let asked_x = asked("x", &x, figure.is_log_x, figure.x_limits, &figure.x_label);
-    let asked_y = asked("y", &y, figure.is_log_y, figure.y_limits, &figure.y_label);
-    let sets: Vec<usize> = (0..rows.len()).filter(|&set| asked_x.has(set) && asked_y.has(set)).collect();
+    let sets: Vec<usize> = (0..rows.len()).filter(|&set| x.has(set) && y.has(set)).collect();
+    let [x_name, y_name] = [&x, &y].map(|asked| &asked.values.column.name);
     if sets.is_empty() {
-        let kind = if figure.is_log_x || figure.is_log_y { "no set has a value > 0" } else { "no set has a value" };
-        return Err(asked_y.refuse(&format!("{kind} of both {} and {}; nothing can be drawn", figure.x, figure.y)));
+        let kind = if x.is_log || y.is_log { "no set has a value > 0" } else { "no set has a value" };
+        return Err(y.values.refuse(&format!("{kind} of both {x_name} and {y_name}; nothing can be drawn")));
     }
-    let (x_axis, y_axis) = (asked_x.axis(&sets)?, asked_y.axis(&sets)?);
-    let is_inside = |set: &usize| {
-        x.numbers[*set].is_some_and(|x| x_axis.contains(x)) && y.numbers[*set].is_some_and(|y| y_axis.contains(y))
-    };
-    let inside = sets.iter().filter(|set| is_inside(set)).count();
+    let (x_axis, y_axis) = (x.axis(&sets)?, y.axis(&sets)?);
+    let place = |set: usize| x.values.numbers[set].zip(y.values.numbers[set]);
+    let places = sets.iter().filter_map(|&set| place(set));
+    let inside = places.filter(|&(x, y)| x_axis.contains(x) && y_axis.contains(y)).count();
     if inside == 0 {
-        return Err(
-            asked_x.refuse(&format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len()))
-        );
+        let problem = format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len());
+        return Err(x.values.refuse(&problem));
     }
 
     let hues = colour.as_ref().map(hues).transpose()?;
@@ -97,42 +125,51 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
         0 => String::new(),
         _ => format!("not shown: {left_out} of {} sets, without a value or outside the axes", rows.len()),
     };
-    let name = format!("{}-{}", figure.y, figure.x);
-    let (page, mut sheet) = layout.page(&name, &look.with_note(&note), &entries);
     let ink = |set: usize| {
         let Some((colour, hues)) = colour.as_ref().zip(hues.as_ref()) else { return INKS[0] };
         colour.numbers[set].map_or(GREY, |value| hues.ink(value))
     };
-    let lines = lines(rows, &figure.x, &sets, &x);
-    for (index, (title, members)) in groups.iter().enumerate() {
-        let (row, column) = (index / layout.columns, index % layout.columns);
-        let mut frame = page.frame(row, column, x_axis.clone(), y_axis.clone());
-        if column > 0 {
-            frame.y.label.clear();
+    let lines = lines(rows, x_name, &sets, &x.values);
+    let layers = |members: &[usize]| {
+        let mut layers = Vec::new();
+        for line in &lines {
+            let line: Vec<usize> = line.iter().copied().filter(|set| members.binary_search(set).is_ok()).collect();
+            for pair in line.windows(2).filter(|pair| ink(pair[0]) == ink(pair[1])) {
+                let stroke = Stroke::solid(ink(pair[0]), LINE_WIDTH);
+                layers.push(Layer::Curve(pair.iter().filter_map(|&set| place(set)).collect(), stroke));
+            }
         }
-        frame.is_lowest |= index + layout.columns >= groups.len();
-        let drawn = Drawn { x: &x, y: &y, ink: &ink, radius };
-        drawn.draw(&mut sheet, &frame, members, &lines);
-        frame.axes(&mut sheet);
-        if groups.len() > 1 {
-            frame.heading(&mut sheet, title, "");
+        // Confidence intervals, along both axes.
+        for &set in members {
+            let Some((at_x, at_y)) = place(set) else { continue };
+            let stroke = Stroke::solid(ink(set), BAR_WIDTH);
+            layers.extend(y.values.intervals[set].map(|ends| Layer::Bars(vec![(at_x, ends)], stroke)));
+            layers.extend(x.values.intervals[set].map(|(low, high)| {
+                let left = if x_axis.place(low).is_finite() { low } else { x_axis.low };
+                Layer::Curve(vec![(left, at_y), (high, at_y)], stroke)
+            }));
         }
-        if let Some(bar) = hues.as_ref().and_then(Hues::bar).filter(|_| index + 1 == layout.columns.min(groups.len())) {
-            bar.draw(&mut sheet, &frame);
+        let dot = |set| Dot { opacity: 0.9, ..Dot::solid(ink(set), radius) };
+        let dots = members.iter().map(|&set| Layer::Dots(place(set).into_iter().collect(), dot(set)));
+        std::iter::once(Layer::Inside(layers)).chain(dots).collect()
+    };
+    let (count, last_of_row) = (groups.len(), layout.columns.min(groups.len()) - 1);
+    let panel = |(index, (title, members)): (usize, (String, Vec<usize>))| {
+        let mut panel = Panel::new(x_axis.clone(), y_axis.clone(), layers(&members));
+        if index % layout.columns > 0 {
+            panel.y.label.clear();
         }
-    }
-    Ok(sheet.finish())
+        panel.heading = (count > 1).then(|| (title, String::new()));
+        panel.with_bar(hues.as_ref().and_then(Hues::bar).filter(|_| index == last_of_row))
+    };
+    let panels = groups.into_iter().enumerate().map(panel).collect();
+    Ok(panel::draw(&format!("{y_name}-{x_name}"), &look.with_note(&note), &layout, &entries, panels))
 }
 
 impl Asked<'_> {
-    fn refuse(&self, problem: &str) -> BadOption {
-        BadOption::new(self.option, &self.values.column.name, problem)
-    }
-
     fn refuse_limits(&self, problem: &str) -> BadOption {
-        let end = |end: Option<f64>| end.map_or_else(String::new, |end| end.to_string());
-        let value = format!("{}:{}", end(self.limits.0), end(self.limits.1));
-        BadOption::new(&format!("{}lim", self.option), &value, problem)
+        let [low, high] = [self.limits.0, self.limits.1].map(|end| end.map_or_else(String::new, |end| end.to_string()));
+        BadOption::new(&format!("{}lim", self.values.option), &format!("{low}:{high}"), problem)
     }
 
     /// Whether a set has a place on the axis.
@@ -143,23 +180,21 @@ impl Asked<'_> {
     /// The axis, from one limit or end of the data to the other.
     fn axis(&self, sets: &[usize]) -> Result<Axis, BadOption> {
         const SLACK: f64 = 1e-9;
-        let label = self.label.clone().unwrap_or_else(|| self.values.label());
+        let label = self.label.map_or_else(|| self.values.label(), str::to_owned);
+        let short_label = self.label.is_none().then(|| self.values.short_label());
         if self.values.is_worded() {
-            let name = &self.values.column.name;
+            let (name, count) = (&self.values.column.name, self.values.words.len());
             if self.is_log {
                 let problem = format!("{name} holds words; a logarithmic axis takes numbers");
-                return Err(BadOption::new("log", self.option, &problem));
+                return Err(BadOption::new("log", self.values.option, &problem));
             }
             if self.limits != (None, None) {
                 return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
             }
-            if self.values.words.len() > MAX_WORDS {
-                let count = self.values.words.len();
-                return Err(
-                    self.refuse(&format!("has {count} words, and {MAX_WORDS} fit an axis; take another column"))
-                );
+            if count > MAX_WORDS {
+                let problem = format!("has {count} words, and {MAX_WORDS} fit an axis; take another column");
+                return Err(self.values.refuse(&problem));
             }
-            let short_label = self.label.is_none().then(|| self.values.short_label());
             let words: Vec<&str> = self.values.words.iter().map(String::as_str).collect();
             return Ok(Axis::categories(&label, &words).with_short_label(short_label));
         }
@@ -167,13 +202,12 @@ impl Asked<'_> {
             return Err(self.refuse_limits("must be > 0 on a logarithmic axis"));
         }
         let ends = |&set: &usize| {
-            let value = self.values.numbers[set];
             let bar = self.values.intervals[set].map(|(low, high)| [low, high]);
-            value.into_iter().chain(bar.into_iter().flatten())
+            self.values.numbers[set].into_iter().chain(bar.into_iter().flatten())
         };
-        let values = || sets.iter().flat_map(ends);
-        let natural = if self.is_log { logarithmic_bounds(values()) } else { bounds(values()).map(widened) };
-        let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value"))?;
+        let values = sets.iter().flat_map(ends);
+        let natural = if self.is_log { logarithmic_bounds(values) } else { bounds(values).map(widened) };
+        let (low, high) = natural.ok_or_else(|| self.values.refuse("has no finite value"))?;
         // Values at a limit are shown, however they are rounded.
         let low = self.limits.0.map_or(low, |end| end - SLACK * end.abs());
         let high = self.limits.1.map_or(high, |end| end + SLACK * end.abs());
@@ -183,7 +217,7 @@ impl Asked<'_> {
             );
         }
         let axis = if self.is_log { Axis::logarithmic } else { Axis::linear };
-        let short_label = self.label.is_none().then(|| axis(&self.values.short_label(), low, high).label);
+        let short_label = short_label.map(|label| axis(&label, low, high).label);
         Ok(axis(&label, low, high).with_short_label(short_label).with_enough_numbers())
     }
 }
@@ -196,15 +230,13 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
 }
 
 fn hues(values: &Values) -> Result<Hues, BadOption> {
-    if values.is_worded() && values.words.len() > INKS.len() {
-        let problem =
-            format!("has {} words, and there are {} colours; take another column", values.words.len(), INKS.len());
-        return Err(BadOption::new("colour", &values.column.name, &problem));
+    let (count, inks) = (values.words.len(), INKS.len());
+    if count > inks {
+        return Err(values.refuse(&format!("has {count} words, and there are {inks} colours; take another column")));
     }
-    let Some(_) = values.numbers.iter().flatten().next() else {
-        return Err(BadOption::new("colour", &values.column.name, "no set has a value of it"));
-    };
-    Ok(Hues::of(&values.short_label(), values.numbers.iter().copied().flatten(), |value| values.setting(value)))
+    let mut known = values.numbers.iter().copied().flatten().peekable();
+    known.peek().ok_or_else(|| values.refuse("no set has a value of it"))?;
+    Ok(Hues::of(&values.short_label(), known, |value| values.setting(value)))
 }
 
 /// The sets of each panel and its title.
@@ -221,7 +253,7 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
         1..=MAX_PANELS => return Ok(groups),
         count => format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour"),
     };
-    Err(BadOption::new("panels", &values.column.name, &problem))
+    Err(values.refuse(&problem))
 }
 
 fn layout(panels: usize, right: f64) -> Layout<'static> {
@@ -255,46 +287,6 @@ fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<u
     lines
 }
 
-struct Drawn<'a> {
-    x: &'a Values,
-    y: &'a Values,
-    ink: &'a dyn Fn(usize) -> Ink,
-    radius: f64,
-}
-
-impl Drawn<'_> {
-    fn place(&self, set: usize) -> Option<(f64, f64)> {
-        self.x.numbers[set].zip(self.y.numbers[set])
-    }
-
-    fn draw(&self, sheet: &mut Sheet, frame: &Frame, sets: &[usize], lines: &[Vec<usize>]) {
-        frame.clipped(sheet, |sheet| {
-            for line in lines {
-                let members: Vec<usize> = line.iter().copied().filter(|set| sets.binary_search(set).is_ok()).collect();
-                for pair in members.windows(2).filter(|pair| (self.ink)(pair[0]) == (self.ink)(pair[1])) {
-                    let stroke = Stroke::solid((self.ink)(pair[0]), LINE_WIDTH);
-                    frame.curve(sheet, pair.iter().filter_map(|&set| self.place(set)), stroke);
-                }
-            }
-            // Confidence intervals, along both axes.
-            for &set in sets {
-                let Some((x, y)) = self.place(set) else { continue };
-                let stroke = Stroke::solid((self.ink)(set), BAR_WIDTH);
-                if let Some(ends) = self.y.intervals[set] {
-                    frame.error_bar(sheet, x, ends, stroke);
-                }
-                if let Some((low, high)) = self.x.intervals[set] {
-                    let left = if frame.x.place(low).is_finite() { low } else { frame.x.low };
-                    frame.curve(sheet, [(left, y), (high, y)], stroke);
-                }
-            }
-        });
-        for &set in sets {
-            frame.points(sheet, self.place(set), Dot { opacity: 0.9, ..Dot::solid((self.ink)(set), self.radius) });
-        }
-    }
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -322,8 +314,12 @@ pub(super) mod tests {
         (0..count).map(row).collect()
     }
 
+    fn named(name: &str) -> Option<String> {
+        Some(name.to_owned())
+    }
+
     fn figure() -> OwnFigure {
-        OwnFigure { x: "V0".to_owned(), y: "tau_mean".to_owned(), ..OwnFigure::default() }
+        OwnFigure { x: named("V0"), y: named("tau_mean"), ..OwnFigure::default() }
     }
 
     fn svg(figure: &OwnFigure) -> String {
@@ -335,49 +331,55 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn either_end_of_an_axis_may_be_left_out() {
+        let ends = |text: &str| limits(text).map(|limits| (limits.0, limits.1));
+        assert_eq!(ends("1e-6:1e-3"), Ok((Some(1e-6), Some(1e-3))));
+        assert_eq!((ends("-1:"), ends(":5")), (Ok((Some(-1.0), None)), Ok((None, Some(5.0)))));
+        for wrong in ["", ":", "1", "a:b", "1:nan", "1:2:3", "inf:"] {
+            assert!(ends(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
     fn each_option_changes_what_it_says() {
         let plain = svg(&figure());
         assert!(plain.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && plain.contains(">Mean interval (s)<"));
         let bars = |svg: &str| svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#)).count();
-        let no_interval = OwnFigure { y: "eta".to_owned(), ..figure() };
+        let no_interval = OwnFigure { y: named("eta"), ..figure() };
         assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
-        let logarithmic = svg(&OwnFigure { is_log_x: true, is_log_y: true, ..figure() });
+        let logarithmic = svg(&OwnFigure { log: named("xy"), ..figure() });
         assert!(logarithmic.contains(">10⁻⁵<") && !plain.contains(">10⁻⁵<"));
-        let colour = svg(&OwnFigure { colour: Some("Delta".to_owned()), ..figure() });
+        let colour = svg(&OwnFigure { colour: named("Delta"), ..figure() });
         assert!(colour.contains(">Δ = 0 m<") && colour.contains(">Δ = 1e-6 m<") && colour.contains(INKS[1]));
-        let scale = svg(&OwnFigure { colour: Some("V0".to_owned()), ..figure() });
+        let scale = svg(&OwnFigure { colour: named("V0"), ..figure() });
         assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = "));
-        let panels = svg(&OwnFigure { panels: Some("Delta".to_owned()), ..figure() });
+        let panels = svg(&OwnFigure { panels: named("Delta"), ..figure() });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0 m<"));
-        let limits = svg(&OwnFigure { x_limits: (Some(1e-6), Some(1e-5)), ..figure() });
+        let limits = svg(&OwnFigure { xlim: Some((Some(1e-6), Some(1e-5))), ..figure() });
         assert!(limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"), "{limits}");
-        let label = svg(&OwnFigure { y_label: Some("τ".to_owned()), ..figure() });
+        let label = svg(&OwnFigure { ylabel: named("τ"), ..figure() });
         assert!(label.contains(">τ<") && !label.contains("Mean interval"));
-        let without = svg(&OwnFigure { colour: Some("T".to_owned()), ..figure() });
+        let without = svg(&OwnFigure { colour: named("T"), ..figure() });
         assert!(without.contains(">T = 0.02 s<") && without.contains(">no T<"));
-        let words = svg(&OwnFigure { x: "break_on".to_owned(), ..figure() });
+        let words = svg(&OwnFigure { x: named("break_on"), ..figure() });
         assert!(words.contains(">magnitude<"));
     }
 
     #[test]
     fn mistakes_are_refused_with_what_to_do() {
-        let named = |name: &str| Some(name.to_owned());
         for (figure, expected) in [
-            (OwnFigure { x: "v0".to_owned(), ..figure() }, "--x v0: no such column; did you mean V0?"),
+            (OwnFigure { x: named("v0"), ..figure() }, "--x v0: no such column; did you mean V0?"),
             (OwnFigure { colour: named("colour"), ..figure() }, "--colour colour: no such column; there are set_id"),
-            (OwnFigure { x: "break_on".to_owned(), is_log_x: true, ..figure() }, "--log x: break_on holds words"),
+            (OwnFigure { x: named("break_on"), log: named("x"), ..figure() }, "--log x: break_on holds words"),
             (
-                OwnFigure { x: "break_on".to_owned(), x_limits: (Some(1.0), None), ..figure() },
+                OwnFigure { x: named("break_on"), xlim: Some((Some(1.0), None)), ..figure() },
                 "--xlim 1:: break_on holds words",
             ),
-            (OwnFigure { y: "drop_mean".to_owned(), ..figure() }, "no set has a value of both V0 and drop_mean"),
-            (
-                OwnFigure { y: "eta".to_owned(), x: "T_to".to_owned(), is_log_y: true, ..figure() },
-                "no set has a value > 0",
-            ),
-            (OwnFigure { x_limits: (Some(2.0), Some(1.0)), ..figure() }, "--xlim 2:1: the lower end must be less"),
-            (OwnFigure { x_limits: (Some(-1.0), None), is_log_x: true, ..figure() }, "--xlim -1:: must be > 0"),
-            (OwnFigure { x_limits: (Some(1.0), Some(2.0)), ..figure() }, "none of 8 sets lies within"),
+            (OwnFigure { y: named("drop_mean"), ..figure() }, "no set has a value of both V0 and drop_mean"),
+            (OwnFigure { y: named("eta"), x: named("T_to"), log: named("y"), ..figure() }, "no set has a value > 0"),
+            (OwnFigure { xlim: Some((Some(2.0), Some(1.0))), ..figure() }, "--xlim 2:1: the lower end must be less"),
+            (OwnFigure { xlim: Some((Some(-1.0), None)), log: named("x"), ..figure() }, "--xlim -1:: must be > 0"),
+            (OwnFigure { xlim: Some((Some(1.0), Some(2.0))), ..figure() }, "none of 8 sets lies within"),
             (OwnFigure { panels: named("regime"), ..figure() }, "--panels regime: no set has a value of it"),
         ] {
             let found = problem(&figure);

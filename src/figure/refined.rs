@@ -5,6 +5,7 @@ use super::axis::{Axis, bounds};
 use super::dependence::{label, number};
 use super::frame::{Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
+use super::panel::{self, Cell, Ends, Layer, Panel};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
 use super::sets::MICROMETRES;
 use super::style::{BAR_WIDTH, INKS, LIGHT_GREY, Look, RADIUS, WHITE, dot};
@@ -58,48 +59,42 @@ fn scale(label: &str, (low, high): Ends, margins: Ends, narrow: impl FnOnce() ->
     if is_wide { Axis::logarithmic(label, margins.0 * low, margins.1 * high) } else { narrow() }
 }
 
-/// Ends of a cell along an axis.
-type Ends = (f64, f64);
 type Quantity = Box<dyn Fn(&SetRow) -> Option<f64>>;
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let first = cells.first()?;
     let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(&first.x), axis_of(first.y.as_deref()?));
     let mut boxes: BTreeMap<[u64; 2], u32> = BTreeMap::new();
-    let mut placed: Vec<(Ends, Ends, &CellRow)> = Vec::new();
+    let mut placed: Vec<(Cell, &CellRow)> = Vec::new();
     for cell in cells {
         let [x, y] = [(cell.x_low, cell.x_high, x_factor), (cell.y_low?, cell.y_high?, y_factor)]
             .map(|(low, high, factor)| (factor * low, factor * high));
         *boxes.entry([x.0.to_bits(), y.0.to_bits()]).or_default() += 1;
-        placed.push((x, y, cell));
+        placed.push(((x, y), cell));
     }
     // Of several maps on top of each other, none would be seen.
     if boxes.values().any(|&count| count > 1) {
         return None;
     }
-    let x_ends = bounds(placed.iter().flat_map(|(x, ..)| [x.0, x.1]))?;
-    let y_ends = bounds(placed.iter().flat_map(|(_, y, _)| [y.0, y.1]))?;
+    let x_ends = bounds(placed.iter().flat_map(|((x, _), _)| [x.0, x.1]))?;
+    let y_ends = bounds(placed.iter().flat_map(|((_, y), _)| [y.0, y.1]))?;
     let [yes, no] = words(&first.by);
     let patch = |ink| Mark::Patch(Fill { ink, opacity: 1.0 });
     let legend = [entry(patch(YES), yes), entry(patch(NO), no), entry(patch(EDGE), "the edge lies here")];
-    let (page, mut sheet) = MAP.page("refined-map", look, &legend);
     let exact = |label: &str, ends: Ends| scale(label, ends, (1.0, 1.0), || Axis::linear(label, ends.0, ends.1));
-    let frame = page.frame(0, 0, exact(&x_label, x_ends), exact(&y_label, y_ends));
-    frame.clipped(&mut sheet, |sheet| {
-        let colour = |cell: &CellRow| match cell.share {
-            _ if cell.differs => EDGE,
-            Some(share) if share > 0.5 => YES,
-            Some(_) => NO,
-            None => WHITE,
-        };
-        sheet.rectangles(placed.iter().map(|&(x, y, cell)| (frame.box_of(x, y), Color::from(colour(cell)))));
-        // The finest cells are seen by their colour.
-        for &(x, y, _) in placed.iter().filter(|(.., cell)| !cell.differs) {
-            frame.curve(sheet, [(x.0, y.1), (x.0, y.0), (x.1, y.0)], OUTLINE);
-        }
-    });
-    frame.axes(&mut sheet);
-    Some(sheet.finish())
+    let colour = |cell: &CellRow| match cell.share {
+        _ if cell.differs => EDGE,
+        Some(share) if share > 0.5 => YES,
+        Some(_) => NO,
+        None => WHITE,
+    };
+    let cells = placed.iter().map(|&(place, cell)| (place, Color::from(colour(cell)))).collect();
+    // The finest cells are seen by their colour.
+    let outlines = placed.iter().filter(|(_, cell)| !cell.differs);
+    let outlines = outlines.map(|((x, y), _)| Layer::Curve(vec![(x.0, y.1), (x.0, y.0), (x.1, y.0)], OUTLINE));
+    let layers = std::iter::once(Layer::Cells(cells, 0.0)).chain(outlines).collect();
+    let panel = Panel::new(exact(&x_label, x_ends), exact(&y_label, y_ends), vec![Layer::Inside(layers)]);
+    Some(panel::draw("refined-map", look, &MAP, &legend, vec![panel]))
 }
 
 /// The edges along one axis against the one other quantity in which sets differ.
@@ -131,18 +126,16 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
     let [yes, _] = words(&cells[0].by);
     let edge = if yes == "locked" { "locking" } else { &yes };
     let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
-    let (page, mut sheet) = LINE.page("refined-edge", look, &legend);
     let margin = 0.05 * (x_high - x_low);
     let x = scale(&x_label, (x_low, x_high), MARGINS, || Axis::linear(&x_label, x_low - margin, x_high + margin));
     let y = scale(&y_label, (y_low, y_high), MARGINS, || Axis::rounded(&y_label, y_low, y_high));
-    let frame = page.frame(0, 0, x, y);
-    for &(x, low, high) in &points {
-        frame.error_bar(&mut sheet, x, (low, high), Stroke::solid(INKS[0], BAR_WIDTH));
-    }
-    let middles = points.iter().map(|&(x, low, high)| (x, frame.y.middle(low, high)));
-    frame.points(&mut sheet, middles, Dot::solid(INKS[0], 0.7 * RADIUS));
-    frame.axes(&mut sheet);
-    Some(sheet.finish())
+    let middles = points.iter().map(|&(x, low, high)| (x, y.middle(low, high))).collect();
+    let bands = points.iter().map(|&(x, low, high)| (x, (low, high))).collect();
+    let layers = vec![
+        Layer::Bars(bands, Stroke::solid(INKS[0], BAR_WIDTH)),
+        Layer::Dots(middles, Dot::solid(INKS[0], 0.7 * RADIUS)),
+    ];
+    Some(panel::draw("refined-edge", look, &LINE, &legend, vec![Panel::new(x, y, layers)]))
 }
 
 #[cfg(test)]

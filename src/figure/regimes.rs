@@ -2,13 +2,14 @@
 
 use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::dependence::{Getter, label, lines, number};
-use super::frame::{Cell, Frame, Layout, RIGHT, ROW_GAP};
+use super::dependence::{Getter, Lines, label, number};
+use super::frame::{Layout, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
-use super::picture::{Dot, Picture, Sheet, Stroke};
-use super::regions::middles;
-use super::sets::{Grid, distinct, modulation, swept};
-use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, WHITE, curve, dot, shade};
+use super::map::Map;
+use super::panel::{self, Layer, Panel};
+use super::picture::{Picture, Stroke};
+use super::sets::{distinct, swept};
+use super::style::{BLACK, Look, RADIUS, REFERENCE, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Statistic};
@@ -21,10 +22,12 @@ const MIN_VALUES: usize = 4;
 const LOGARITHMIC: f64 = 20.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 
-const SHARE: (&str, Getter) = ("Share of time within slips", |set| Statistic::of(set.slip_share, None));
-const FRICTION: (&str, Getter) =
-    ("Mean friction (N)", |set| Statistic::of(set.mean_friction, set.mean_friction_interval));
-const INTERVAL: (&str, Getter) = ("Mean interval τ (s)", |set| Statistic::of(set.tau_mean, set.tau_interval));
+const SHARE: &str = "Share of time within slips";
+const QUANTITIES: [(&str, Getter); 3] = [
+    (SHARE, |set| Statistic::of(set.slip_share, None)),
+    ("Mean friction (N)", |set| Statistic::of(set.mean_friction, set.mean_friction_interval)),
+    ("Mean interval τ (s)", |set| Statistic::of(set.tau_mean, set.tau_interval)),
+];
 
 /// Draws sets in which, besides the modulation, only V0 or the reattachment delay differs, or any one parameter if not
 /// all sets are stick-slip; `None` for others.
@@ -35,36 +38,25 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
     if values.len() < MIN_VALUES || (is_plain && !matches!(symbol, Symbol::V0 | Symbol::TauR)) {
         return None;
     }
-    let lines = lines(sets.iter())?;
-    let x = Grid::of(values).wider_axis(&label(symbol));
-    let names = lines.iter().map(|line| modulation(&line[0].parameters));
-    let mut entries: Vec<_> = names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect();
-    if sets.iter().any(|set| set.regime == Some(Regime::Sliding)) {
+    let lines = Lines::of(sets, symbol)?;
+    let is_sliding = |set: &SetRow| set.regime == Some(Regime::Sliding);
+    let mut entries = lines.legend();
+    if sets.iter().any(is_sliding) {
         entries.push(entry(Mark::Ring(BLACK, RADIUS), "sliding"));
     }
     let [mixed, sliding] = Regime::MIN_SHARES;
     entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));
-    let (page, mut sheet) = LINES.page("regimes", look, &entries);
-    for (row, (y_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
-        let y = match row {
-            0 => Axis::linear(y_label, -0.03, 1.03),
-            _ => Axis::of_data(y_label, sets.iter().filter_map(statistic).flat_map(Statistic::ends), LOGARITHMIC, 0.0)?,
+    let panel = |(label, statistic): (&str, Getter)| {
+        let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
+        let (y, levels) = match label {
+            SHARE => (Axis::linear(label, -0.03, 1.03), &Regime::MIN_SHARES[..]),
+            _ => (Axis::of_data(label, ends, LOGARITHMIC, 0.0)?, &[][..]),
         };
-        let frame = page.frame(row, 0, x.clone(), y);
-        if row == 0 {
-            for share in Regime::MIN_SHARES {
-                frame.level(&mut sheet, share, REFERENCE);
-            }
-        }
-        for (line, ink) in lines.iter().zip(INKS) {
-            let point = |set: &&SetRow| Some((number(&set.parameters, symbol)?, statistic(set)?));
-            frame.statistics(&mut sheet, &line.iter().filter_map(point).collect::<Vec<_>>(), curve(ink), RADIUS);
-            let sliding = line.iter().filter(|set| set.regime == Some(Regime::Sliding)).filter_map(point);
-            frame.points(&mut sheet, sliding.map(|(x, y)| (x, y.value)), Dot::solid(WHITE, RADIUS - 1.6));
-        }
-        frame.axes(&mut sheet);
-    }
-    Some(sheet.finish())
+        let levels = levels.iter().map(|&share| Layer::Level(share, REFERENCE));
+        Some(Panel::new(lines.axis(), y, levels.chain(lines.layers(statistic, is_sliding)).collect()))
+    };
+    let panels: Option<Vec<Panel<'_>>> = QUANTITIES.into_iter().map(panel).collect();
+    Some(panel::draw("regimes", look, &LINES, &entries, panels?))
 }
 
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
@@ -77,75 +69,40 @@ pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         [first, second] => [first, second],
         _ => return None,
     };
-    let grids = [horizontal, vertical].map(|symbol| distinct(sets.iter(), |parameters| number(parameters, symbol)));
-    let is_grid = grids.iter().all(|values| values.len() >= MIN_VALUES)
-        && 2 * sets.len() >= grids[0].len() * grids[1].len()
-        && lines(sets.iter()).is_some_and(|lines| lines.len() == 1);
-    if !is_grid {
+    let [x, y] = [horizontal, vertical].map(|symbol| move |set: &SetRow| number(&set.parameters, symbol));
+    let map = Map::of(&sets.iter().collect::<Vec<_>>(), [&x, &y], MIN_VALUES)?;
+    if Lines::of(sets, horizontal)?.lines.len() > 1 {
         return None;
     }
-    let [columns, rows] = grids.map(Grid::of);
-    let cell = |set: &SetRow| {
-        let place = |symbol, grid: &Grid| Some(grid.index_of(number(&set.parameters, symbol)?));
-        Some((place(horizontal, &columns)?, place(vertical, &rows)?))
-    };
-    let ends = |(column, row)| (columns.cell(column), rows.cell(row));
-    let cells: Vec<(&SetRow, Cell)> = sets.iter().filter_map(|set| Some((set, ends(cell(set)?)))).collect();
-    let (page, mut sheet) = MAP.page(
-        "regime-map",
-        look,
-        &[entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")],
-    );
-    for (row, (bar_label, statistic)) in [SHARE, FRICTION, INTERVAL].into_iter().enumerate() {
+    let panel = |(name, statistic): (&'static str, Getter)| {
         let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
-        let shades = if row == 0 {
-            Axis::linear(bar_label, 0.0, 1.0)
-        } else {
-            Axis::of_data(bar_label, values, LOGARITHMIC, 0.0)?
+        let shades = match name {
+            SHARE => Axis::linear(name, 0.0, 1.0),
+            _ => Axis::of_data(name, values, LOGARITHMIC, 0.0)?,
         };
-        let frame = page.frame(row, 0, columns.axis(&label(horizontal)), rows.axis(&label(vertical)));
-        frame.clipped(&mut sheet, |sheet| {
-            let colour = |set| Some(shade(shades.place(statistic(set)?.value)));
-            frame.cells(sheet, cells.iter().filter_map(|&(set, cell)| Some((cell, colour(set)?))));
-            borders(sheet, &frame, &cells);
-        });
-        if row == 0 {
+        let cells = map.coloured(|set| Some(shade(shades.place(statistic(set)?.value))));
+        let borders = map.borders(|set| set.regime, BORDER);
+        let mut layers = vec![Layer::Inside(std::iter::once(cells).chain(borders).collect())];
+        if name == SHARE {
             let regime = |set: &SetRow| Regime::ALL.iter().position(|regime| set.regime == Some(*regime));
-            let numbers = sets.iter().filter_map(|set| Some((cell(set)?, regime(set)?))).collect();
-            for (middle, index) in middles(&numbers) {
+            let word = |index: usize| {
                 let share = if Regime::ALL[index] == Regime::StickSlip { 0.0 } else { 1.0 };
-                frame.name_cell(&mut sheet, ends(middle), Regime::ALL[index].word(), share);
-            }
-        }
-        frame.axes(&mut sheet);
-        ColourBar::of_axis(bar_label, &shades).draw(&mut sheet, &frame);
-    }
-    Some(sheet.finish())
-}
-
-/// Lines between neighbouring cells of different regimes.
-fn borders(sheet: &mut Sheet, frame: &Frame, cells: &[(&SetRow, Cell)]) {
-    for (index, &(set, (x, y))) in cells.iter().enumerate() {
-        for &(_, (other_x, other_y)) in cells[index + 1..].iter().filter(|(other, _)| other.regime != set.regime) {
-            let meets = |a: (f64, f64), b: (f64, f64)| {
-                [(a.1, b.0), (b.1, a.0)].into_iter().find(|(end, start)| (end / start - 1.0).abs() < 1e-9)
+                (Regime::ALL[index].word().to_owned(), share)
             };
-            if x == other_x
-                && let Some((edge, _)) = meets(y, other_y)
-            {
-                frame.curve(sheet, [(x.0, edge), (x.1, edge)], BORDER);
-            } else if y == other_y
-                && let Some((edge, _)) = meets(x, other_x)
-            {
-                frame.curve(sheet, [(edge, y.0), (edge, y.1)], BORDER);
-            }
+            layers.extend(map.words(regime, word));
         }
-    }
+        let (x, y) = map.axes(&label(horizontal), &label(vertical));
+        Some(Panel::new(x, y, layers).with_bar(Some(ColourBar::of_axis(name, &shades))))
+    };
+    let panels: Option<Vec<Panel<'_>>> = QUANTITIES.into_iter().map(panel).collect();
+    let legend = [entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")];
+    Some(panel::draw("regime-map", look, &MAP, &legend, panels?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::sets::tests::set;
+    use super::super::style::WHITE;
     use super::*;
     use crate::model::Parameters;
     use crate::model::selected::Selected;

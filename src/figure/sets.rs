@@ -221,7 +221,6 @@ fn has_even_steps(values: &[f64]) -> bool {
 /// Periods as an axis: T, or 1/T if its steps are even and those of T are not; in units of the mean interval without
 /// modulation if that is known.
 pub(super) struct Periods {
-    pub(super) grid: Grid,
     pub(super) label: &'static str,
     is_inverse: bool,
     unit: f64,
@@ -238,11 +237,7 @@ impl Periods {
             (true, None) => FREQUENCY,
             (true, Some(_)) => "Modulation frequency τ₀ / T",
         };
-        let mut axis = Self { grid: Grid::of(vec![1.0]), label, is_inverse, unit: free.unwrap_or(1.0) };
-        let mut places: Vec<f64> = periods.iter().map(|&period| axis.place(period)).collect();
-        places.sort_by(f64::total_cmp);
-        axis.grid = Grid::of(places);
-        axis
+        Self { label, is_inverse, unit: free.unwrap_or(1.0) }
     }
 
     /// Where a period in s stands on the axis.

@@ -5,7 +5,8 @@ use super::axis::{Axis, bounds};
 use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Frame, Layout, OVERLAP, RIGHT, ROW_GAP};
 use super::legend::{Mark, entry};
-use super::picture::{Picture, Sheet, Stroke, snapped};
+use super::panel::{self, Layer, Panel, Place};
+use super::picture::{Picture, Stroke, snapped};
 use super::sets::{MICROMETRES, common};
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
@@ -65,58 +66,42 @@ pub fn simulation(
         (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
     ];
     let legend: Vec<_> = legend.into_iter().flatten().collect();
-    let (page, mut sheet) = Layout::column(WIDTH - right, &heights, ROW_GAP, right).page(NAME, look, &legend);
-    let mut row = 0..;
-    let mut next_row = || row.next().unwrap_or(0);
-    if let Some(period) = period {
+    let layout = Layout::column(WIDTH - right, &heights, ROW_GAP, right);
+    let peaks = || peaks.iter().map(|&peak| Layer::Upright(peak, REFERENCE));
+    let modulation = period.map(|period| {
         let amplitude = MICROMETRES * parameters.modulation_amplitude;
         let mut y = Axis::sparse("Modulation Δ cos(2πt/T) (µm)", -1.2 * amplitude, 1.2 * amplitude);
         y.minor.clear();
-        let frame = page.frame(next_row(), 0, x(), y);
-        frame.clipped(&mut sheet, |sheet| {
-            frame.level(sheet, 0.0, GRID);
-            marks(sheet, &frame, &peaks, REFERENCE);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand points")]
-            let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
-            let curve = frame.x.evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / period)));
-            frame.curve(sheet, curve, MODULATION);
-        });
-        frame.axes(&mut sheet);
-    }
-    if let Some(trace) = trace {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand points")]
+        let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
+        let curve = x().evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / period)));
+        let level = std::iter::once(Layer::Level(0.0, GRID));
+        Panel::new(x(), y, inside(level.chain(peaks()).chain([Layer::Curve(curve.collect(), MODULATION)])))
+    });
+    let force = trace.map(|trace| {
         let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
-        let frame = page.frame(next_row(), 0, x(), Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most));
-        frame.clipped(&mut sheet, |sheet| {
-            marks(sheet, &frame, &peaks, REFERENCE);
-            frame.curve(sheet, thinned(trace, frame.width), TRACE);
-        });
-        frame.axes(&mut sheet);
-    }
-    if let Some(map) = map {
+        let y = Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most);
+        Panel::new(x(), y, inside(peaks().chain([Layer::Curve(thinned(trace, layout.width), TRACE)])))
+    });
+    let contacts = map.map(|map| {
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, parameters.slider_length * MILLIMETRES);
-        let frame = page.frame(next_row(), 0, x(), y);
-        frame.clipped(&mut sheet, |sheet| {
-            sheet.rectangles(cells(&frame, map, blocks));
-            marks(sheet, &frame, &peaks, REFERENCE);
-            marks(sheet, &frame, &onsets, ONSET);
-        });
-        frame.axes(&mut sheet);
+        let cells = Layer::Drawn(Box::new(move |sheet, frame| sheet.rectangles(cells(frame, map, blocks))));
+        let onsets = onsets.iter().map(|&onset| Layer::Upright(onset, ONSET));
         let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0));
         percent.ticks =
             [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
-        percent.draw(&mut sheet, &frame);
-    }
-    Ok(sheet.finish())
+        Panel::new(x(), y, inside(std::iter::once(cells).chain(peaks()).chain(onsets))).with_bar(Some(percent))
+    });
+    let panels = [modulation, force, contacts].into_iter().flatten().collect();
+    Ok(panel::draw(NAME, look, &layout, &legend, panels))
 }
 
-fn marks(sheet: &mut Sheet, frame: &Frame, instants: &[f64], stroke: Stroke) {
-    for &instant in instants {
-        frame.upright(sheet, instant, stroke);
-    }
+fn inside<'a>(layers: impl Iterator<Item = Layer<'a>>) -> Vec<Layer<'a>> {
+    vec![Layer::Inside(layers.collect())]
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.
-fn thinned(trace: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
+fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
     let columns = (2.0 * width) as usize;
     let samples = trace.len().div_ceil(columns).max(1);

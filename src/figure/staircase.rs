@@ -2,10 +2,11 @@
 //! the locking index under it.
 
 use super::axis::Axis;
-use super::frame::{Frame, Layout, RIGHT, ROW_GAP};
+use super::frame::{Layout, RIGHT, ROW_GAP};
 use super::legend::{Entry, Mark, entry};
-use super::picture::{Dot, Fill, Ink, Picture, Sheet, Stroke};
-use super::sets::{Modulations, Periods, amplitude};
+use super::panel::{self, Layer, Panel, Place};
+use super::picture::{Dot, Fill, Ink, Picture, Stroke};
+use super::sets::{Grid, Modulations, Periods, amplitude, ascending};
 use super::style::{GREY, GRID, INKS, Look, REFERENCE};
 use crate::reduce::SetRow;
 
@@ -30,7 +31,8 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     }
     let free = sets.free.and_then(|set| set.tau_mean);
     let periods = Periods::of(&sets.periods, free);
-    let x = periods.grid.axis(periods.label);
+    let grid = Grid::of(ascending(sets.periods.iter().map(|&period| periods.place(period))));
+    let x = grid.axis(periods.label);
     let ratios = sets.modulated.iter().filter_map(|set| quartiles(set)).flatten();
     let y = Axis::of_data("Slip interval τ / T, median", ratios, WIDE, f64::INFINITY)?;
     let mut entries: Vec<Entry> =
@@ -38,46 +40,28 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     entries.extend(free.map(|_| entry(Mark::Line(REFERENCE), "τ₀ / T, Δ = 0")));
-    let (page, mut sheet) = LAYOUT.page("staircase", look, &entries);
-    let frames = [page.frame(0, 0, x.clone(), y), page.frame(1, 0, x, Axis::sparse("Locking index", 0.0, 1.0))];
-
-    frames[0].clipped(&mut sheet, |sheet| {
-        let Frame { x, y, .. } = &frames[0];
-        let whole = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MAX_LINES));
-        whole.for_each(|n| frames[0].level(sheet, n, GRID));
-        if let Some(free) = free {
-            frames[0].curve(sheet, x.evenly_placed(200).map(|place| (place, free / periods.period(place))), REFERENCE);
-        }
-    });
+    let whole = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MAX_LINES));
+    let mut background: Vec<Layer<'_>> = whole.map(|n| Layer::Level(n, GRID)).collect();
+    background.extend(free.map(|free| {
+        Layer::Curve(x.evenly_placed(200).map(|place| (place, free / periods.period(place))).collect(), REFERENCE)
+    }));
+    let (mut ratios, mut indices) = (vec![Layer::Inside(background)], Vec::new());
     for (&height, ink) in sets.amplitudes.iter().zip(INKS) {
         let of_height = sets.modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
         let places: Vec<(f64, &SetRow)> =
             of_height.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
-        draw(&mut sheet, &frames, &periods, &places, ink);
+        let quartiles = || places.iter().filter_map(|(place, set)| Some((*place, quartiles(set)?)));
+        let boxes = quartiles().map(|(place, [low, _, high])| (grid.cell_of(place), (low, high)));
+        ratios.push(Layer::Inside(vec![Layer::Boxes(boxes.collect(), Fill { ink, opacity: BOX })]));
+        ratios.push(Layer::Dots(quartiles().map(|(place, [_, median, _])| (place, median)).collect(), dot(ink)));
+        let mut of_index: Vec<Place> =
+            places.iter().filter_map(|(place, set)| Some((*place, set.locking_index?))).collect();
+        of_index.sort_by(|left, right| left.0.total_cmp(&right.0));
+        indices.push(Layer::Dots(of_index.clone(), dot(ink)));
+        indices.push(Layer::Curve(of_index, Stroke::solid(ink, 1.2)));
     }
-    for frame in &frames {
-        frame.axes(&mut sheet);
-    }
-    Some(sheet.finish())
-}
-
-/// One amplitude: sets at their places.
-fn draw(sheet: &mut Sheet, frames: &[Frame; 2], periods: &Periods, places: &[(f64, &SetRow)], ink: Ink) {
-    frames[0].clipped(sheet, |sheet| {
-        for (place, set) in places {
-            if let Some([low, _, high]) = quartiles(set) {
-                let cell = frames[0].box_of(periods.grid.cell_of(*place), (low, high));
-                sheet.rectangle(cell, Fill { ink, opacity: BOX });
-            }
-        }
-    });
-    let medians = places.iter().filter_map(|(place, set)| Some((*place, quartiles(set)?[1])));
-    frames[0].points(sheet, medians, dot(ink));
-    let mut indices: Vec<(f64, f64)> =
-        places.iter().filter_map(|(place, set)| Some((*place, set.locking_index?))).collect();
-    indices.sort_by(|left, right| left.0.total_cmp(&right.0));
-    frames[1].points(sheet, indices.iter().copied(), dot(ink));
-    frames[1].curve(sheet, indices, Stroke::solid(ink, 1.2));
+    let lower = Panel::new(x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
+    Some(panel::draw("staircase", look, &LAYOUT, &entries, vec![Panel::new(x, y, ratios), lower]))
 }
 
 const fn dot(ink: Ink) -> Dot {

@@ -24,8 +24,9 @@ columns! {
 /// What figures show of a set.
 type Shown<'a> = (&'a SetRow, Derived);
 
-/// A column of the sets.
+/// A column of the sets that an option names.
 pub(super) struct Values {
+    pub(super) option: &'static str,
     pub(super) column: Column,
     /// A number for each set; of a word its place among the words.
     pub(super) numbers: Vec<Option<f64>>,
@@ -50,21 +51,18 @@ impl Values {
         let (mut numbers, mut intervals, mut given) = (Vec::new(), Vec::new(), Vec::new());
         for row in rows {
             let frequency = row.parameters.modulation_period.map(|period| 1.0 / period);
-            let (mut all, mut word) = (Vec::new(), None);
+            let mut cells = Vec::new();
             (row, Derived { frequency }).cells(&mut |cell| {
-                match cell {
-                    Value::Flag(flag) if all.len() == column => word = Some(if flag { "yes" } else { "no" }.to_owned()),
-                    Value::Text(text) if all.len() == column => word = Some(text.to_owned()),
-                    _ => (),
-                }
-                all.push(match cell {
-                    Value::Real(real) => Some(real),
-                    Value::Count(count) => Some(count as f64),
-                    Value::Null | Value::Flag(_) | Value::Text(_) => None,
-                });
+                let word = match cell {
+                    Value::Flag(flag) => Some(if flag { "yes" } else { "no" }.to_owned()),
+                    Value::Text(text) => Some(text.to_owned()),
+                    _ => None,
+                };
+                cells.push((cell.number(), word));
             });
-            intervals.push(ends.and_then(|(low, high)| all[low].zip(all[high])));
-            numbers.push(all[column].filter(|number| number.is_finite()));
+            intervals.push(ends.and_then(|(low, high)| cells[low].0.zip(cells[high].0)));
+            let (number, word) = cells.swap_remove(column);
+            numbers.push(number.filter(|number| number.is_finite()));
             given.push(word);
         }
         let mut words: Vec<String> = given.iter().flatten().cloned().collect();
@@ -73,7 +71,12 @@ impl Values {
         for (number, word) in numbers.iter_mut().zip(given) {
             *number = number.or_else(|| words.binary_search(&word?).ok().map(|index| index as f64));
         }
-        Ok(Self { column: columns[column].clone(), numbers, intervals, words })
+        Ok(Self { option, column: columns[column].clone(), numbers, intervals, words })
+    }
+
+    /// Why the option cannot name it.
+    pub(super) fn refuse(&self, problem: &str) -> BadOption {
+        BadOption::new(self.option, &self.column.name, problem)
     }
 
     /// Whether it holds words, or yes and no.

@@ -2,9 +2,10 @@
 //! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Frame, Layout, RIGHT};
+use super::frame::{Layout, RIGHT};
 use super::legend::{Mark, entry};
-use super::picture::{Dot, Ink, Picture, Sheet, Stroke};
+use super::panel::{self, Layer, Panel};
+use super::picture::{Dot, Ink, Picture, Stroke};
 use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
 use anyhow::{Result, anyhow};
 
@@ -85,22 +86,21 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let chance = has_chance.then(|| entry(Mark::Patch(STRIPE), "what chance alone gives in 95 of 100 cases"));
     let legend: Vec<_> = lines.chain(chance).collect();
     let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, &HEIGHTS, 0.0, RIGHT) };
-    let (page, mut sheet) = layout.page(NAME, look, &legend);
-    for (column, panel) in panels.iter().enumerate() {
+    let panel = |(column, panel): (usize, &ErrorPanel)| {
         // Lower ends may be 0: they run out of the panel.
         let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
-        let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance)).ok_or_else(empty)?;
+        let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance))?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
-        let frame = page.frame(0, column, Axis::logarithmic(&panel.label, low, high), y);
-        if let Some(by_chance) = panel.by_chance {
-            frame.stripe(&mut sheet, low, by_chance, STRIPE);
-        }
-        for MethodLine { method, drive, points } in &panel.lines {
-            draw(&mut sheet, &frame, points, look_of(method, drive), panel.by_chance.is_none());
-        }
-        frame.axes(&mut sheet);
-    }
-    Ok(sheet.finish())
+        let x = Axis::logarithmic(&panel.label, low, high);
+        let chance = panel.by_chance.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
+        let lines = panel.lines.iter().map(|MethodLine { method, drive, points }| {
+            Layer::Inside(layers(points, look_of(method, drive), x.low, panel.by_chance.is_none()))
+        });
+        let layers = chance.into_iter().chain(lines).collect();
+        Some(Panel::new(x, y, layers))
+    };
+    let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
+    Ok(panel::draw(NAME, look, &layout, &legend, panels.ok_or_else(empty)?))
 }
 
 /// Each name once, in the order of first appearance.
@@ -113,31 +113,22 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     })
 }
 
-/// A method's settings, with the uncertainty of their errors.
-fn draw(
-    sheet: &mut Sheet,
-    frame: &Frame,
+/// A method's settings, with the uncertainty of their errors, on an axis of errors that begins at `least`.
+fn layers<'a>(
     points: &[WorkPrecision],
     (ink, (dashes, has_holes)): (Ink, Pattern),
+    least: f64,
     is_joined: bool,
-) {
-    let points: Vec<&WorkPrecision> = points.iter().filter(|point| point.is_usable()).collect();
-    let places = || points.iter().map(|point| (point.error, point.work));
-    frame.clipped(sheet, |sheet| {
-        if is_joined {
-            frame.curve(sheet, places(), Stroke { ink, width: 1.8, dashes });
-        }
-        for point in &points {
-            if let Some((low, high)) = point.uncertainty {
-                let ends = [low.max(frame.x.low), high].map(|end| (end, point.work));
-                frame.curve(sheet, ends, Stroke::solid(ink, UNCERTAINTY));
-            }
-        }
-        frame.points(sheet, places(), Dot::solid(ink, RADIUS));
-        if has_holes {
-            frame.points(sheet, places(), Dot::solid(WHITE, RADIUS - 1.6));
-        }
+) -> Vec<Layer<'a>> {
+    let points = || points.iter().filter(|point| point.is_usable());
+    let places = || points().map(|point| (point.error, point.work)).collect();
+    let line = is_joined.then(|| Layer::Curve(places(), Stroke { ink, width: 1.8, dashes }));
+    let bars = points().filter_map(|point| {
+        let (low, high) = point.uncertainty?;
+        Some(Layer::Curve([low.max(least), high].map(|end| (end, point.work)).into(), Stroke::solid(ink, UNCERTAINTY)))
     });
+    let holes = has_holes.then(|| Layer::Dots(places(), Dot::solid(WHITE, RADIUS - 1.6)));
+    line.into_iter().chain(bars).chain([Layer::Dots(places(), Dot::solid(ink, RADIUS))]).chain(holes).collect()
 }
 
 #[cfg(test)]

@@ -1,0 +1,141 @@
+//! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
+
+use super::axis::Axis;
+use super::colour_bar::ColourBar;
+use super::frame::{Frame, Layout};
+use super::legend::Entry;
+use super::picture::{Anchor, Dot, Fill, Picture, Sheet, Stroke};
+use super::style::{BAR_WIDTH, HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
+use crate::reduce::Statistic;
+use kuva::render::color::Color;
+
+/// A point of data.
+pub(super) type Place = (f64, f64);
+/// Lower and upper end.
+pub(super) type Ends = (f64, f64);
+/// A rectangle of data: its ends along x and along y.
+pub(super) type Cell = (Ends, Ends);
+
+/// What is drawn in a panel, in units of its axes.
+pub(super) enum Layer<'a> {
+    /// What lies inside the frame of other layers.
+    Inside(Vec<Self>),
+    Curve(Vec<Place>, Stroke),
+    /// A level line from edge to edge.
+    Level(f64, Stroke),
+    /// A vertical line from edge to edge.
+    Upright(f64, Stroke),
+    /// A vertical stripe between two values of x.
+    Stripe(Ends, Fill),
+    /// The points that lie inside the frame.
+    Dots(Vec<Place>, Dot),
+    /// An upright bar between two values at each x; what lies under a logarithmic axis runs out of the frame.
+    Bars(Vec<(f64, Ends)>, Stroke),
+    Boxes(Vec<Cell>, Fill),
+    /// Cells, each in its own colour, and by how much they reach under their neighbours.
+    Cells(Vec<(Cell, Color)>, f64),
+    /// A short text in the middle of a cell of this shade.
+    Word(Cell, String, f64),
+    /// What depends on the size of the frame.
+    Drawn(Box<dyn FnOnce(&mut Sheet, &Frame) + 'a>),
+}
+
+impl Layer<'_> {
+    /// Statistics, with a bar for each confidence interval that is known, joined by a line.
+    pub(super) fn statistics(points: &[(f64, Statistic)], stroke: Stroke, radius: f64) -> [Self; 2] {
+        let values = || points.iter().map(|&(x, statistic)| (x, statistic.value)).collect();
+        let bars = points.iter().filter_map(|&(x, statistic)| Some((x, statistic.interval?))).collect();
+        let bars = Self::Bars(bars, Stroke::solid(stroke.ink, BAR_WIDTH));
+        [Self::Inside(vec![Self::Curve(values(), stroke), bars]), Self::Dots(values(), Dot::solid(stroke.ink, radius))]
+    }
+
+    fn draw(self, sheet: &mut Sheet, frame: &Frame) {
+        match self {
+            Self::Inside(layers) => sheet.clipped([frame.left, frame.top, frame.width, frame.height], |sheet| {
+                layers.into_iter().for_each(|layer| layer.draw(sheet, frame));
+            }),
+            Self::Curve(points, stroke) => {
+                sheet.line(points.into_iter().map(|point| frame.place(point)).collect(), stroke);
+            }
+            Self::Level(y, stroke) => {
+                Self::Curve(vec![(frame.x.low, y), (frame.x.high, y)], stroke).draw(sheet, frame);
+            }
+            Self::Upright(x, stroke) => {
+                Self::Curve(vec![(x, frame.y.low), (x, frame.y.high)], stroke).draw(sheet, frame);
+            }
+            Self::Stripe((low, high), fill) => {
+                let (left, right) = (frame.x_of(low.max(frame.x.low)), frame.x_of(high.min(frame.x.high)));
+                if right > left {
+                    sheet.rectangle([left, frame.top, right - left, frame.height], fill);
+                }
+            }
+            Self::Dots(points, dot) => {
+                let inside = points.into_iter().filter(|&(x, y)| frame.x.contains(x) && frame.y.contains(y));
+                let centres: Vec<Place> = inside.map(|point| frame.place(point)).collect();
+                if !centres.is_empty() {
+                    sheet.discs(centres, dot);
+                }
+            }
+            Self::Bars(bars, stroke) => {
+                for (x, (low, high)) in bars {
+                    let (x, is_finite) = (frame.x_of(x), frame.y.place(low).is_finite());
+                    let bottom = if is_finite { frame.y_of(low).min(2.0 * frame.bottom()) } else { frame.bottom() };
+                    sheet.line(vec![(x, bottom), (x, frame.y_of(high))], stroke);
+                }
+            }
+            Self::Boxes(boxes, fill) => boxes.into_iter().for_each(|cell| sheet.rectangle(frame.box_of(cell), fill)),
+            Self::Cells(cells, overlap) => sheet.rectangles(cells.into_iter().map(|(cell, colour)| {
+                let [left, top, width, height] = frame.box_of(cell);
+                ([left, top, width + overlap, height + overlap], colour)
+            })),
+            Self::Word((x, y), text, share) => {
+                let (x, y) = frame.place((frame.x.middle(x.0, x.1), frame.y.middle(y.0, y.1)));
+                let place = (x, y + HALF_DIGIT * f64::from(LEGEND_TEXT));
+                sheet.coloured_text(place, &text, LEGEND_TEXT, Anchor::Middle, Some(ink_on(share)));
+            }
+            Self::Drawn(draw) => draw(sheet, frame),
+        }
+    }
+}
+
+pub(super) struct Panel<'a> {
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    /// From below.
+    pub(super) layers: Vec<Layer<'a>>,
+    /// Over the axes.
+    pub(super) notes: Vec<Layer<'a>>,
+    /// What it shows, and how much of it.
+    pub(super) heading: Option<(String, String)>,
+    pub(super) bar: Option<ColourBar<'a>>,
+}
+
+impl<'a> Panel<'a> {
+    pub(super) const fn new(x: Axis, y: Axis, layers: Vec<Layer<'a>>) -> Self {
+        Self { x, y, layers, notes: Vec::new(), heading: None, bar: None }
+    }
+
+    pub(super) fn with_bar(self, bar: Option<ColourBar<'a>>) -> Self {
+        Self { bar, ..self }
+    }
+}
+
+/// Panels on a sheet under a legend, row by row.
+pub(super) fn draw(name: &str, look: &Look, layout: &Layout<'_>, legend: &[Entry], panels: Vec<Panel<'_>>) -> Picture {
+    let (page, mut sheet) = layout.page(name, look, legend);
+    let count = panels.len();
+    for (index, Panel { x, y, layers, notes, heading, bar }) in panels.into_iter().enumerate() {
+        let mut frame = page.frame(index / layout.columns, index % layout.columns, x, y);
+        frame.is_lowest = index + layout.columns >= count;
+        layers.into_iter().for_each(|layer| layer.draw(&mut sheet, &frame));
+        frame.axes(&mut sheet);
+        notes.into_iter().for_each(|note| note.draw(&mut sheet, &frame));
+        if let Some((text, amount)) = heading {
+            frame.heading(&mut sheet, &text, &amount);
+        }
+        if let Some(bar) = bar {
+            bar.draw(&mut sheet, &frame);
+        }
+    }
+    sheet.finish()
+}
