@@ -1,8 +1,8 @@
 //! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over locked sets.
 
 use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Layout, OVERLAP, RIGHT};
+use super::colour_bar::ColourBar;
+use super::frame::{Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Picture, Stroke};
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 const WIDTH: f64 = 580.0;
-const HEIGHTS: &[f64] = &[390.0];
+const HEIGHT: f64 = 390.0;
 /// Slips one by one, those of locked sets over the others.
 const OTHER: Dot = Dot { ink: GREY, radius: 1.6, opacity: 0.45 };
 const LOCKED: Dot = Dot { ink: BLACK, ..OTHER };
@@ -56,7 +56,6 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
     ]);
-    let right = if density.is_some() { COLOUR_BAR } else { RIGHT };
     let x = Axis::logarithmic(ETA, low, high);
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
@@ -88,8 +87,8 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         Layer::Dots(means(), AVERAGE),
     ]);
     let bar = density.as_ref().map(|density| ColourBar::of_axis("density (1/rad)", &density.shades));
-    let panel = Panel::new(x, Axis::angle("Phase φ (rad)", low, high), vec![Layer::Inside(layers)]).with_bar(bar);
-    Some(panel::draw("phi-eta", look, &Layout::column(WIDTH, HEIGHTS, 0.0, right), &entries, vec![panel]))
+    let panel = Panel { bar, ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers) };
+    Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
 }
 
 /// η, mean phase in rad, and the ends of its interval.

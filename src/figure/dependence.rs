@@ -2,7 +2,7 @@
 //! for each modulation.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::frame::Layout;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Picture};
@@ -14,7 +14,7 @@ use crate::reduce::{SetRow, Statistic};
 /// Of a column of panels; between columns stand the numbers of the right one.
 const WIDTH: f64 = 330.0;
 const COLUMN_GAP: f64 = 92.0;
-const HEIGHTS: [f64; 2] = [230.0; 2];
+const HEIGHT: f64 = 230.0;
 /// Least values of a parameter that make a dependence; a rule has two.
 const MIN_VALUES: usize = 3;
 /// Ratio of the largest to the least value from which times are drawn on a logarithmic axis.
@@ -55,13 +55,15 @@ pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
         Symbol::BreakOn => Axis::categories("Contacts break on", &[BreakOn::Magnitude.word(), BreakOn::Tension.word()]),
         _ => lines.axis(),
     };
-    let panel =
-        |quantity: Quantity| Some(Panel::new(x.clone(), y_axis(quantity, sets)?, lines.layers(quantity.1, |_| false)));
+    let panel = |quantity: Quantity| {
+        Some(Panel::new(HEIGHT, x.clone(), y_axis(quantity, sets)?, lines.layers(quantity.1, |_| false)))
+    };
     let panels: Vec<Panel<'_>> = QUANTITIES.into_iter().filter_map(panel).collect();
-    let columns = panels.len().min(2);
-    let heights = HEIGHTS.get(..panels.len().div_ceil(2)).filter(|heights| !heights.is_empty())?;
-    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, heights, ROW_GAP, RIGHT) };
-    Some(panel::draw("dependence", look, &layout, &lines.legend(), panels))
+    if panels.is_empty() {
+        return None;
+    }
+    let layout = Layout { columns: panels.len().min(2), column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
+    Some(panel::draw("dependence", look, layout, &lines.legend(), panels))
 }
 
 /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much; `None` if no set has a value.

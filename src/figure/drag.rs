@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, bounds};
 use super::font;
-use super::frame::{Frame, Layout, ROW_GAP};
+use super::frame::{Frame, Layout};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Ends, Layer, Panel, Place};
 use super::picture::{Anchor, Dot, Fill, Ink, Picture, Sheet, Stroke};
@@ -13,7 +13,7 @@ use crate::reduce::{Point, RampStage, quantile};
 const NUMBERS: f64 = 66.0;
 /// Space above the longest interval for them, over the range of intervals.
 const NUMBERS_ABOVE: f64 = 0.14;
-const LAYOUT: Layout = Layout::column(520.0, &[320.0, 210.0], ROW_GAP, NUMBERS);
+const LAYOUT: Layout = Layout { right: NUMBERS, ..Layout::column(520.0) };
 /// The stages of the ramp, their names and inks.
 const STAGES: [(RampStage, &str, Ink); 2] = [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
 /// Share of the intervals at either end that the axis of the medians leaves out.
@@ -72,13 +72,13 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let dots =
         slips.iter().map(|slip| Layer::Dots(vec![(slip.modulation, slip.interval)], slip_dot(STAGES[slip.stage].2)));
     let numbers: Vec<(f64, [Place; 2])> = multiples.iter().map(|&n| (n, line(n))).collect();
-    let mut upper = Panel::new(x.clone(), upper, vec![Layer::Inside(lines.chain(dots).collect())]);
-    upper.notes = vec![Layer::Drawn(Box::new(move |sheet, frame| {
+    let notes = vec![Layer::Drawn(Box::new(move |sheet, frame| {
         numbers.into_iter().for_each(|(n, line)| number_line(sheet, frame, n, line));
     }))];
     let levels = multiples.iter().map(|&n| Layer::Level(n, GRID));
-    let lower = Panel::new(x, lower, vec![Layer::Inside(levels.chain(medians_of(&slips, (low, high))).collect())]);
-    Some(panel::draw("drag", look, &LAYOUT, &entries, vec![upper, lower]))
+    let lower = Panel::inside(210.0, x.clone(), lower, levels.chain(medians_of(&slips, (low, high))));
+    let upper = Panel { notes, ..Panel::inside(320.0, x.clone(), upper, lines.chain(dots)) };
+    Some(panel::draw("drag", look, LAYOUT, &entries, vec![upper, lower]))
 }
 
 const fn slip_dot(ink: Ink) -> Dot {

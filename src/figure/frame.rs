@@ -24,13 +24,13 @@ const EDGE: f64 = 2.0;
 /// Space left of a frame for numbers.
 pub(super) const LEFT: f64 = 76.0;
 /// Space right of a frame.
-pub(super) const RIGHT: f64 = 26.0;
+const RIGHT: f64 = 26.0;
 /// Space above a frame for the label of its y axis.
 pub(super) const ABOVE: f64 = 38.0;
 /// Space under a frame for numbers and label.
 const UNDER: f64 = 58.0;
 /// Between two rows of frames, for a label and some air.
-pub(super) const ROW_GAP: f64 = 52.0;
+const ROW_GAP: f64 = 52.0;
 /// Space above a frame for a heading.
 const HEADING: f64 = 26.0;
 /// Distance of the rows of a legend.
@@ -46,12 +46,10 @@ const SHORTEST: f64 = 60.0;
 
 /// Frames of a figure, in rows and columns; numbers and label of the x axes stand under the lowest row only.
 #[derive(Clone, Copy)]
-pub(super) struct Layout<'a> {
+pub(super) struct Layout {
     pub(super) columns: usize,
     pub(super) width: f64,
     pub(super) column_gap: f64,
-    /// Heights of the rows, from above.
-    pub(super) heights: &'a [f64],
     pub(super) row_gap: f64,
     /// Space right of the last column.
     pub(super) right: f64,
@@ -59,14 +57,14 @@ pub(super) struct Layout<'a> {
     pub(super) has_headings: bool,
 }
 
-impl<'a> Layout<'a> {
-    /// A column of frames with this space between them.
-    pub(super) const fn column(width: f64, heights: &'a [f64], row_gap: f64, right: f64) -> Self {
-        Self { columns: 1, width, column_gap: 0.0, heights, row_gap, right, has_headings: false }
+impl Layout {
+    /// One under the other.
+    pub(super) const fn column(width: f64) -> Self {
+        Self { columns: 1, width, column_gap: 0.0, row_gap: ROW_GAP, right: RIGHT, has_headings: false }
     }
 
-    /// The frames on a sheet of the size that is asked for, under this legend.
-    pub(super) fn page(&self, name: &str, look: &Look, legend: &[Entry]) -> (Page<'a>, Sheet) {
+    /// Frames with these heights of the rows on a sheet of the size that is asked for, under this legend.
+    pub(super) fn page(self, name: &str, look: &Look, legend: &[Entry], natural_heights: &[f64]) -> (Page, Sheet) {
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -80,16 +78,16 @@ impl<'a> Layout<'a> {
         let top = ABOVE + legend_rows(legend, right - MARGIN).len() as f64 * LEGEND_ROW;
         // A journal has the small print in the caption.
         let notes = if look.style == Style::Screen { wrapped(&look.note, right - MARGIN) } else { Vec::new() };
-        let rows = self.heights.len() as f64;
+        let rows = natural_heights.len() as f64;
         let heading = if self.has_headings { HEADING } else { 0.0 };
         let above_notes = top + rows * heading + (rows - 1.0) * self.row_gap + UNDER;
         let around = above_notes + notes.len() as f64 * NOTE_ROW + if notes.is_empty() { 0.0 } else { 0.5 * NOTE_ROW };
-        let natural: f64 = self.heights.iter().sum();
+        let natural: f64 = natural_heights.iter().sum();
         let scale = match asked {
             Some((_, height)) => (height - around) / natural,
             None => (width / self.width).min(1.0),
         };
-        let heights: Vec<f64> = self.heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
+        let heights: Vec<f64> = natural_heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
         let frames: f64 = heights.iter().sum();
 
         let mut sheet = Sheet::new(name, look, (total, frames + around));
@@ -98,8 +96,7 @@ impl<'a> Layout<'a> {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
             sheet.coloured_text(place, line, NOTE_TEXT, Anchor::Start, Some(Color::from(DARK_GREY)));
         }
-        let page = Page { layout: Layout { width, ..*self }, heights, top, heading, end: right };
-        (page, sheet)
+        (Page { layout: Self { width, ..self }, heights, top, heading, end: right }, sheet)
     }
 }
 
@@ -119,16 +116,16 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
 }
 
 /// Where frames lie on a sheet.
-pub(super) struct Page<'a> {
+pub(super) struct Page {
     /// With the width that the frames have.
-    layout: Layout<'a>,
-    pub(super) heights: Vec<f64>,
+    layout: Layout,
+    heights: Vec<f64>,
     top: f64,
     heading: f64,
     end: f64,
 }
 
-impl Page<'_> {
+impl Page {
     /// The frame in a row and a column, both from 0. One of several has a letter.
     pub(super) fn frame(&self, row: usize, column: usize, x: Axis, y: Axis) -> Frame {
         let Layout { columns, width, column_gap, row_gap: gap, .. } = self.layout;
@@ -313,10 +310,10 @@ mod tests {
 
     #[test]
     fn a_sheet_has_the_size_that_is_asked_for_and_never_frames_too_small_to_read() {
-        let layout = Layout::column(500.0, &[300.0, 200.0], ROW_GAP, RIGHT);
+        let layout = Layout::column(500.0);
         let drawn = |style, size| {
             let look = Look { style, size, note: "small print ".repeat(40) };
-            layout.page("", &look, &[]).1.finish().size()
+            layout.page("", &look, &[], &[300.0, 200.0]).1.finish().size()
         };
         for style in [Style::Screen, Style::Print] {
             let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 140.0 } };
@@ -331,8 +328,8 @@ mod tests {
     /// The text elements of a small figure: where each starts and ends, and what it says.
     fn texts(style: Style, (width, height): (f64, f64), x: &Axis, y: &Axis) -> (f64, Vec<(f64, f64, String)>) {
         let look = Look { style, size: Some(Size { width, height }), note: "Sweep test".to_owned() };
-        let layout = Layout { columns: 2, column_gap: LEFT, ..Layout::column(300.0, &[200.0], ROW_GAP, RIGHT) };
-        let (page, mut sheet) = layout.page("", &look, &[]);
+        let layout = Layout { columns: 2, column_gap: LEFT, ..Layout::column(300.0) };
+        let (page, mut sheet) = layout.page("", &look, &[], &[200.0]);
         for column in 0..2 {
             let frame = page.frame(0, column, x.clone(), y.clone());
             frame.axes(&mut sheet);

@@ -1,7 +1,7 @@
 //! Mean friction over the amplitude of the modulated force: small perturbations do not change it, large ones lower it.
 
 use super::axis::{Axis, bounds};
-use super::frame::{Layout, RIGHT};
+use super::frame::Layout;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::Picture;
@@ -9,7 +9,6 @@ use super::sets::{Modulations, frequency};
 use super::style::{BLACK, INKS, Look, RADIUS, REFERENCE, STRIPE, curve, dot};
 use crate::reduce::{SetRow, Statistic};
 
-const LAYOUT: Layout = Layout::column(558.0, &[340.0], 0.0, RIGHT);
 /// Least amplitudes, zero included, and most periods of the figure.
 const MIN_AMPLITUDES: usize = 5;
 const MAX_PERIODS: usize = 3;
@@ -53,8 +52,8 @@ pub(super) fn friction(sets: &[SetRow], look: &Look) -> Option<Picture> {
         points.sort_by(|left, right| left.0.total_cmp(&right.0));
         layers.extend(Layer::statistics(&points, curve(ink), RADIUS));
     }
-    let panel = Panel::new(x, Axis::rounded(y_label, least.min(0.0), most), layers);
-    Some(panel::draw("friction", look, &LAYOUT, &entries, vec![panel]))
+    let panel = Panel::new(340.0, x, Axis::rounded(y_label, least.min(0.0), most), layers);
+    Some(panel::draw("friction", look, Layout::column(558.0), &entries, vec![panel]))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::axis::{Axis, bounds};
 use super::font;
-use super::frame::{Frame, Layout, OVERLAP, RIGHT};
+use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
@@ -15,9 +15,8 @@ use crate::reduce::{HistogramBin, SetRow};
 const MAX_PANELS: usize = 4;
 /// Sets that may fit: each panel can hold a second one, of identical contacts.
 pub(super) const MAX_SETS: usize = 2 * MAX_PANELS;
-const NAME: &str = "tau-histograms";
 const WIDTH: f64 = 558.0;
-const HEIGHTS: [f64; MAX_PANELS] = [150.0; MAX_PANELS];
+const HEIGHT: f64 = 150.0;
 /// Multiples of T that are marked; more would be a grey area.
 const MAX_MULTIPLES: f64 = 40.0;
 /// Space in a panel for the numbers of the multiples.
@@ -71,23 +70,23 @@ impl<'a> Panel<'a> {
 pub(super) fn histograms<'a>(sets: &[SetRow], bins: &'a [HistogramBin], look: &Look) -> Option<Picture> {
     let panels = panels(sets, bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
-    let layout = Layout { has_headings: true, ..Layout::column(WIDTH, HEIGHTS.get(..panels.len())?, 10.0, RIGHT) };
-    let legend = legend(&panels);
-    let (page, _) = layout.page(NAME, look, &legend);
+    if panels.len() > MAX_PANELS {
+        return None;
+    }
     let margin = 0.04 * (high - low);
-    let of_set = |panel: &Panel<'a>, height: f64| {
+    let panel = |(index, panel): (usize, &Panel<'a>)| {
         let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
         let multiples = panel.period.map_or_else(Vec::new, |period| x.multiples_of(period, MAX_MULTIPLES));
-        let y_label = if *panel == panels[0] { "Probability density (1/s)" } else { "" };
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
+        let y = Axis::sparse(if index == 0 { "Probability density (1/s)" } else { "" }, 0.0, highest);
         // The numbers cover no bar.
-        let free = height - if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
-        let y = Axis::sparse(y_label, 0.0, highest * height / free);
+        let head = if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
         let heading = Some((panel.title.clone(), panel.amount()));
-        panel::Panel { heading, ..panel::Panel::new(x, y, panel.layers(multiples)) }
+        panel::Panel { head, heading, ..panel::Panel::new(HEIGHT, x, y, panel.layers(multiples)) }
     };
-    let drawn = panels.iter().zip(page.heights).map(|(panel, height)| of_set(panel, height)).collect();
-    Some(panel::draw(NAME, look, &layout, &legend, drawn))
+    let layout = Layout { row_gap: 10.0, ..Layout::column(WIDTH) };
+    let drawn = panels.iter().enumerate().map(panel).collect();
+    Some(panel::draw("tau-histograms", look, layout, &legend(&panels), drawn))
 }
 
 /// A panel per set by rising frequency, as in Fig. 2. One of identical contacts goes onto the panel of the set that it

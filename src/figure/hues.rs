@@ -1,8 +1,7 @@
 //! Hues: a quantity as colours. Few values have inks of their own and stand in the legend, many a scale beside the frame.
 
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::RIGHT;
+use super::colour_bar::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
 use super::sets::ascending;
@@ -55,11 +54,6 @@ impl Hues {
     pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
         let Self::Scale(axis) = self else { return None };
         Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis) })
-    }
-
-    /// Space that they need right of the frames.
-    pub(super) fn right(&self) -> f64 {
-        if matches!(self, Self::Scale(_)) { COLOUR_BAR } else { RIGHT }
     }
 }
 

@@ -1,7 +1,7 @@
 //! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which locked intervals fall.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Layout, ROW_GAP};
+use super::frame::Layout;
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
@@ -10,8 +10,6 @@ use super::sets::three_digits;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::Point;
 
-const WIDTH: f64 = 560.0;
-const HEIGHTS: [f64; 2] = [180.0, 340.0];
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
 /// Whole numbers whose lines can be distinguished.
@@ -42,17 +40,16 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
-    let layout = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, hues.right());
-    let panels = [(all, 1), (few, LINES)].map(|(y, lines)| {
+    let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines).map(|n| Layer::Level(f64::from(n), GRID)).collect();
         let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
         layers.push(Layer::Dots(others.collect(), OTHER));
         layers.extend(slips.iter().filter(|slip| slip.0.is_locked).map(|&(point, place)| {
             Layer::Dots(vec![place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 })
         }));
-        Panel::new(x.clone(), y, vec![Layer::Inside(layers)]).with_bar(hues.bar())
+        Panel { bar: hues.bar(), ..Panel::inside(height, x.clone(), y, layers) }
     });
-    Some(panel::draw("tau-T", look, &layout, &entries, panels.into()))
+    Some(panel::draw("tau-T", look, Layout::column(560.0), &entries, panels.into()))
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 //! modulation.
 
 use super::axis::Axis;
-use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Layout, ROW_GAP};
+use super::colour_bar::ColourBar;
+use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::map::Map;
 use super::panel::{self, Layer, Panel, Place};
@@ -15,7 +15,7 @@ use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
 const WIDTH: f64 = 560.0;
-const HEIGHTS: [f64; 2] = [280.0; 2];
+const HEIGHT: f64 = 280.0;
 /// Least values of amplitude and of period that make a map.
 const MIN_VALUES: usize = 8;
 /// Numbers of periods that have a colour of their own; larger ones share one.
@@ -55,14 +55,13 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let panels = panels.map(|(cells, words, bar)| {
         let inside = Layer::Inside(std::iter::once(cells).chain(lines()).collect());
         let layers = std::iter::once(inside).chain(words).collect();
-        Panel::new(x.clone(), y.clone(), layers).with_bar(Some(bar))
+        Panel { bar: Some(bar), ..Panel::new(HEIGHT, x.clone(), y.clone(), layers) }
     });
     let legend = [
         entry(Mark::Line(LINE), "η = 1; locking is expected above"),
         entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "not locked"),
     ];
-    let layout = Layout::column(WIDTH, &HEIGHTS, ROW_GAP, COLOUR_BAR);
-    Some(panel::draw("locking-map", look, &layout, &legend, panels.into()))
+    Some(panel::draw("locking-map", look, Layout::column(WIDTH), &legend, panels.into()))
 }
 
 /// n of τ = nT.

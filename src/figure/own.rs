@@ -2,7 +2,7 @@
 
 use super::BadOption;
 use super::axis::{Axis, bounds, logarithmic_bounds};
-use super::frame::{LEFT, Layout, RIGHT};
+use super::frame::{LEFT, Layout};
 use super::hues::Hues;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
@@ -22,7 +22,8 @@ const HEIGHT: f64 = 400.0;
 const MAX_COLUMNS: usize = 3;
 const MAX_PANELS: usize = 9;
 const PANEL_WIDTH: f64 = 260.0;
-const PANEL_HEIGHTS: &[f64] = &[220.0; MAX_PANELS / MAX_COLUMNS];
+const PANEL_HEIGHT: f64 = 220.0;
+const PANEL_GAP: f64 = 26.0;
 const MAX_WORDS: usize = 12;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
@@ -114,7 +115,9 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
 
     let hues = colour.as_ref().map(hues).transpose()?;
     let groups = groups(panels.as_ref(), &sets)?;
-    let layout = layout(groups.len(), hues.as_ref().map_or(RIGHT, Hues::right));
+    let (count, columns) = (groups.len(), if groups.len() == 4 { 2 } else { groups.len().min(MAX_COLUMNS) });
+    let (width, height) = if count == 1 { (WIDTH, HEIGHT) } else { (PANEL_WIDTH, PANEL_HEIGHT) };
+    let layout = Layout { columns, column_gap: LEFT, row_gap: PANEL_GAP, ..Layout::column(width) };
     let radius = if inside > FEW_SETS { SMALL_RADIUS } else { RADIUS };
     let mut entries = hues.as_ref().map_or_else(Vec::new, |hues| hues.entries(RADIUS));
     if let Some(colour) = colour.as_ref().filter(|colour| sets.iter().any(|&set| colour.numbers[set].is_none())) {
@@ -153,17 +156,17 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
         let dots = members.iter().map(|&set| Layer::Dots(place(set).into_iter().collect(), dot(set)));
         std::iter::once(Layer::Inside(layers)).chain(dots).collect()
     };
-    let (count, last_of_row) = (groups.len(), layout.columns.min(groups.len()) - 1);
     let panel = |(index, (title, members)): (usize, (String, Vec<usize>))| {
-        let mut panel = Panel::new(x_axis.clone(), y_axis.clone(), layers(&members));
-        if index % layout.columns > 0 {
+        let mut panel = Panel::new(height, x_axis.clone(), y_axis.clone(), layers(&members));
+        if index % columns > 0 {
             panel.y.label.clear();
         }
         panel.heading = (count > 1).then(|| (title, String::new()));
-        panel.with_bar(hues.as_ref().and_then(Hues::bar).filter(|_| index == last_of_row))
+        panel.bar = hues.as_ref().and_then(Hues::bar).filter(|_| index + 1 == columns);
+        panel
     };
     let panels = groups.into_iter().enumerate().map(panel).collect();
-    Ok(panel::draw(&format!("{y_name}-{x_name}"), &look.with_note(&note), &layout, &entries, panels))
+    Ok(panel::draw(&format!("{y_name}-{x_name}"), &look.with_note(&note), layout, &entries, panels))
 }
 
 impl Asked<'_> {
@@ -254,16 +257,6 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
         count => format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour"),
     };
     Err(values.refuse(&problem))
-}
-
-fn layout(panels: usize, right: f64) -> Layout<'static> {
-    const ONE: &[f64] = &[HEIGHT];
-    if panels == 1 {
-        return Layout::column(WIDTH, ONE, 0.0, right);
-    }
-    let columns = if panels == 4 { 2 } else { panels.min(MAX_COLUMNS) };
-    let heights = &PANEL_HEIGHTS[..panels.div_ceil(columns)];
-    Layout { columns, column_gap: LEFT, has_headings: true, ..Layout::column(PANEL_WIDTH, heights, 26.0, right) }
 }
 
 /// Sets that differ in the x axis alone, if that is a parameter, η or 1/T, in the order of x.

@@ -1,7 +1,7 @@
 //! Panels as data: axes and what lies between them, layer by layer. One engine draws the panels of every figure.
 
 use super::axis::Axis;
-use super::colour_bar::ColourBar;
+use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Frame, Layout};
 use super::legend::Entry;
 use super::picture::{Anchor, Dot, Fill, Picture, Sheet, Stroke};
@@ -99,41 +99,54 @@ impl Layer<'_> {
 }
 
 pub(super) struct Panel<'a> {
+    pub(super) height: f64,
     pub(super) x: Axis,
     pub(super) y: Axis,
     /// From below.
     pub(super) layers: Vec<Layer<'a>>,
     /// Over the axes.
     pub(super) notes: Vec<Layer<'a>>,
+    /// Height over the data that layers need, whatever the size of the frame.
+    pub(super) head: f64,
     /// What it shows, and how much of it.
     pub(super) heading: Option<(String, String)>,
     pub(super) bar: Option<ColourBar<'a>>,
 }
 
 impl<'a> Panel<'a> {
-    pub(super) const fn new(x: Axis, y: Axis, layers: Vec<Layer<'a>>) -> Self {
-        Self { x, y, layers, notes: Vec::new(), heading: None, bar: None }
+    pub(super) const fn new(height: f64, x: Axis, y: Axis, layers: Vec<Layer<'a>>) -> Self {
+        Self { height, x, y, layers, notes: Vec::new(), head: 0.0, heading: None, bar: None }
     }
 
-    pub(super) fn with_bar(self, bar: Option<ColourBar<'a>>) -> Self {
-        Self { bar, ..self }
+    /// With all layers inside the frame.
+    pub(super) fn inside(height: f64, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer<'a>>) -> Self {
+        Self::new(height, x, y, vec![Layer::Inside(layers.into_iter().collect())])
     }
 }
 
-/// Panels on a sheet under a legend, row by row.
-pub(super) fn draw(name: &str, look: &Look, layout: &Layout<'_>, legend: &[Entry], panels: Vec<Panel<'_>>) -> Picture {
-    let (page, mut sheet) = layout.page(name, look, legend);
+/// Draws panels row by row, under a legend. Those of a row are as high as the first.
+pub(super) fn draw(name: &str, look: &Look, mut layout: Layout, legend: &[Entry], panels: Vec<Panel<'_>>) -> Picture {
+    if panels.iter().any(|panel| panel.bar.is_some()) {
+        layout.right = COLOUR_BAR;
+    }
+    layout.has_headings = panels.iter().any(|panel| panel.heading.is_some());
+    let heights: Vec<f64> = panels.iter().step_by(layout.columns).map(|panel| panel.height).collect();
+    let (page, mut sheet) = layout.page(name, look, legend, &heights);
     let count = panels.len();
-    for (index, Panel { x, y, layers, notes, heading, bar }) in panels.into_iter().enumerate() {
-        let mut frame = page.frame(index / layout.columns, index % layout.columns, x, y);
+    for (index, panel) in panels.into_iter().enumerate() {
+        let mut frame = page.frame(index / layout.columns, index % layout.columns, panel.x, panel.y);
         frame.is_lowest = index + layout.columns >= count;
-        layers.into_iter().for_each(|layer| layer.draw(&mut sheet, &frame));
+        if panel.head > 0.0 {
+            let high = frame.y.high * frame.height / (frame.height - panel.head);
+            frame.y = Axis::sparse(&frame.y.label, frame.y.low, high);
+        }
+        panel.layers.into_iter().for_each(|layer| layer.draw(&mut sheet, &frame));
         frame.axes(&mut sheet);
-        notes.into_iter().for_each(|note| note.draw(&mut sheet, &frame));
-        if let Some((text, amount)) = heading {
+        panel.notes.into_iter().for_each(|note| note.draw(&mut sheet, &frame));
+        if let Some((text, amount)) = panel.heading {
             frame.heading(&mut sheet, &text, &amount);
         }
-        if let Some(bar) = bar {
+        if let Some(bar) = panel.bar {
             bar.draw(&mut sheet, &frame);
         }
     }

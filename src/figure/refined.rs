@@ -3,7 +3,7 @@
 
 use super::axis::{Axis, bounds};
 use super::dependence::{label, number};
-use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
@@ -14,8 +14,6 @@ use crate::reduce::{CellRow, SetRow};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, HashMap};
 
-const MAP: Layout = Layout::column(560.0, &[400.0], ROW_GAP, RIGHT);
-const LINE: Layout = Layout::column(490.0, &[300.0], ROW_GAP, RIGHT);
 /// Ratio of the largest to the least value above which a scale is logarithmic.
 const LOGARITHMIC: f64 = 20.0;
 /// Cells in which all sets are locked, or above the threshold.
@@ -92,9 +90,9 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     // The finest cells are seen by their colour.
     let outlines = placed.iter().filter(|(_, cell)| !cell.differs);
     let outlines = outlines.map(|((x, y), _)| Layer::Curve(vec![(x.0, y.1), (x.0, y.0), (x.1, y.0)], OUTLINE));
-    let layers = std::iter::once(Layer::Cells(cells, 0.0)).chain(outlines).collect();
-    let panel = Panel::new(exact(&x_label, x_ends), exact(&y_label, y_ends), vec![Layer::Inside(layers)]);
-    Some(panel::draw("refined-map", look, &MAP, &legend, vec![panel]))
+    let layers = std::iter::once(Layer::Cells(cells, 0.0)).chain(outlines);
+    let panel = Panel::inside(400.0, exact(&x_label, x_ends), exact(&y_label, y_ends), layers);
+    Some(panel::draw("refined-map", look, Layout::column(560.0), &legend, vec![panel]))
 }
 
 /// The edges along one axis against the one other quantity in which sets differ.
@@ -135,7 +133,7 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
         Layer::Bars(bands, Stroke::solid(INKS[0], BAR_WIDTH)),
         Layer::Dots(middles, Dot::solid(INKS[0], 0.7 * RADIUS)),
     ];
-    Some(panel::draw("refined-edge", look, &LINE, &legend, vec![Panel::new(x, y, layers)]))
+    Some(panel::draw("refined-edge", look, Layout::column(490.0), &legend, vec![Panel::new(300.0, x, y, layers)]))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Regimes: share of time within slips, mean friction and mean interval, along one parameter or over two.
 
 use super::axis::Axis;
-use super::colour_bar::{COLOUR_BAR, ColourBar};
+use super::colour_bar::ColourBar;
 use super::dependence::{Getter, Lines, label, number};
-use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::map::Map;
 use super::panel::{self, Layer, Panel};
@@ -14,8 +14,6 @@ use crate::model::Symbol;
 use crate::observe::Regime;
 use crate::reduce::{SetRow, Statistic};
 
-const LINES: Layout = Layout::column(558.0, &[190.0; 3], ROW_GAP, RIGHT);
-const MAP: Layout = Layout::column(490.0, &[220.0; 3], ROW_GAP, COLOUR_BAR);
 /// Least values of the parameter along which lines are drawn, and of each parameter of a map.
 const MIN_VALUES: usize = 4;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
@@ -53,10 +51,10 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
             _ => (Axis::of_data(label, ends, LOGARITHMIC, 0.0)?, &[][..]),
         };
         let levels = levels.iter().map(|&share| Layer::Level(share, REFERENCE));
-        Some(Panel::new(lines.axis(), y, levels.chain(lines.layers(statistic, is_sliding)).collect()))
+        Some(Panel::new(190.0, lines.axis(), y, levels.chain(lines.layers(statistic, is_sliding)).collect()))
     };
     let panels: Option<Vec<Panel<'_>>> = QUANTITIES.into_iter().map(panel).collect();
-    Some(panel::draw("regimes", look, &LINES, &entries, panels?))
+    Some(panel::draw("regimes", look, Layout::column(558.0), &entries, panels?))
 }
 
 /// Draws maps of sets in which two parameters besides the modulation differ, and that fill at least half of a grid of 4 by
@@ -92,11 +90,11 @@ pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             layers.extend(map.words(regime, word));
         }
         let (x, y) = map.axes(&label(horizontal), &label(vertical));
-        Some(Panel::new(x, y, layers).with_bar(Some(ColourBar::of_axis(name, &shades))))
+        Some(Panel { bar: Some(ColourBar::of_axis(name, &shades)), ..Panel::new(220.0, x, y, layers) })
     };
     let panels: Option<Vec<Panel<'_>>> = QUANTITIES.into_iter().map(panel).collect();
     let legend = [entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")];
-    Some(panel::draw("regime-map", look, &MAP, &legend, panels?))
+    Some(panel::draw("regime-map", look, Layout::column(490.0), &legend, panels?))
 }
 
 #[cfg(test)]

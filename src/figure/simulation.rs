@@ -2,8 +2,8 @@
 //! contacts (Fig. 4b, d) with the onsets of slips.
 
 use super::axis::{Axis, bounds};
-use super::colour_bar::{COLOUR_BAR, ColourBar};
-use super::frame::{Frame, Layout, OVERLAP, RIGHT, ROW_GAP};
+use super::colour_bar::ColourBar;
+use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Picture, Stroke, snapped};
@@ -16,11 +16,8 @@ use kuva::render::color::Color;
 use std::f64::consts::TAU;
 
 const NAME: &str = "simulation";
-/// Of the panels and all that stands right of them.
-const WIDTH: f64 = 684.0;
-const MODULATION_HEIGHT: f64 = 64.0;
-const TRACE_HEIGHT: f64 = 230.0;
-const MAP_HEIGHT: f64 = 260.0;
+/// Width of the panels without a map, and beside the colour bar of one.
+const WIDTHS: [f64; 2] = [658.0, 588.0];
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 const MODULATION: Stroke = Stroke::solid(BLUE, 1.6);
@@ -57,16 +54,13 @@ pub fn simulation(
     let period = parameters.modulation_period.filter(is_drawn);
     let onsets: Vec<f64> = onsets.iter().copied().filter(|onset| (first..=last).contains(onset)).collect();
 
-    let rows = [period.map(|_| MODULATION_HEIGHT), trace.map(|_| TRACE_HEIGHT), map.map(|_| MAP_HEIGHT)];
-    let heights: Vec<f64> = rows.into_iter().flatten().collect();
-    let right = if map.is_some() { COLOUR_BAR } else { RIGHT };
     let peaks = period.map_or_else(Vec::new, |period| x().multiples_of(period, MAX_PEAKS));
     let legend = [
         map.filter(|_| !onsets.is_empty()).map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
         (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
     ];
     let legend: Vec<_> = legend.into_iter().flatten().collect();
-    let layout = Layout::column(WIDTH - right, &heights, ROW_GAP, right);
+    let width = WIDTHS[usize::from(map.is_some())];
     let peaks = || peaks.iter().map(|&peak| Layer::Upright(peak, REFERENCE));
     let modulation = period.map(|period| {
         let amplitude = MICROMETRES * parameters.modulation_amplitude;
@@ -76,12 +70,12 @@ pub fn simulation(
         let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
         let curve = x().evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / period)));
         let level = std::iter::once(Layer::Level(0.0, GRID));
-        Panel::new(x(), y, inside(level.chain(peaks()).chain([Layer::Curve(curve.collect(), MODULATION)])))
+        Panel::inside(64.0, x(), y, level.chain(peaks()).chain([Layer::Curve(curve.collect(), MODULATION)]))
     });
     let force = trace.map(|trace| {
         let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
         let y = Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most);
-        Panel::new(x(), y, inside(peaks().chain([Layer::Curve(thinned(trace, layout.width), TRACE)])))
+        Panel::inside(230.0, x(), y, peaks().chain([Layer::Curve(thinned(trace, width), TRACE)]))
     });
     let contacts = map.map(|map| {
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, parameters.slider_length * MILLIMETRES);
@@ -90,14 +84,13 @@ pub fn simulation(
         let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0));
         percent.ticks =
             [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
-        Panel::new(x(), y, inside(std::iter::once(cells).chain(peaks()).chain(onsets))).with_bar(Some(percent))
+        Panel {
+            bar: Some(percent),
+            ..Panel::inside(260.0, x(), y, std::iter::once(cells).chain(peaks()).chain(onsets))
+        }
     });
     let panels = [modulation, force, contacts].into_iter().flatten().collect();
-    Ok(panel::draw(NAME, look, &layout, &legend, panels))
-}
-
-fn inside<'a>(layers: impl Iterator<Item = Layer<'a>>) -> Vec<Layer<'a>> {
-    vec![Layer::Inside(layers.collect())]
+    Ok(panel::draw(NAME, look, Layout::column(width), &legend, panels))
 }
 
 /// The least and the largest of the samples of each column of a figure: no peak is lost.

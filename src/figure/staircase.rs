@@ -2,7 +2,7 @@
 //! the locking index under it.
 
 use super::axis::Axis;
-use super::frame::{Layout, RIGHT, ROW_GAP};
+use super::frame::Layout;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
@@ -10,7 +10,6 @@ use super::sets::{Grid, Modulations, Periods, amplitude, ascending};
 use super::style::{GREY, GRID, INKS, Look, REFERENCE};
 use crate::reduce::SetRow;
 
-const LAYOUT: Layout = Layout::column(558.0, &[310.0, 160.0], ROW_GAP, RIGHT);
 /// Least values of the period that make a staircase.
 const MIN_PERIODS: usize = 24;
 /// Amplitudes that are easily distinguished.
@@ -60,8 +59,8 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
         indices.push(Layer::Dots(of_index.clone(), dot(ink)));
         indices.push(Layer::Curve(of_index, Stroke::solid(ink, 1.2)));
     }
-    let lower = Panel::new(x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
-    Some(panel::draw("staircase", look, &LAYOUT, &entries, vec![Panel::new(x, y, ratios), lower]))
+    let lower = Panel::new(160.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
+    Some(panel::draw("staircase", look, Layout::column(558.0), &entries, vec![Panel::new(310.0, x, y, ratios), lower]))
 }
 
 const fn dot(ink: Ink) -> Dot {

@@ -2,7 +2,7 @@
 //! method has an ink, a drive a pattern of the line and a mark. Errors that are chance are not joined by lines.
 
 use super::axis::{Axis, logarithmic_bounds};
-use super::frame::{Layout, RIGHT};
+use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Dot, Ink, Picture, Stroke};
@@ -12,7 +12,7 @@ use anyhow::{Result, anyhow};
 const NAME: &str = "work-precision";
 const WIDTH: f64 = 250.0;
 const COLUMN_GAP: f64 = 70.0;
-const HEIGHTS: [f64; 1] = [340.0];
+const HEIGHT: f64 = 340.0;
 /// Width of the bars of uncertainty.
 const UNCERTAINTY: f64 = 1.0;
 
@@ -85,7 +85,7 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
     let chance = has_chance.then(|| entry(Mark::Patch(STRIPE), "what chance alone gives in 95 of 100 cases"));
     let legend: Vec<_> = lines.chain(chance).collect();
-    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH, &HEIGHTS, 0.0, RIGHT) };
+    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
     let panel = |(column, panel): (usize, &ErrorPanel)| {
         // Lower ends may be 0: they run out of the panel.
         let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
@@ -97,10 +97,10 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
             Layer::Inside(layers(points, look_of(method, drive), x.low, panel.by_chance.is_none()))
         });
         let layers = chance.into_iter().chain(lines).collect();
-        Some(Panel::new(x, y, layers))
+        Some(Panel::new(HEIGHT, x, y, layers))
     };
     let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
-    Ok(panel::draw(NAME, look, &layout, &legend, panels.ok_or_else(empty)?))
+    Ok(panel::draw(NAME, look, layout, &legend, panels.ok_or_else(empty)?))
 }
 
 /// Each name once, in the order of first appearance.
