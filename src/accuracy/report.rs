@@ -3,7 +3,7 @@
 use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
 use super::{Stability, cost, other_settings};
-use crate::figure::{ErrorPanel, Look, MethodLine, Picture, WorkPrecision, work_precision};
+use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::commit::Commit;
 use crate::results::layout::Layout;
@@ -114,21 +114,20 @@ fn work_precision_figure(set: &Parameters, findings: &Findings) -> Result<Pictur
                         equal distributions stay under in 95 of 100 samples; bars: 95 %. \
                         Errors of break times: median, bars up to the largest.";
     const EXTRAPOLATED: &str = " * Cost extrapolated from that of a step.";
-    let breaks = lines(&findings.methods, set, |row| {
+    let breaks = points(&findings.methods, set, |row| {
         let (error, largest) = (row.break_times.median?, row.break_times.largest?);
-        Some(WorkPrecision { error, uncertainty: Some((error, largest)), work: row.cost.per_slip })
+        Some((error, (error, largest)))
     });
     let label = "Error of break times (s)".to_owned();
-    let mut panels = vec![ErrorPanel { label, by_chance: None, lines: breaks }];
+    let mut panels = vec![ErrorPanel { label, by_chance: None, points: breaks }];
     for (quantity, name) in [("interval", "τ"), ("front_speed", "front speed")] {
-        let lines = lines(&findings.methods, set, |row| {
+        let points = points(&findings.methods, set, |row| {
             let Distances { w1, w1_low, w1_high, w1_floor, .. } = findings.distances_of(row, quantity)?.distances;
-            let uncertainty = Some((w1_low / w1_floor, w1_high / w1_floor));
-            Some(WorkPrecision { error: w1 / w1_floor, uncertainty, work: row.cost.per_slip })
+            Some((w1 / w1_floor, (w1_low / w1_floor, w1_high / w1_floor)))
         });
-        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance level"), by_chance: Some(1.0), lines });
+        panels.push(ErrorPanel { label: format!("W₁ of {name} / chance level"), by_chance: Some(1.0), points });
     }
-    panels.retain(|panel| !panel.lines.is_empty());
+    panels.retain(|panel| !panel.points.is_empty());
     let others = other_settings(set).map(|(key, value)| format!(", {key} = {value}"));
     let mut mine = findings.methods.iter().filter(|row| unmodulated(&row.parameters) == *set);
     let extrapolated = if mine.any(|row| row.cost.is_extrapolated()) { EXTRAPOLATED } else { "" };
@@ -144,14 +143,17 @@ fn unmodulated(set: &Parameters) -> Parameters {
     Parameters { modulation_amplitude, modulation_period, ..set.clone() }
 }
 
-/// A line per method and modulation of the sets that are this one without.
-fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Option<WorkPrecision>) -> Vec<MethodLine> {
+/// Each method under each modulation of the sets that are this one without: `error` gives an error and its uncertainty.
+fn points(
+    rows: &[MethodRow],
+    set: &Parameters,
+    error: impl Fn(&MethodRow) -> Option<(f64, (f64, f64))>,
+) -> Vec<WorkPrecision> {
     let rows: Vec<&MethodRow> = rows.iter().filter(|row| unmodulated(&row.parameters) == *set).collect();
     let modulations = || rows.iter().filter(|row| row.parameters.modulation_amplitude > 0.0);
     let is_one = modulations().all(|row| modulations().next().is_some_and(|first| first.parameters == row.parameters));
-    let mut lines: Vec<MethodLine> = Vec::new();
-    for row in &rows {
-        let Some(point) = point(row) else { continue };
+    let point = |row: &&MethodRow| {
+        let (error, uncertainty) = error(row)?;
         let drive = match row.parameters.modulation_period {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
@@ -159,12 +161,9 @@ fn lines(rows: &[MethodRow], set: &Parameters, point: impl Fn(&MethodRow) -> Opt
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());
-        match lines.iter_mut().find(|line| line.method == method && line.drive == drive) {
-            Some(line) => line.points.push(point),
-            None => lines.push(MethodLine { method, drive, points: vec![point] }),
-        }
-    }
-    lines
+        Some(WorkPrecision { method, drive, error, uncertainty, work: row.cost.per_slip })
+    };
+    rows.iter().filter_map(point).collect()
 }
 
 #[cfg(test)]

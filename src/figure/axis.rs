@@ -45,6 +45,8 @@ const MANTISSAS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 
 /// power of ten that stands in the label.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
 const MAX_DECIMALS: usize = 3;
+/// Ratio of the largest to the least value above which a scale is logarithmic.
+pub(super) const DECADES: f64 = 20.0;
 /// Most ticks of any kind: values of which nothing can come have no end of them.
 const MAX_MULTIPLES: usize = 1000;
 /// No quantity is larger than this, nor smaller than its inverse.
@@ -144,6 +146,11 @@ impl Axis {
             Some((start, end)) if low > 0.0 && high > wide * low => Self::logarithmic(label, start, end),
             _ => Self::rounded(label, low.min(base), high),
         })
+    }
+
+    /// From `low` to `high`: logarithmic if these lie decades apart.
+    pub(super) fn spanning(label: &str, (low, high): (f64, f64)) -> Self {
+        if is_wide((low, high)) { Self::logarithmic(label, low, high) } else { Self::linear(label, low, high) }
     }
 
     /// Logarithmic from `low` to `high`, both > 0.
@@ -252,6 +259,11 @@ impl Axis {
             }
         })
     }
+}
+
+/// Whether values so far apart are seen on a logarithmic axis only.
+pub(super) fn is_wide((low, high): (f64, f64)) -> bool {
+    low > 0.0 && high > DECADES * low
 }
 
 /// Bounds of a logarithmic axis for data: a little wider than the data; `None` without any value > 0.

@@ -1,15 +1,12 @@
 //! Hues: a quantity as colours. Few values have inks of their own and stand in the legend, many a scale beside the frame.
 
-use super::axis::{Axis, bounds, logarithmic_bounds};
+use super::axis::Axis;
 use super::colour_bar::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
 use super::sets::ascending;
 use super::style::{INKS, SCALE};
 use kuva::render::color::Color;
-
-/// Ratio of the largest to the least value from which a scale is logarithmic.
-const WIDE: f64 = 20.0;
 
 /// How the values of a quantity become colours.
 pub(super) enum Hues {
@@ -22,10 +19,9 @@ impl Hues {
     /// For these values of a quantity with this label, each called as `word` says.
     pub(super) fn of(label: &str, values: impl Iterator<Item = f64>, word: impl Fn(f64) -> String) -> Self {
         let values = ascending(values.filter(|value| value.is_finite()));
-        if values.len() <= INKS.len() {
-            Self::Inks(values.into_iter().map(|value| (value, word(value))).collect())
-        } else {
-            Self::Scale(scale(label, &values))
+        match values[..] {
+            [low, .., high] if values.len() > INKS.len() => Self::Scale(Axis::spanning(label, (low, high))),
+            _ => Self::Inks(values.into_iter().map(|value| (value, word(value))).collect()),
         }
     }
 
@@ -54,16 +50,6 @@ impl Hues {
     pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
         let Self::Scale(axis) = self else { return None };
         Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis) })
-    }
-}
-
-/// An axis from the least to the largest of some ascending values.
-fn scale(label: &str, values: &[f64]) -> Axis {
-    let (low, high) = bounds(values.iter().copied()).unwrap_or((0.0, 1.0));
-    if low > 0.0 && high >= WIDE * low && logarithmic_bounds(values.iter().copied()).is_some() {
-        Axis::logarithmic(label, low, high)
-    } else {
-        Axis::linear(label, low, high)
     }
 }
 

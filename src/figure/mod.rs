@@ -43,7 +43,7 @@ pub use own::{OwnFigure, columns};
 pub use picture::{Format, Picture};
 pub use simulation::simulation;
 pub use style::{Look, Size, Style};
-pub use work_precision::{ErrorPanel, MethodLine, WorkPrecision, work_precision};
+pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.
 #[derive(Debug, thiserror::Error)]

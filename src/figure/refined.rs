@@ -1,7 +1,7 @@
 //! Refined grids: a map of cells of different size with the edge between two kinds of sets; and, along one axis, the edge
 //! against another parameter, each with the band in which it lies.
 
-use super::axis::{Axis, bounds};
+use super::axis::{Axis, bounds, is_wide};
 use super::dependence::{label, number};
 use super::frame::Layout;
 use super::legend::{Mark, entry};
@@ -14,8 +14,6 @@ use crate::reduce::{CellRow, SetRow};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, HashMap};
 
-/// Ratio of the largest to the least value above which a scale is logarithmic.
-const LOGARITHMIC: f64 = 20.0;
 /// Cells in which all sets are locked, or above the threshold.
 const YES: Ink = "#7fa8cf";
 /// Cells in which none is.
@@ -51,12 +49,6 @@ fn words(by: &str) -> [String; 2] {
     }
 }
 
-/// A logarithmic axis with these margins, as factors, for values over decades, else another.
-fn scale(label: &str, (low, high): Ends, margins: Ends, narrow: impl FnOnce() -> Axis) -> Axis {
-    let is_wide = low > 0.0 && high / low > LOGARITHMIC;
-    if is_wide { Axis::logarithmic(label, margins.0 * low, margins.1 * high) } else { narrow() }
-}
-
 type Quantity = Box<dyn Fn(&SetRow) -> Option<f64>>;
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
@@ -79,7 +71,6 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let [yes, no] = words(&first.by);
     let patch = |ink| Mark::Patch(Fill { ink, opacity: 1.0 });
     let legend = [entry(patch(YES), yes), entry(patch(NO), no), entry(patch(EDGE), "the edge lies here")];
-    let exact = |label: &str, ends: Ends| scale(label, ends, (1.0, 1.0), || Axis::linear(label, ends.0, ends.1));
     let colour = |cell: &CellRow| match cell.share {
         _ if cell.differs => EDGE,
         Some(share) if share > 0.5 => YES,
@@ -91,7 +82,7 @@ fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let outlines = placed.iter().filter(|(_, cell)| !cell.differs);
     let outlines = outlines.map(|((x, y), _)| Layer::Curve(vec![(x.0, y.1), (x.0, y.0), (x.1, y.0)], OUTLINE));
     let layers = std::iter::once(Layer::Cells(cells, 0.0)).chain(outlines);
-    let panel = Panel::inside(400.0, exact(&x_label, x_ends), exact(&y_label, y_ends), layers);
+    let panel = Panel::inside(400.0, Axis::spanning(&x_label, x_ends), Axis::spanning(&y_label, y_ends), layers);
     Some(panel::draw("refined-map", look, Layout::column(560.0), &legend, vec![panel]))
 }
 
@@ -119,14 +110,20 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
         .iter()
         .filter_map(|(cell, set)| Some((x_factor * of(set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
         .collect();
-    let (x_low, x_high) = bounds(points.iter().map(|point| point.0))?;
-    let (y_low, y_high) = bounds(points.iter().flat_map(|point| [point.1, point.2]))?;
+    let (x_ends, y_ends) =
+        (bounds(points.iter().map(|point| point.0))?, bounds(points.iter().flat_map(|point| [point.1, point.2]))?);
     let [yes, _] = words(&cells[0].by);
     let edge = if yes == "locked" { "locking" } else { &yes };
     let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
-    let margin = 0.05 * (x_high - x_low);
-    let x = scale(&x_label, (x_low, x_high), MARGINS, || Axis::linear(&x_label, x_low - margin, x_high + margin));
-    let y = scale(&y_label, (y_low, y_high), MARGINS, || Axis::rounded(&y_label, y_low, y_high));
+    let scale = |label: &str, ends: Ends, narrow: fn(&str, Ends) -> Axis| {
+        let wide = || Axis::logarithmic(label, MARGINS.0 * ends.0, MARGINS.1 * ends.1);
+        if is_wide(ends) { wide() } else { narrow(label, ends) }
+    };
+    let x = scale(&x_label, x_ends, |label, (low, high)| {
+        let margin = 0.05 * (high - low);
+        Axis::linear(label, low - margin, high + margin)
+    });
+    let y = scale(&y_label, y_ends, |label, (low, high)| Axis::rounded(label, low, high));
     let middles = points.iter().map(|&(x, low, high)| (x, y.middle(low, high))).collect();
     let bands = points.iter().map(|&(x, low, high)| (x, (low, high))).collect();
     let layers = vec![

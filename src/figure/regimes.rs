@@ -1,6 +1,6 @@
 //! Regimes: share of time within slips, mean friction and mean interval, along one parameter or over two.
 
-use super::axis::Axis;
+use super::axis::{Axis, DECADES};
 use super::colour_bar::ColourBar;
 use super::dependence::{Getter, Lines, label, number};
 use super::frame::Layout;
@@ -16,8 +16,6 @@ use crate::reduce::{SetRow, Statistic};
 
 /// Least values of the parameter along which lines are drawn, and of each parameter of a map.
 const MIN_VALUES: usize = 4;
-/// Ratio of the largest to the least value above which a scale is logarithmic.
-const LOGARITHMIC: f64 = 20.0;
 const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
 
 const SHARE: &str = "Share of time within slips";
@@ -48,7 +46,7 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let ends = sets.iter().filter_map(statistic).flat_map(Statistic::ends);
         let (y, levels) = match label {
             SHARE => (Axis::linear(label, -0.03, 1.03), &Regime::MIN_SHARES[..]),
-            _ => (Axis::of_data(label, ends, LOGARITHMIC, 0.0)?, &[][..]),
+            _ => (Axis::of_data(label, ends, DECADES, 0.0)?, &[][..]),
         };
         let levels = levels.iter().map(|&share| Layer::Level(share, REFERENCE));
         Some(Panel::new(190.0, lines.axis(), y, levels.chain(lines.layers(statistic, is_sliding)).collect()))
@@ -76,7 +74,7 @@ pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         let values = sets.iter().filter_map(statistic).map(|statistic| statistic.value);
         let shades = match name {
             SHARE => Axis::linear(name, 0.0, 1.0),
-            _ => Axis::of_data(name, values, LOGARITHMIC, 0.0)?,
+            _ => Axis::of_data(name, values, DECADES, 0.0)?,
         };
         let cells = map.coloured(|set| Some(shade(shades.place(statistic(set)?.value))));
         let borders = map.borders(|set| set.regime, BORDER);

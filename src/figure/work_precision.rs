@@ -4,7 +4,7 @@
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::Layout;
 use super::legend::{Mark, entry};
-use super::panel::{self, Layer, Panel};
+use super::panel::{self, Ends, Layer, Panel};
 use super::picture::{Dot, Ink, Picture, Stroke};
 use super::style::{INKS, Look, RADIUS, STRIPE, WHITE};
 use anyhow::{Result, anyhow};
@@ -21,30 +21,17 @@ type Pattern = (Option<(f64, f64)>, bool);
 
 const PATTERNS: [Pattern; 2] = [(None, false), (Some((5.0, 3.0)), true)];
 
-/// Error and cost of a method at one setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WorkPrecision {
-    /// Error, > 0.
-    pub error: f64,
-    /// Lower and upper end of the error's uncertainty, if it is known.
-    pub uncertainty: Option<(f64, f64)>,
-    /// Cost, > 0.
-    pub work: f64,
-}
-
-impl WorkPrecision {
-    fn is_usable(&self) -> bool {
-        self.error > 0.0 && self.work > 0.0
-    }
-}
-
-/// A method under one drive, setting by setting.
+/// Error and cost of a method at one setting, under one drive.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MethodLine {
+pub struct WorkPrecision {
     pub method: String,
     pub drive: String,
-    /// In the order of settings.
-    pub points: Vec<WorkPrecision>,
+    /// Error, > 0.
+    pub error: f64,
+    /// Lower and upper end of the error's uncertainty.
+    pub uncertainty: Ends,
+    /// Cost, > 0.
+    pub work: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -52,13 +39,26 @@ pub struct ErrorPanel {
     pub label: String,
     /// The largest error that chance alone gives, > 0, if it gives any.
     pub by_chance: Option<f64>,
-    /// A line for each method and drive.
-    pub lines: Vec<MethodLine>,
+    /// Those of a method under a drive in the order of settings.
+    pub points: Vec<WorkPrecision>,
 }
 
 impl ErrorPanel {
     fn usable(&self) -> impl Iterator<Item = &WorkPrecision> {
-        self.lines.iter().flat_map(|line| &line.points).filter(|point| point.is_usable())
+        self.points.iter().filter(|point| point.error > 0.0 && point.work > 0.0)
+    }
+
+    /// A method under a drive, on an axis of errors that begins at `least`: joined by a line unless errors are chance.
+    fn layer<'a>(&self, of: (&str, &str), (ink, (dashes, has_holes)): (Ink, Pattern), least: f64) -> Layer<'a> {
+        let points = || self.usable().filter(|point| (&*point.method, &*point.drive) == of);
+        let places = || points().map(|point| (point.error, point.work)).collect();
+        let line = self.by_chance.is_none().then(|| Layer::Curve(places(), Stroke { ink, width: 1.8, dashes }));
+        let bars = points().map(|WorkPrecision { uncertainty: (low, high), work, .. }| {
+            Layer::Curve(vec![(low.max(least), *work), (*high, *work)], Stroke::solid(ink, UNCERTAINTY))
+        });
+        let dots = Layer::Dots(places(), Dot::solid(ink, RADIUS));
+        let holes = has_holes.then(|| Layer::Dots(places(), Dot::solid(WHITE, RADIUS - 1.6)));
+        Layer::Inside(line.into_iter().chain(bars).chain([dots]).chain(holes).collect())
     }
 }
 
@@ -68,35 +68,30 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let empty = || anyhow!("figure {NAME}: there are no errors and costs to draw");
     let works = panels.iter().flat_map(ErrorPanel::usable).map(|point| point.work);
     let (least, most) = logarithmic_bounds(works).ok_or_else(empty)?;
-    let columns = panels.len();
-    let all = || panels.iter().flat_map(|panel| &panel.lines);
-    let (methods, drives) = (distinct(all().map(|line| &*line.method)), distinct(all().map(|line| &*line.drive)));
-    let place = |name: &str, names: &[&str]| names.iter().position(|known| *known == name).unwrap_or(0);
-    let look_of = |method: &str, drive: &str| {
-        (INKS[place(method, &methods) % INKS.len()], PATTERNS[place(drive, &drives) % PATTERNS.len()])
-    };
-    let each = methods.iter().flat_map(|method| drives.iter().map(move |drive| (*method, *drive)));
-    let known = each.filter(|(method, drive)| all().any(|line| (&*line.method, &*line.drive) == (method, drive)));
-    let lines = known.map(|(method, drive)| {
-        let (ink, (_, has_holes)) = look_of(method, drive);
+    let all = || panels.iter().flat_map(|panel| &panel.points);
+    let (methods, drives) = (distinct(all().map(|point| &*point.method)), distinct(all().map(|point| &*point.drive)));
+    let inks = methods.iter().zip(INKS.into_iter().cycle());
+    let looks = inks.flat_map(|(method, ink)| {
+        drives.iter().zip(PATTERNS.into_iter().cycle()).map(move |(drive, pattern)| ((*method, *drive), (ink, pattern)))
+    });
+    let is_known = |of: (&str, &str)| all().any(|point| (&*point.method, &*point.drive) == of);
+    let looks: Vec<_> = looks.filter(|(of, _)| is_known(*of)).collect();
+    let lines = looks.iter().map(|&((method, drive), (ink, (_, has_holes)))| {
         let mark = if has_holes { Mark::Ring(ink, RADIUS) } else { Mark::Dot(Dot::solid(ink, RADIUS)) };
         entry(mark, format!("{method}, {drive}"))
     });
     let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
     let chance = has_chance.then(|| entry(Mark::Patch(STRIPE), "what chance alone gives in 95 of 100 cases"));
     let legend: Vec<_> = lines.chain(chance).collect();
-    let layout = Layout { columns, column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
+    let layout = Layout { columns: panels.len(), column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
     let panel = |(column, panel): (usize, &ErrorPanel)| {
         // Lower ends may be 0: they run out of the panel.
-        let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.map_or(point.error, |ends| ends.1)]);
+        let ends = panel.usable().flat_map(|point| [point.error, point.uncertainty.1]);
         let (low, high) = logarithmic_bounds(ends.chain(panel.by_chance))?;
         let y = Axis::logarithmic(if column == 0 { work_label } else { "" }, least, most);
         let x = Axis::logarithmic(&panel.label, low, high);
         let chance = panel.by_chance.map(|by_chance| Layer::Stripe((low, by_chance), STRIPE));
-        let lines = panel.lines.iter().map(|MethodLine { method, drive, points }| {
-            Layer::Inside(layers(points, look_of(method, drive), x.low, panel.by_chance.is_none()))
-        });
-        let layers = chance.into_iter().chain(lines).collect();
+        let layers = chance.into_iter().chain(looks.iter().map(|&(of, look)| panel.layer(of, look, x.low))).collect();
         Some(Panel::new(HEIGHT, x, y, layers))
     };
     let panels: Option<Vec<Panel<'_>>> = panels.iter().enumerate().map(panel).collect();
@@ -113,40 +108,26 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     })
 }
 
-/// A method's settings, with the uncertainty of their errors, on an axis of errors that begins at `least`.
-fn layers<'a>(
-    points: &[WorkPrecision],
-    (ink, (dashes, has_holes)): (Ink, Pattern),
-    least: f64,
-    is_joined: bool,
-) -> Vec<Layer<'a>> {
-    let points = || points.iter().filter(|point| point.is_usable());
-    let places = || points().map(|point| (point.error, point.work)).collect();
-    let line = is_joined.then(|| Layer::Curve(places(), Stroke { ink, width: 1.8, dashes }));
-    let bars = points().filter_map(|point| {
-        let (low, high) = point.uncertainty?;
-        Some(Layer::Curve([low.max(least), high].map(|end| (end, point.work)).into(), Stroke::solid(ink, UNCERTAINTY)))
-    });
-    let holes = has_holes.then(|| Layer::Dots(places(), Dot::solid(WHITE, RADIUS - 1.6)));
-    line.into_iter().chain(bars).chain([Layer::Dots(places(), Dot::solid(ink, RADIUS))]).chain(holes).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_method_has_one_ink_in_all_panels_and_an_entry_for_each_drive() {
-        let point = |error| WorkPrecision { error, uncertainty: Some((0.0, 2.0 * error)), work: 0.01 };
-        let line = |(method, drive): &(&str, &str)| MethodLine {
-            method: (*method).to_owned(),
-            drive: (*drive).to_owned(),
-            points: vec![point(1e-6), point(1e-5)],
-        };
         let panel = |by_chance, lines: &[(&str, &str)]| ErrorPanel {
             label: "error".to_owned(),
             by_chance,
-            lines: lines.iter().map(line).collect(),
+            points: lines
+                .iter()
+                .flat_map(|(method, drive)| [1e-6, 1e-5].map(|error| (method, drive, error)))
+                .map(|(method, drive, error)| WorkPrecision {
+                    method: (*method).to_owned(),
+                    drive: (*drive).to_owned(),
+                    error,
+                    uncertainty: (0.0, 2.0 * error),
+                    work: 0.01,
+                })
+                .collect(),
         };
         let panels =
             [panel(None, &[("a", "quiet"), ("b", "quiet")]), panel(Some(1e-5), &[("b", "quiet"), ("b", "loud")])];
