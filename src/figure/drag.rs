@@ -73,7 +73,9 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
         slips.iter().map(|slip| Layer::Dots(vec![(slip.modulation, slip.interval)], slip_dot(STAGES[slip.stage].2)));
     let numbers: Vec<(f64, [Place; 2])> = multiples.iter().map(|&n| (n, line(n))).collect();
     let notes = vec![Layer::Drawn(Box::new(move |sheet, frame| {
-        numbers.into_iter().for_each(|(n, line)| number_line(sheet, frame, n, line));
+        for (n, line) in numbers {
+            number_line(sheet, frame, n, line);
+        }
     }))];
     let levels = multiples.iter().map(|&n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x.clone(), lower, levels.chain(medians_of(&slips, (low, high))));

@@ -12,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Cells across a region that has its word in it.
 const MIN_ACROSS: usize = 3;
 
+type Quantity<'a> = dyn Fn(&SetRow) -> Option<f64> + 'a;
+
 /// A column and a row of a map.
 type Position = (usize, usize);
 
@@ -23,11 +25,7 @@ pub(super) struct Map<'a> {
 
 impl<'a> Map<'a> {
     /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
-    pub(super) fn of(
-        sets: &[&'a SetRow],
-        quantities: [&dyn Fn(&SetRow) -> Option<f64>; 2],
-        min_values: usize,
-    ) -> Option<Self> {
+    pub(super) fn of(sets: &[&'a SetRow], quantities: [&Quantity<'_>; 2], min_values: usize) -> Option<Self> {
         let values = quantities.map(|quantity| ascending(sets.iter().filter_map(|set| quantity(set))));
         let is_grid = values.iter().all(|values| values.len() >= min_values)
             && 2 * sets.len() >= values[0].len() * values[1].len();

@@ -307,12 +307,8 @@ pub(super) mod tests {
         (0..count).map(row).collect()
     }
 
-    fn named(name: &str) -> Option<String> {
-        Some(name.to_owned())
-    }
-
     fn figure() -> OwnFigure {
-        OwnFigure { x: named("V0"), y: named("tau_mean"), ..OwnFigure::default() }
+        OwnFigure { x: Some("V0".into()), y: Some("tau_mean".into()), ..OwnFigure::default() }
     }
 
     fn svg(figure: &OwnFigure) -> String {
@@ -338,47 +334,59 @@ pub(super) mod tests {
         let plain = svg(&figure());
         assert!(plain.contains(">Drive velocity V₀ (10⁻⁶ m/s)<") && plain.contains(">Mean interval (s)<"));
         let bars = |svg: &str| svg.matches(&format!(r#"stroke-width="{BAR_WIDTH}""#)).count();
-        let no_interval = OwnFigure { y: named("eta"), ..figure() };
+        let no_interval = OwnFigure { y: Some("eta".into()), ..figure() };
         assert_eq!((bars(&plain), bars(&svg(&no_interval))), (8, 0));
-        let logarithmic = svg(&OwnFigure { log: named("xy"), ..figure() });
+        let logarithmic = svg(&OwnFigure { log: Some("xy".into()), ..figure() });
         assert!(logarithmic.contains(">10⁻⁵<") && !plain.contains(">10⁻⁵<"));
-        let colour = svg(&OwnFigure { colour: named("Delta"), ..figure() });
+        let colour = svg(&OwnFigure { colour: Some("Delta".into()), ..figure() });
         assert!(colour.contains(">Δ = 0 m<") && colour.contains(">Δ = 1e-6 m<") && colour.contains(INKS[1]));
-        let scale = svg(&OwnFigure { colour: named("V0"), ..figure() });
+        let scale = svg(&OwnFigure { colour: Some("V0".into()), ..figure() });
         assert!(scale.contains(">V₀ (m/s)<") && !scale.contains("V₀ = "));
-        let panels = svg(&OwnFigure { panels: named("Delta"), ..figure() });
+        let panels = svg(&OwnFigure { panels: Some("Delta".into()), ..figure() });
         assert!(panels.contains(">(a)<") && panels.contains(">(b)<") && panels.contains(">Δ = 0 m<"));
         let limits = svg(&OwnFigure { xlim: Some((Some(1e-6), Some(1e-5))), ..figure() });
         assert!(limits.contains("not shown: 4 of 8 sets, without a value or outside the axes"), "{limits}");
-        let label = svg(&OwnFigure { ylabel: named("τ"), ..figure() });
+        let label = svg(&OwnFigure { ylabel: Some("τ".into()), ..figure() });
         assert!(label.contains(">τ<") && !label.contains("Mean interval"));
-        let without = svg(&OwnFigure { colour: named("T"), ..figure() });
+        let without = svg(&OwnFigure { colour: Some("T".into()), ..figure() });
         assert!(without.contains(">T = 0.02 s<") && without.contains(">no T<"));
-        let words = svg(&OwnFigure { x: named("break_on"), ..figure() });
+        let words = svg(&OwnFigure { x: Some("break_on".into()), ..figure() });
         assert!(words.contains(">magnitude<"));
     }
 
     #[test]
     fn mistakes_are_refused_with_what_to_do() {
         for (figure, expected) in [
-            (OwnFigure { x: named("v0"), ..figure() }, "--x v0: no such column; did you mean V0?"),
-            (OwnFigure { colour: named("colour"), ..figure() }, "--colour colour: no such column; there are set_id"),
-            (OwnFigure { x: named("break_on"), log: named("x"), ..figure() }, "--log x: break_on holds words"),
+            (OwnFigure { x: Some("v0".into()), ..figure() }, "--x v0: no such column; did you mean V0?"),
             (
-                OwnFigure { x: named("break_on"), xlim: Some((Some(1.0), None)), ..figure() },
+                OwnFigure { colour: Some("colour".into()), ..figure() },
+                "--colour colour: no such column; there are set_id",
+            ),
+            (
+                OwnFigure { x: Some("break_on".into()), log: Some("x".into()), ..figure() },
+                "--log x: break_on holds words",
+            ),
+            (
+                OwnFigure { x: Some("break_on".into()), xlim: Some((Some(1.0), None)), ..figure() },
                 "--xlim 1:: break_on holds words",
             ),
-            (OwnFigure { y: named("drop_mean"), ..figure() }, "no set has a value of both V0 and drop_mean"),
-            (OwnFigure { y: named("eta"), x: named("T_to"), log: named("y"), ..figure() }, "no set has a value > 0"),
+            (OwnFigure { y: Some("drop_mean".into()), ..figure() }, "no set has a value of both V0 and drop_mean"),
+            (
+                OwnFigure { y: Some("eta".into()), x: Some("T_to".into()), log: Some("y".into()), ..figure() },
+                "no set has a value > 0",
+            ),
             (OwnFigure { xlim: Some((Some(2.0), Some(1.0))), ..figure() }, "--xlim 2:1: the lower end must be less"),
-            (OwnFigure { xlim: Some((Some(-1.0), None)), log: named("x"), ..figure() }, "--xlim -1:: must be > 0"),
+            (
+                OwnFigure { xlim: Some((Some(-1.0), None)), log: Some("x".into()), ..figure() },
+                "--xlim -1:: must be > 0",
+            ),
             (OwnFigure { xlim: Some((Some(1.0), Some(2.0))), ..figure() }, "none of 8 sets lies within"),
-            (OwnFigure { panels: named("regime"), ..figure() }, "--panels regime: no set has a value of it"),
+            (OwnFigure { panels: Some("regime".into()), ..figure() }, "--panels regime: no set has a value of it"),
         ] {
             let found = problem(&figure);
             assert!(found.contains(expected), "{found}");
         }
-        let many = OwnFigure { panels: named("V0"), ..figure() };
+        let many = OwnFigure { panels: Some("V0".into()), ..figure() };
         let error = own(&rows(12), &many, &Look::default()).err().unwrap().to_string();
         assert!(
             error.contains("--panels V0: has 12 values, and 9 panels fit a page; show it with --colour"),

@@ -16,6 +16,8 @@ pub(super) type Ends = (f64, f64);
 /// A rectangle of data: its ends along x and along y.
 pub(super) type Cell = (Ends, Ends);
 
+pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Sheet, &Frame) + 'a>;
+
 /// What is drawn in a panel, in units of its axes.
 pub(super) enum Layer<'a> {
     /// What lies inside the frame of other layers.
@@ -37,7 +39,7 @@ pub(super) enum Layer<'a> {
     /// A short text in the middle of a cell of this shade.
     Word(Cell, String, f64),
     /// What depends on the size of the frame.
-    Drawn(Box<dyn FnOnce(&mut Sheet, &Frame) + 'a>),
+    Drawn(Drawing<'a>),
 }
 
 impl Layer<'_> {
@@ -52,7 +54,9 @@ impl Layer<'_> {
     fn draw(self, sheet: &mut Sheet, frame: &Frame) {
         match self {
             Self::Inside(layers) => sheet.clipped([frame.left, frame.top, frame.width, frame.height], |sheet| {
-                layers.into_iter().for_each(|layer| layer.draw(sheet, frame));
+                for layer in layers {
+                    layer.draw(sheet, frame);
+                }
             }),
             Self::Curve(points, stroke) => {
                 sheet.line(points.into_iter().map(|point| frame.place(point)).collect(), stroke);
@@ -140,9 +144,13 @@ pub(super) fn draw(name: &str, look: &Look, mut layout: Layout, legend: &[Entry]
             let high = frame.y.high * frame.height / (frame.height - panel.head);
             frame.y = Axis::sparse(&frame.y.label, frame.y.low, high);
         }
-        panel.layers.into_iter().for_each(|layer| layer.draw(&mut sheet, &frame));
+        for layer in panel.layers {
+            layer.draw(&mut sheet, &frame);
+        }
         frame.axes(&mut sheet);
-        panel.notes.into_iter().for_each(|note| note.draw(&mut sheet, &frame));
+        for note in panel.notes {
+            note.draw(&mut sheet, &frame);
+        }
         if let Some((text, amount)) = panel.heading {
             frame.heading(&mut sheet, &text, &amount);
         }
