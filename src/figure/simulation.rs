@@ -3,10 +3,10 @@
 
 use super::axis::{Axis, bounds};
 use super::colour_bar::ColourBar;
-use super::frame::{Frame, Layout, OVERLAP};
+use super::frame::{Layout, OVERLAP};
 use super::legend::{Mark, entry};
-use super::panel::{self, Layer, Panel, Place};
-use super::picture::{Picture, Stroke, snapped};
+use super::panel::{self, Cell, Layer, Panel, Place};
+use super::picture::{Picture, Stroke};
 use super::sets::{MICROMETRES, common};
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
@@ -78,8 +78,9 @@ pub fn simulation(
         Panel::inside(230.0, x(), y, peaks().chain([Layer::Curve(thinned(trace, width), TRACE)]))
     });
     let contacts = map.map(|map| {
-        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, parameters.slider_length * MILLIMETRES);
-        let cells = Layer::Drawn(Box::new(move |sheet, frame| sheet.rectangles(cells(frame, map, blocks))));
+        let length = parameters.slider_length * MILLIMETRES;
+        let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
+        let cells = Layer::Cells(cells(map, blocks, first, length, width), OVERLAP);
         let onsets = onsets.iter().map(|&onset| Layer::Upright(onset, ONSET));
         let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0));
         percent.ticks =
@@ -111,17 +112,17 @@ fn thinned(trace: &[Place], width: f64) -> Vec<Place> {
     trace.chunks(samples).flat_map(extremes).collect()
 }
 
-/// Rectangles of the map: averages over the instants of a column one unit wide, equal neighbours joined.
-fn cells(frame: &Frame, map: &[MapRow], blocks: usize) -> Vec<([f64; 4], Color)> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
-    let columns = (frame.width as usize).min(map.len() / blocks);
+/// Cells of the map on axes of this time and length: averages over the instants of a column one unit wide, equal
+/// neighbours joined.
+fn cells(map: &[MapRow], blocks: usize, first: f64, length: f64, width: f64) -> Vec<(Cell, Color)> {
     let (instants, time) = (map.len() / blocks, |instant: usize| map[instant * blocks].time);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the width of a figure")]
+    let columns = (width as usize).min(instants);
     // Half a spacing on both sides of an instant belongs to it.
     let spacing = (time(instants - 1) - time(0)) / (instants - 1) as f64;
     let start_of = |column: usize| column * instants / columns;
-    let left_of =
-        |column: usize| snapped(frame.x_of(time(0) + (start_of(column) as f64 - 0.5) * spacing).max(frame.left));
-    let top_of = |block: usize| snapped(frame.top + frame.height * (1.0 - block as f64 / blocks as f64));
+    let left_of = |column: usize| (time(0) + (start_of(column) as f64 - 0.5) * spacing).max(first);
+    let bottom_of = |block: usize| length * block as f64 / blocks as f64;
     let level = |block: usize, column: usize| {
         let span = start_of(column)..start_of(column + 1);
         let count = span.len() as f64;
@@ -131,11 +132,10 @@ fn cells(frame: &Frame, map: &[MapRow], blocks: usize) -> Vec<([f64; 4], Color)>
     let mut cells = Vec::new();
     for block in 0..blocks {
         let levels: Vec<f64> = (0..columns).map(|column| level(block, column)).collect();
-        let (top, bottom) = (top_of(block + 1), top_of(block));
         let mut column = 0;
         for run in levels.chunk_by(|left, right| left == right) {
-            let (left, right) = (left_of(column), left_of(column + run.len()));
-            cells.push(([left, top, right - left + OVERLAP, bottom - top + OVERLAP], shade(1.0 - run[0] / LEVELS)));
+            let times = (left_of(column), left_of(column + run.len()));
+            cells.push(((times, (bottom_of(block), bottom_of(block + 1))), shade(1.0 - run[0] / LEVELS)));
             column += run.len();
         }
     }
