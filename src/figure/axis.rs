@@ -8,17 +8,6 @@ enum Scale {
     Logarithmic,
 }
 
-/// How an axis gets more ticks with a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Finer {
-    /// It has those that there are.
-    Never,
-    /// By smaller steps; the numbers are those of the values over this power of ten.
-    Steps(i32),
-    /// By more mantissas in a decade.
-    Mantissas,
-}
-
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     /// What it shows, with its unit; an empty label is not drawn.
@@ -28,8 +17,8 @@ pub(super) struct Axis {
     pub(super) low: f64,
     pub(super) high: f64,
     scale: Scale,
-    /// What finer ticks would be.
-    finer: Finer,
+    /// Power of ten over which the numbers of a linear axis are; `None` if its ticks are given.
+    power: Option<i32>,
     pub(super) ticks: Vec<(f64, String)>,
     pub(super) minor: Vec<f64>,
 }
@@ -76,10 +65,8 @@ impl Axis {
         // Thousandths, millionths, thousands, ...: those that units have prefixes for.
         let is_scaled = is_small || (WRITTEN_OUT.end..LARGEST).contains(&largest);
         let power = if is_scaled { 3 * exponent(largest).div_euclid(3) } else { 0 };
-        let axis = Self {
-            finer: Finer::Steps(power),
-            ..Self::fixed(&with_power(label, power), (low, high), Vec::new(), Vec::new())
-        };
+        let axis =
+            Self { power: Some(power), ..Self::fixed(&with_power(label, power), (low, high), Vec::new(), Vec::new()) };
         axis.with_steps(nice_step((high - low) / max_ticks), power)
     }
 
@@ -109,21 +96,21 @@ impl Axis {
         if self.ticks.len() >= FEWEST {
             return self;
         }
-        match self.finer {
-            Finer::Never => self,
-            Finer::Mantissas => {
-                let levels = MANTISSAS.map(|mantissas| self.clone().with_mantissas(mantissas));
-                levels.into_iter().find(|axis| axis.ticks.len() >= FEWEST).unwrap_or(self)
+        let has_enough = |axis: &Self| axis.ticks.len() >= FEWEST;
+        let finer = match (self.scale, self.power) {
+            (Scale::Logarithmic, _) => {
+                MANTISSAS.into_iter().map(|mantissas| self.clone().with_mantissas(mantissas)).find(has_enough)
             }
-            Finer::Steps(power) => {
-                let (few, strip) = (FEWEST as f64, self.minor.is_empty());
-                let step = nice_step((self.high - self.low) / few);
+            (Scale::Linear, Some(power)) => {
+                let step = nice_step((self.high - self.low) / FEWEST as f64);
                 let steps = [1.0, 0.5, 0.4, 0.2, 0.1].map(|share| nice_step(share * step));
-                let finer = steps.into_iter().map(|step| self.clone().with_steps(step, power));
-                let found = finer.into_iter().find(|axis| axis.ticks.len() >= FEWEST).unwrap_or(self);
-                if strip { Self { minor: Vec::new(), ..found } } else { found }
+                steps.into_iter().map(|step| self.clone().with_steps(step, power)).find(has_enough)
             }
-        }
+            (Scale::Linear, None) => None,
+        };
+        let is_bare = self.minor.is_empty();
+        let axis = finer.unwrap_or(self);
+        if is_bare { Self { minor: Vec::new(), ..axis } } else { axis }
     }
 
     /// Linear between the round numbers that enclose `low` and `high`.
@@ -156,11 +143,7 @@ impl Axis {
     /// Logarithmic from `low` to `high`, both > 0.
     pub(super) fn logarithmic(label: &str, low: f64, high: f64) -> Self {
         let [low, high] = [low, high].map(|end| end.clamp(1.0 / LARGEST, LARGEST));
-        let axis = Self {
-            scale: Scale::Logarithmic,
-            finer: Finer::Mantissas,
-            ..Self::fixed(label, (low, high), Vec::new(), Vec::new())
-        };
+        let axis = Self { scale: Scale::Logarithmic, ..Self::fixed(label, (low, high), Vec::new(), Vec::new()) };
         axis.with_mantissas(MANTISSAS[usize::from(libm::log10(high / low) < 2.0)])
     }
 
@@ -207,7 +190,7 @@ impl Axis {
 
     fn fixed(label: &str, (low, high): (f64, f64), ticks: Vec<(f64, String)>, minor: Vec<f64>) -> Self {
         let label = label.to_owned();
-        Self { label, short_label: None, low, high, scale: Scale::Linear, finer: Finer::Never, ticks, minor }
+        Self { label, short_label: None, low, high, scale: Scale::Linear, power: None, ticks, minor }
     }
 
     /// Its label where there is little room.

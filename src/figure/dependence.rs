@@ -6,7 +6,7 @@ use super::frame::Layout;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Picture};
-use super::sets::{Grid, distinct, modulation, parameter, swept};
+use super::sets::{Grid, ascending, modulation, parameter, swept};
 use super::style::{INKS, Look, RADIUS, WHITE, curve, dot};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetRow, Statistic};
@@ -97,8 +97,8 @@ impl<'a> Lines<'a> {
     }
 
     pub(super) fn axis(&self) -> Axis {
-        let values = distinct(self.lines.iter().flatten().copied(), |parameters| number(parameters, self.symbol));
-        Grid::of(values).wider_axis(&label(self.symbol))
+        let values = self.lines.iter().flatten().filter_map(|set| number(&set.parameters, self.symbol));
+        Grid::of(ascending(values)).wider_axis(&label(self.symbol))
     }
 
     pub(super) fn legend(&self) -> Vec<Entry> {

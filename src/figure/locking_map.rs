@@ -8,7 +8,7 @@ use super::legend::{Mark, entry};
 use super::map::Map;
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Fill, Ink, Picture, Stroke};
-use super::sets::{MICROMETRES, Modulations, Periods, is_modulated};
+use super::sets::{MICROMETRES, Modulations, Periods};
 use super::style::{BLACK, Look, WHITE, shade};
 use crate::reduce::SetRow;
 use kuva::render::color::Color;
@@ -31,7 +31,8 @@ const FREE: Ink = "#f2f2f0";
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.
 pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
-    let Modulations { modulated, periods, .. } = Modulations::of(sets.iter().filter(|set| is_modulated(set)))?;
+    let Modulations { modulated, periods, .. } =
+        Modulations::of(sets.iter().filter(|set| set.parameters.modulation_period.is_some()))?;
     let periods = Periods::of(&periods, None);
     let place = |set: &SetRow| set.parameters.modulation_period.map(|period| periods.place(period));
     let map =

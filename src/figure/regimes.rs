@@ -8,7 +8,7 @@ use super::legend::{Mark, entry};
 use super::map::Map;
 use super::panel::{self, Layer, Panel};
 use super::picture::{Picture, Stroke};
-use super::sets::{distinct, swept};
+use super::sets::{ascending, swept};
 use super::style::{BLACK, Look, RADIUS, REFERENCE, shade};
 use crate::model::Symbol;
 use crate::observe::Regime;
@@ -30,7 +30,7 @@ const QUANTITIES: [(&str, Getter); 3] = [
 pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let [symbol] = swept(&sets.iter())[..] else { return None };
     let is_plain = sets.iter().all(|set| set.regime == Some(Regime::StickSlip));
-    let values = distinct(sets.iter(), |parameters| number(parameters, symbol));
+    let values = ascending(sets.iter().filter_map(|set| number(&set.parameters, symbol)));
     if values.len() < MIN_VALUES || (is_plain && !matches!(symbol, Symbol::V0 | Symbol::TauR)) {
         return None;
     }

@@ -38,23 +38,12 @@ impl<'a> Modulations<'a> {
         if !swept(&sets).is_empty() {
             return None;
         }
-        let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) = sets.partition(|set| is_modulated(set));
-        let amplitudes = distinct(modulated.iter().copied(), |parameters| Some(parameters.modulation_amplitude));
-        let periods = distinct(modulated.iter().copied(), |parameters| parameters.modulation_period);
+        let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) =
+            sets.partition(|set| set.parameters.modulation_period.is_some());
+        let amplitudes = ascending(modulated.iter().map(|set| set.parameters.modulation_amplitude));
+        let periods = ascending(modulated.iter().filter_map(|set| set.parameters.modulation_period));
         Some(Self { modulated, free: free.first().copied(), amplitudes, periods })
     }
-}
-
-pub(super) fn is_modulated(set: &SetRow) -> bool {
-    set.parameters.modulation_period.is_some()
-}
-
-/// The distinct values of a quantity, ascending.
-pub(super) fn distinct<'a>(
-    sets: impl Iterator<Item = &'a SetRow>,
-    quantity: impl Fn(&Parameters) -> Option<f64>,
-) -> Vec<f64> {
-    ascending(sets.filter_map(|set| quantity(&set.parameters)))
 }
 
 /// Each value once, in their order.
