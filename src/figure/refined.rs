@@ -7,8 +7,9 @@ use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
-use super::sets::MICROMETRES;
+use super::sets::{MICROMETRES, ascending};
 use super::style::{BAR_WIDTH, INKS, LIGHT_GREY, Look, RADIUS, WHITE, dot};
+use super::values::FREQUENCY_COLUMN;
 use crate::model::Symbol;
 use crate::reduce::{CellRow, SetRow};
 use kuva::render::color::Color;
@@ -31,11 +32,19 @@ pub(super) fn refined(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option
 /// Label of an axis, and the factor to its unit.
 fn axis_of(key: &str) -> (String, f64) {
     match (key, Symbol::from_key(key)) {
-        ("frequency", _) => ("Frequency 1/T (Hz)".to_owned(), 1.0),
+        (FREQUENCY_COLUMN, _) => ("Frequency 1/T (Hz)".to_owned(), 1.0),
         ("eta", _) => ("η".to_owned(), 1.0),
         (_, Some(Symbol::Delta)) => ("Amplitude Δ (µm)".to_owned(), MICROMETRES),
         (_, Some(symbol)) => (label(symbol), 1.0),
         (key, None) => (key.to_owned(), 1.0),
+    }
+}
+
+/// A parameter of a set, or the frequency.
+fn value(key: &str, set: &SetRow) -> Option<f64> {
+    match Symbol::from_key(key) {
+        Some(symbol) => number(&set.parameters, symbol),
+        None => set.parameters.modulation_period.map(|period| 1.0 / period),
     }
 }
 
@@ -48,8 +57,6 @@ fn words(by: &str) -> [String; 2] {
         None => [by.to_owned(), "not so".to_owned()],
     }
 }
-
-type Quantity = Box<dyn Fn(&SetRow) -> Option<f64>>;
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let first = cells.first()?;
@@ -93,22 +100,16 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
     let bands: Vec<(&CellRow, &SetRow)> =
         at_edges.filter_map(|cell| Some((cell, *by_id.get(cell.set_id.as_deref()?)?))).collect();
     let refined = &cells.first()?.x;
-    let quantities = Symbol::ALL.into_iter().filter(|symbol| *symbol != Symbol::Seed).filter_map(|symbol| {
-        let (key, of): (_, Quantity) = match symbol {
-            Symbol::T => ("frequency", Box::new(|set| set.parameters.modulation_period.map(|period| 1.0 / period))),
-            symbol => (symbol.key(), Box::new(move |set| number(&set.parameters, symbol))),
-        };
-        let is_refined = key == refined || (symbol == Symbol::T && ["T", "eta"].contains(&refined.as_str()));
-        let mut values = bands.iter().filter_map(|(_, set)| of(set));
-        let first = values.next()?;
-        (!is_refined && values.any(|value| value != first)).then_some((key, of))
-    });
-    let quantities: Vec<_> = quantities.collect();
-    let [(key, of)] = quantities.as_slice() else { return None };
+    let is_refined =
+        |key: &str| key == refined || (key == FREQUENCY_COLUMN && ["T", "eta"].contains(&refined.as_str()));
+    let differs = |key: &str| ascending(bands.iter().filter_map(|(_, set)| value(key, set))).len() > 1;
+    let parameters = Symbol::ALL.into_iter().filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
+    let keys = parameters.map(Symbol::key).chain([FREQUENCY_COLUMN]);
+    let [key] = keys.filter(|key| !is_refined(key) && differs(key)).collect::<Vec<_>>()[..] else { return None };
     let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(key), axis_of(refined));
     let points: Vec<(f64, f64, f64)> = bands
         .iter()
-        .filter_map(|(cell, set)| Some((x_factor * of(set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
+        .filter_map(|(cell, set)| Some((x_factor * value(key, set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
         .collect();
     let (x_ends, y_ends) =
         (bounds(points.iter().map(|point| point.0))?, bounds(points.iter().flat_map(|point| [point.1, point.2]))?);
