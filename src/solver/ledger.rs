@@ -55,8 +55,6 @@ pub(super) struct Audit {
     pub quadrature: Quadrature,
     pub damping: Cell<f64>,
     pub left_out: Cell<f64>,
-    /// Work of the drive on motion that the segments do not show.
-    pub unseen_work: Cell<f64>,
     pub elastic: Cell<f64>,
     pub kinetic: Cell<f64>,
 }
@@ -65,7 +63,7 @@ impl Audit {
     fn new() -> Self {
         let zero = || Cell::new(0.0);
         let quadrature = Quadrature::new();
-        Self { quadrature, damping: zero(), left_out: zero(), unseen_work: zero(), elastic: zero(), kinetic: zero() }
+        Self { quadrature, damping: zero(), left_out: zero(), elastic: zero(), kinetic: zero() }
     }
 
     /// Adds to an entry, in J.
@@ -87,7 +85,7 @@ impl Meter<'_> {
     fn so_far(&self) -> Spent {
         let Self { audit, work, broken, .. } = self;
         let damping = audit.damping.get() + audit.left_out.get();
-        Spent { work: work + audit.unseen_work.get(), damping, broken: *broken }
+        Spent { work: *work, damping, broken: *broken }
     }
 }
 

@@ -1,15 +1,13 @@
 //! What the event-driven solver enters into the energy ledger: damping along series and leaps, and what is stored at
 //! the end.
 
-use super::Integration;
 use super::chain::{Chain, State};
 use super::kernels::Kernels;
 use super::series::Series;
 use super::slider::Slider;
 use super::split::{BlockMotion, Split};
 use crate::solver::harmonic::Harmonic;
-use crate::solver::ledger::{Audit, work};
-use crate::solver::segment::Segment;
+use crate::solver::ledger::Audit;
 
 impl Audit {
     /// Enters the damping loss over a part of a step of `length` s: ∫ mγ Σ v² dt, exact for the polynomial.
@@ -84,38 +82,6 @@ impl Audit {
         self.kinetic.set(0.5 * chain.mass * speeds.map(|v| v * v).sum::<f64>());
         let chained = chain.mass * chain.coupling[0][0] * stretched;
         self.elastic.set(0.5 * (chained + sprung) + interface.elastic_energy(&displacements));
-    }
-}
-
-impl Integration<'_> {
-    /// Resolves a leap that carried the free motion over again in Taylor steps, for the energies. `reported` is its
-    /// force without the free motion.
-    pub(super) fn audit_carried_leap(&mut self, before: State, reported: &Segment<'_>) {
-        let elapsed = reported.duration;
-        let after = std::mem::replace(&mut self.slider.state, before);
-        let (start, min_orders, mut done) = (self.frame.time, self.control.min_orders, 0.0);
-        while done < elapsed {
-            let left = elapsed - done;
-            if self.expand(left).is_err() {
-                break;
-            }
-            let length = self.step.length;
-            let s = (left / length).min(1.0);
-            if let Some(audit) = self.audit {
-                audit.follow_series(&*self.kernels, &self.slider.chain, &self.step.series, [0.0, s], length);
-                let resolved = self.step.segment_to(s, self.frame.now());
-                Audit::add(&audit.unseen_work, work(&self.frame.drive, &audit.quadrature, &resolved));
-            }
-            self.kernels.evaluate(&self.step.series, s, length, &mut self.slider.state);
-            done = if s < 1.0 { elapsed } else { done + length };
-            self.frame.set_time(start + done);
-        }
-        self.slider.state = after;
-        self.control.min_orders = min_orders;
-        self.frame.set_time(start);
-        if let Some(audit) = self.audit {
-            Audit::add(&audit.unseen_work, -work(&self.frame.drive, &audit.quadrature, reported));
-        }
     }
 }
 

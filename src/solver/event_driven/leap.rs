@@ -2,8 +2,8 @@
 //!
 //! Between events the motion is a driven solution and a free motion about it, which decays and is bounded for each block ([`super::split`]). A leap may therefore start while the free motion is still
 //! large, if the bound shows that meanwhile no block reaches a break position, and that the shear force has been or
-//! will be larger than it can be meanwhile. If the free motion has fallen under the tolerance when the next event
-//! comes, it is dropped; if not, and no mode is overdamped, it is carried over in one go ([`super::chebyshev`]).
+//! will be larger than it can be meanwhile. What is left of the free motion when the next event comes
+//! has fallen under the tolerance, and is dropped.
 //! Contract: a leap leaves out at most `tolerance` · f_s/k of any block's displacement at its end, no event on the way,
 //! and no largest shear force.
 
@@ -20,9 +20,6 @@ use std::f64::consts::TAU;
 /// How far beyond a leap under modulation a larger shear force is looked for, in units of 1/γ.
 const LOOK_AHEAD: f64 = 10.0;
 
-/// Part of the error of a leap that each term which the propagator leaves out may have.
-const PROPAGATED_SHARE: f64 = 1e-3;
-
 /// Part of the error of a leap that the reattachments passed by it may add up to.
 const PASSED_SHARE: f64 = 0.2;
 /// Free motion at which a contact may attach on the driven solution, in errors of a leap.
@@ -30,9 +27,6 @@ const LOOSE: f64 = 3.0;
 /// How far a passed contact may be astray, in errors of a leap: by free motion where it attaches and later, and by what the
 /// others displace.
 const ASTRAY: f64 = 2.0 * LOOSE + PASSED_SHARE;
-
-/// Longest time to carry the free motion over, in units of the shortest time scale of the slider: some 20 MB.
-const MAX_CARRIED_ANGLE: f64 = 1e6;
 
 /// A leap that may be taken.
 #[derive(Clone, Copy, Debug)]
@@ -43,8 +37,6 @@ pub(super) struct Plan {
     pub reached: Option<usize>,
     /// Whether it ends at the horizon.
     pub is_whole: bool,
-    /// The part of the free motion's bound that is left then, if it must be carried over.
-    pub carried: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -122,23 +114,18 @@ fn plan<S: Simd>(
     bounds: Bounds,
 ) -> Result<Plan, f64> {
     let Bounds { horizon, error, .. } = bounds;
-    let decay_rate = split.decay_rate;
     // Worth another try after some e-foldings of the free motion, or after the next event.
-    let wait = (0.7 / decay_rate).min(horizon);
-    let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / decay_rate };
-    let is_short = decay >= horizon;
-    if is_short && decay_rate < 0.5 * chain.damping_rate {
+    let wait = (0.7 / split.decay_rate).min(horizon);
+    let decay = if largest <= error { 0.0 } else { libm::log(largest / error) / split.decay_rate };
+    if decay >= horizon {
         return Err(horizon);
     }
-    let horizon = if is_short { horizon.min(max_carried_time(chain)) } else { horizon };
-    let moving = decay.min(horizon);
-    let left = if is_short { libm::exp(-decay_rate * horizon) } else { error / largest };
-    if decay > 0.0 && !stays_clear(simd, chain, split, moving, left) {
+    let left = error / largest;
+    if decay > 0.0 && !stays_clear(simd, chain, split, decay, left) {
         return Err(wait);
     }
-    let (elapsed, reached) =
-        if is_short { (horizon, None) } else { first_reached(simd, chain, split, drive, [decay, horizon]) };
-    if elapsed <= decay && decay > 0.0 && !is_short {
+    let (elapsed, reached) = first_reached(simd, chain, split, drive, [decay, horizon]);
+    if elapsed <= decay && decay > 0.0 {
         return Err(wait);
     }
     if !elapsed.is_finite() {
@@ -146,16 +133,10 @@ fn plan<S: Simd>(
     }
     let path = split.driven(chain, 0).force_path(drive, chain.drive_stiffness);
     let segment = Segment { start: 0.0, duration: elapsed, path };
-    if largest > error && !hides_no_peak(simd, split, chain, interface, drive, &segment, [moving, left], bounds) {
+    if largest > error && !hides_no_peak(simd, split, (chain, interface), drive, &segment, [decay, left], bounds) {
         return Err(wait);
     }
-    Ok(Plan { segment, reached, is_whole: elapsed == bounds.horizon, carried: is_short.then_some(left) })
-}
-
-/// How long the free motion may be carried over in one leap, in s, so that work and memory are bounded.
-fn max_carried_time(chain: &Chain) -> f64 {
-    let widest = chain.diagonal.iter().flat_map(|row| row.iter()).fold(0.0_f64, |most, diagonal| most.max(*diagonal));
-    MAX_CARRIED_ANGLE / (widest + 2.0 * chain.coupling[0][0]).sqrt()
+    Ok(Plan { segment, reached, is_whole: elapsed == horizon })
 }
 
 /// Whether the free motion of the first `moving` s, of which a part `left` remains then, hides no largest shear force: one
@@ -164,8 +145,7 @@ fn max_carried_time(chain: &Chain) -> f64 {
 fn hides_no_peak<S: Simd>(
     simd: S,
     split: &Split,
-    chain: &Chain,
-    interface: &mut Interface,
+    (chain, interface): (&Chain, &mut Interface),
     drive: &Harmonic,
     segment: &Segment<'static>,
     [moving, left]: [f64; 2],
@@ -201,8 +181,7 @@ fn hides_no_peak<S: Simd>(
     driven(ahead).maximum_above(highest + left * swing).is_some() && stays_clear(simd, chain, split, ahead, left)
 }
 
-/// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies,
-/// unless the free motion is carried over.
+/// Tries to leap, on the grid over reattachments, and moves the state on; see [`plan`]. `audit` receives the energies.
 #[inline(always)]
 pub(super) fn leap<S: Simd>(
     simd: S,
@@ -217,15 +196,10 @@ pub(super) fn leap<S: Simd>(
         bounds.horizon = passing.horizon(split, chain, interface, drive, bounds, largest)?;
     }
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
-    let elapsed = plan.segment.duration;
-    if let Some(audit) = audit.filter(|_| plan.carried.is_none()) {
-        audit.follow_leap(chain, drive, split, state, elapsed);
+    if let Some(audit) = audit {
+        audit.follow_leap(chain, drive, split, state, plan.segment.duration);
     }
-    follow(simd, split, drive, elapsed, state);
-    if let Some(left) = plan.carried {
-        let error = PROPAGATED_SHARE * bounds.error / largest;
-        split.propagator.carry(simd, chain, [elapsed, left, error], state);
-    }
+    follow(simd, split, drive, plan.segment.duration, state);
     Ok(plan)
 }
 
@@ -308,41 +282,10 @@ fn turned<S: Simd>(simd: S, row: &SplitRow, (sine, cosine): (f64, f64)) -> S::Ve
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::Layout;
     use super::super::split::BlockMotion;
     use super::*;
     use crate::model::Parameters;
     use pulp::Scalar512b as Baseline;
-
-    #[test]
-    fn a_leap_carries_an_undamped_oscillation_over_for_a_bounded_time() {
-        let parameters = Parameters { blocks: 1, damping_rate: 0.0, ..Parameters::default() };
-        let layout = Layout::new(1);
-        // Without contacts nothing can be reached; the spring swings the block about where it pulls to.
-        let mut slider = Slider::new(&parameters);
-        slider.chain = Chain::new(&parameters, layout);
-        let squared = parameters.drive_stiffness / slider.chain.mass;
-        let drive = Harmonic { start: 0.0, rate: 1e-12, amplitude: 0.0, phase: 0.0, angular_frequency: 0.0 };
-        let amplitude = 1e-6;
-        slider.state.displacement[0][0] = amplitude;
-        let horizon = 1e9;
-        let mut split = Split::new(&slider.chain);
-        let (until_cycle_end, largest_force) = (f64::INFINITY, f64::INFINITY);
-        let bounds = Bounds { horizon, until_cycle_end, error: 1e-12, start: 0.0, largest_force, passing: None };
-        let plan = leap(Baseline, &mut split, &mut slider, &drive, bounds, None).unwrap();
-        assert!(plan.reached.is_none() && plan.carried.is_some(), "{plan:?}");
-        let elapsed = plan.segment.duration;
-        let angle = squared.sqrt() * elapsed;
-        assert!(angle > 1e5 && angle <= MAX_CARRIED_ANGLE, "{angle}");
-        // A ramp that the block follows, and what is left of its start.
-        let ramp = drive.rate * elapsed - drive.rate / squared.sqrt() * libm::sin(angle);
-        let expected = ramp + amplitude * libm::cos(angle);
-        assert!(
-            (slider.state.displacement[0][0] - expected).abs() < 1e-8 * amplitude,
-            "{}",
-            slider.state.displacement[0][0] - expected
-        );
-    }
 
     #[test]
     fn a_leap_ends_where_the_first_block_reaches_a_break_position() {

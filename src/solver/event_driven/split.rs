@@ -13,7 +13,6 @@
 //! overdamped; then a is halved until S' is positive definite.
 
 use super::chain::{Chain, State};
-use super::chebyshev::ChebyshevPropagator;
 use super::elimination::{Elimination, Number, outer};
 use super::layout::FIRST_BLOCK;
 use crate::model::simd::{Simd, Vector};
@@ -54,8 +53,6 @@ pub(super) struct Split {
     pub rows: Vec<SplitRow>,
     /// The rate a at which the bound on the free motion decays, in 1/s.
     pub decay_rate: f64,
-    /// Begins with y in m and w + a y in m/s.
-    pub propagator: ChebyshevPropagator,
     /// The diagonal that padding has in addition, and the eliminations of S/m, of S'/m and of S/m - ω² + iγω.
     fixed: Vec<Row>,
     stiffness: Elimination<1>,
@@ -75,7 +72,6 @@ impl Split {
         Self {
             rows: vec![row; layout.rows],
             decay_rate: f64::INFINITY,
-            propagator: ChebyshevPropagator::new(layout),
             fixed,
             stiffness,
             shifted,
@@ -107,7 +103,6 @@ impl Split {
         let cut = self.solve(simd, chain, drive);
         let (outer, minus_two) = (outer(simd, chain), simd.splat(-2.0));
         let before = cut.to_next_lane().times(outer);
-        let [displaced, moved] = &mut self.propagator.here;
         let (mut energy, mut y_before, mut y_first) = (simd.splat(0.0), simd.splat(0.0), simd.splat(0.0));
         for ((r, row), entry) in self.rows.iter_mut().enumerate().zip(&self.stiffness.rows) {
             let alone = before.mul_add(simd.load(&entry.after[0]), simd.load(&row.start));
@@ -119,8 +114,6 @@ impl Split {
             let velocity = simd.load(&state.velocity[r]).minus(simd.load(&row.rate[0]));
             let w = imaginary.mul_add(simd.splat(drive.angular_frequency), velocity);
             let shifted = y.mul_add(simd.splat(self.decay_rate), w);
-            y.store(&mut displaced[r]);
-            shifted.store(&mut moved[r]);
             let own = simd.load(&chain.diagonal[r]).minus(shift).times(y);
             let stretched = y_before.times(minus_two).mul_add(simd.load(&chain.coupling[r]), own);
             energy = shifted.mul_add(shifted, y.mul_add(stretched, energy));
@@ -403,10 +396,8 @@ mod tests {
         for block in 0..parameters.blocks {
             let (row, lane) = chain.layout.slot(block);
             let BlockMotion { start, rate: speed, wave: [real, imaginary], swing } = driven(block);
-            let [y, shifted] = split.propagator.here.each_ref().map(|rows| rows[row][lane]);
-            assert_eq!(y, state.displacement[row][lane] - start - real, "{what:?}");
-            let w = state.velocity[row][lane] - speed + frequency * imaginary;
-            assert!((shifted - (w + rate * y)).abs() <= 1e-14 * (w.abs() + (rate * y).abs()), "{what:?}");
+            let y = state.displacement[row][lane] - start - real;
+            let shifted = state.velocity[row][lane] - speed + frequency * imaginary + rate * y;
             assert!((swing - real.hypot(imaginary)).abs() <= 1e-14 * swing + 1e-150, "{what:?}");
             twice_energy +=
                 shifted * shifted + y * ((stiffness(block) - shift(rate)) * y - 2.0 * chain.coupling[0][0] * before);

@@ -45,7 +45,7 @@ pub(super) struct StepControl {
     break_window: f64,
     attach_window: f64,
     /// Order from which on terms are checked, by the number of halvings.
-    pub min_orders: [usize; MAX_HALVINGS + 1],
+    min_orders: [usize; MAX_HALVINGS + 1],
 }
 
 impl StepControl {
@@ -107,12 +107,6 @@ impl Step {
             scale: self.length,
             ends,
         }
-    }
-
-    /// The segment from s = 0 to `s`, which starts at a time in s.
-    pub fn segment_to(&self, s: f64, start: f64) -> Segment<'_> {
-        let ends = [0.0, s].map(|s| ForceAt::new(&self.force, s));
-        Segment { start, duration: s * self.length, path: self.force_path(0.0, ends) }
     }
 
     /// Notes and returns where in a part of the step a block first breaks; infinite if it does not.
