@@ -110,7 +110,10 @@ impl Path {
         let halley = |[x, slope, half]: [f64; 3]| (x - level) * slope / slope.mul_add(slope, (level - x) * half);
         let [c0, c1, c2, c3, c4] = self.coefficients;
         let rise = self.end() - c0;
-        let [part, at_start, at_end] = [(level - c0) / rise, rise / c1, rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4))];
+        // Slopes above 3 let a cubic turn back.
+        let limited = |slope: f64| if slope > 0.0 && slope < 3.0 { slope } else { 3.0 };
+        let [at_start, at_end] = [limited(rise / c1), limited(rise / (c1 + 2.0 * c2 + (3.0 * c3 + 4.0 * c4)))];
+        let part = (level - c0) / rise;
         let rest = 1.0 - part;
         let mut last = within(part * (part * (1.0 + 2.0 * rest) + rest * (rest * at_start - part * at_end)));
         let mut s = within(last - halley(self.at(last)));
