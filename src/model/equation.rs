@@ -75,15 +75,6 @@ impl StiffnessMatrix {
             if self.eigenvalues_below(middle) > index { high = middle } else { low = middle }
         }
     }
-
-    /// Solves S y = f e_1 for y_1 = y of the trailing edge and returns f/y_1, in N/m: the stiffness seen there.
-    pub fn end_stiffness(&self) -> f64 {
-        let last = self.diagonal.len() - 1;
-        self.diagonal[..last]
-            .iter()
-            .rev()
-            .fold(self.diagonal[last], |pivot, diagonal| diagonal - self.coupling * self.coupling / pivot)
-    }
 }
 
 /// Largest angular frequency of the intact slider, in rad/s.

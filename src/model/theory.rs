@@ -1,17 +1,7 @@
-//! Closed forms of the paper: Eq. 1, η, Φ_max, Eq. 2 and its asymptote; limits that the solvers are tested against.
+//! Closed forms of the paper: η, Φ_max, Eq. 2 and its asymptote; what slips at random loads show; a typical interval.
 
 use super::Parameters;
 use std::f64::consts::{PI, TAU};
-
-/// Decay rate of the displacement per block in Eq. 1, `sqrt(K_s/K_int)`; infinite for a single block.
-pub fn decay_per_block(parameters: &Parameters) -> f64 {
-    (parameters.block_contact_stiffness() / parameters.coupling_stiffness()).sqrt()
-}
-
-/// Decay rate per block of the discrete chain, 2 asinh(½ `sqrt(K_s/K_int)`), of which Eq. 1 is the continuum limit.
-pub fn exact_decay_per_block(parameters: &Parameters) -> f64 {
-    2.0 * libm::asinh(0.5 * decay_per_block(parameters))
-}
 
 /// η = 2πΔ/(T V0), the ratio of the harmonic to the uniform loading rate, from the angular frequency 2π/T in rad/s, the
 /// amplitude Δ in m and the velocity V0 in m/s; 0 without modulation.
@@ -81,13 +71,6 @@ pub fn typical_interval(parameters: &Parameters) -> f64 {
     loading + parameters.reattachment_time
 }
 
-/// Mean friction of a rigid block at a constant velocity in m/s, identical contacts, in N:
-/// `½ N N_s f_s t_a/(t_a + τ_r)` with the time attached `t_a = f_s/(k V)`.
-pub fn rigid_block_friction(parameters: &Parameters, velocity: f64) -> f64 {
-    let attached = parameters.contact_reach() / velocity;
-    0.5 * total_strength(parameters) * attached / (attached + parameters.reattachment_time)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::equation::StiffnessMatrix;
@@ -131,7 +114,9 @@ mod tests {
             let parameters = Parameters { blocks, reattachment_time: 1e-300, ..Parameters::default() };
             let rate = LOADED_SHARE * total_strength(&parameters) / typical_interval(&parameters);
             let predicted = rate / parameters.drive_velocity;
-            let chain = StiffnessMatrix::intact(&parameters).end_stiffness() - parameters.drive_stiffness;
+            let StiffnessMatrix { diagonal, coupling, .. } = StiffnessMatrix::intact(&parameters);
+            let end = diagonal.iter().rev().fold(f64::INFINITY, |pivot, entry| entry - coupling * coupling / pivot);
+            let chain = end - parameters.drive_stiffness;
             let exact = 1.0 / (1.0 / chain + 1.0 / parameters.drive_stiffness);
             assert!((predicted / exact - 1.0).abs() < tolerance, "{blocks} blocks: {predicted} against {exact}");
         }

@@ -10,10 +10,10 @@
 //! | Δ = 1 µm, 1/T = 29 Hz | 0.1371 (6) | 0.0164 | 0.1262 0.1343 0.1378 0.1399 0.1447 |
 //! | Δ = 1 µm, 1/T = 58 Hz | 0.1273 (12) | 0.0364 | 0.0692 0.0993 0.1376 0.1381 0.2065 |
 
+use crate::deterministic_rows::exact_decay_per_block;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use stickslip::model::equation::StiffnessMatrix;
-use stickslip::model::theory::exact_decay_per_block;
 use stickslip::model::{Change, ContactEvent, Parameters};
 use stickslip::observe::{Recording, measure};
 use stickslip::reduce::quantile;
