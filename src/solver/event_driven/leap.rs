@@ -51,54 +51,43 @@ pub(super) struct Bounds {
     pub error: f64,
     /// Largest shear force on record since the last break, in N. Every observer has seen it.
     pub largest_force: f64,
-    /// On the grid a leap passes reattachments.
-    pub passing: Option<Passing>,
+    /// How long a leap from the grid, over reattachments, must be and may be, in s.
+    pub passing: Option<[f64; 2]>,
 }
 
-/// A leap over reattachments. A contact that attaches on the way holds its block back by its stiffness times how far the
-/// block has moved since, which the driven solution leaves out; what all displace may be a part of the error of a leap.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Passing {
-    /// How long it must be and may be, in s.
-    pub least: f64,
-    pub most: f64,
-}
-
-impl Passing {
-    /// How long the leap may be, in s, if it is allowed to leave out `error` m, with free motion of at most `largest` m now;
-    /// if that is too short, after how many seconds to look again.
-    fn horizon(
-        &self,
-        split: &Split,
-        chain: &Chain,
-        interface: &mut Interface,
-        drive: &Harmonic,
-        Bounds { start, error, .. }: Bounds,
-        largest: f64,
-    ) -> Result<f64, f64> {
-        let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
-        let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
-        let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, self.most);
-        interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
-            let seconds = due - start;
-            let by_then = displaced + rate * (seconds - last);
-            if seconds >= limit || by_then > allowed {
-                return false;
-            }
-            if seconds < loose {
-                limit = seconds;
-                return false;
-            }
-            (displaced, last) = (by_then, seconds);
-            let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
-            rate += per_mass * stiffness * speed * compliance;
-            // Nor may it break.
-            limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
-            true
-        });
-        let horizon = if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit };
-        if horizon < self.least { Err(loose.clamp(0.5 * self.least, 4.0 * self.least)) } else { Ok(horizon) }
-    }
+/// How long a leap over reattachments may be, in s, with free motion of at most `largest` m now; if that is less than it must
+/// be, after how many seconds to look again. A contact that attaches on the way holds its block back by its stiffness times
+/// how far the block has moved since, which the driven solution leaves out; what all displace may be a part of the error.
+fn passing_horizon(
+    split: &Split,
+    (chain, interface): (&Chain, &mut Interface),
+    drive: &Harmonic,
+    Bounds { start, error, .. }: Bounds,
+    [least, most]: [f64; 2],
+    largest: f64,
+) -> Result<f64, f64> {
+    let loose = libm::log(largest / (LOOSE * error)) / split.decay_rate;
+    let (allowed, per_mass) = (PASSED_SHARE * error, 1.0 / chain.mass);
+    let (mut displaced, mut rate, mut last, mut limit) = (0.0, 0.0, 0.0, most);
+    interface.look_ahead_to_lives(|due, block, [stiffness, reach]| {
+        let seconds = due - start;
+        let by_then = displaced + rate * (seconds - last);
+        if seconds >= limit || by_then > allowed {
+            return false;
+        }
+        if seconds < loose {
+            limit = seconds;
+            return false;
+        }
+        (displaced, last) = (by_then, seconds);
+        let [speed, compliance] = split.speed_and_compliance(chain, drive, block);
+        rate += per_mass * stiffness * speed * compliance;
+        // Nor may it break.
+        limit = limit.min(seconds + (reach - ASTRAY * error).max(0.0) / speed);
+        true
+    });
+    let horizon = if rate > 0.0 { limit.min(last + (allowed - displaced) / rate) } else { limit };
+    if horizon < least { Err(loose.clamp(0.5 * least, 4.0 * least)) } else { Ok(horizon) }
 }
 
 /// Looks for a leap under a drive that moves as given. The free motion of a block is at most `largest` m. If there is none,
@@ -193,7 +182,7 @@ pub(super) fn leap<S: Simd>(
 ) -> Result<Plan, f64> {
     let largest = split.update(simd, chain, drive, state).ok_or((2.0 / chain.damping_rate).min(bounds.horizon))?;
     if let Some(passing) = bounds.passing {
-        bounds.horizon = passing.horizon(split, chain, interface, drive, bounds, largest)?;
+        bounds.horizon = passing_horizon(split, (chain, interface), drive, bounds, passing, largest)?;
     }
     let plan = plan(simd, split, chain, interface, drive, largest, bounds)?;
     if let Some(audit) = audit {

@@ -28,7 +28,7 @@ use self::frame::Frame;
 use self::grid::Grid;
 use self::kernels::Kernels;
 use self::layout::Layout;
-use self::leap::{Bounds, Passing, Plan};
+use self::leap::{Bounds, Plan};
 use self::slider::Slider;
 use self::split::Split;
 use self::step::{Step, StepControl};
@@ -200,8 +200,7 @@ impl<'a> Integration<'a> {
         let drive = self.frame.drive_motion();
         let (start, began) = (self.frame.now(), self.frame.time);
         let Tolerances { leap_error: error, max_step, .. } = self.tolerances;
-        let least = WORTHWHILE_GRID_LEAP * self.grid.step.length;
-        let passing = self.takes_grid.then_some(Passing { least, most: until_change });
+        let passing = self.takes_grid.then_some([WORTHWHILE_GRID_LEAP * self.grid.step.length, until_change]);
         let largest_force = self.largest_force;
         let bounds = Bounds { start: began, horizon, until_cycle_end, error, largest_force, passing };
         let attempt = self.kernels.leap(&mut self.split, &mut self.slider, &drive, bounds, self.audit);
