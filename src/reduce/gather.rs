@@ -38,6 +38,7 @@ columns! {
 
 columns! {
     /// What a reduction takes from the jobs table beside set and parameters.
+    #[derive(Clone, Debug)]
     pub(super) struct JobFacts {
         outcome: JobOutcome;
         slips: Option<u64>;
@@ -238,22 +239,45 @@ fn slips_of(
     Ok(sets)
 }
 
+/// A job of a directory: what its row says, and its slips.
+#[cfg(test)]
+#[derive(Clone, Debug)]
+pub(crate) struct PooledJob {
+    seed: u64,
+    facts: JobFacts,
+    slips: Vec<Slip>,
+}
+
+/// All jobs of a directory by their sets, in the order of parameters and seeds.
+#[cfg(test)]
+pub(crate) fn pool_of(layout: &Layout<'_>) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
+    let jobs = layout.dataset(JOBS)?;
+    let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
+    each_job(&jobs, &|_| true, |JobOfSet { set_id, facts }, parameters| {
+        let seed = parameters.seed;
+        let (_, set) = sets.entry(set_id).or_insert_with(|| (parameters, BTreeMap::new()));
+        set.insert(seed, PooledJob { seed, facts, slips: Vec::new() });
+    })?;
+    for batch in committed_files(layout, SLIPS, &jobs)?.rows::<(JobOfSlip, Slip)>() {
+        for (job, slip) in batch? {
+            let set = sets.get_mut(&job.set_id).map(|(_, set)| set);
+            set.and_then(|set| set.get_mut(&job.seed)).expect("slips of a job").slips.push(slip);
+        }
+    }
+    let mut pool: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
+    pool.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
+        left.modulation_amplitude.total_cmp(&right.modulation_amplitude)
+    });
+    Ok(pool)
+}
+
 /// The row of a set of these jobs.
 #[cfg(test)]
-pub(crate) fn row_of(parameters: &Parameters, jobs: &[crate::observe::Measurements]) -> SetRow {
+pub(crate) fn row_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
     let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
-    for (seed, job) in (0..).zip(jobs) {
-        let averages = job.averages;
-        let facts = JobFacts {
-            outcome: JobOutcome::of(job),
-            slips: Some(job.slips.len() as u64),
-            mean_friction: averages.map(|averages| averages.friction),
-            attached_fraction: averages.map(|averages| averages.attached_fraction),
-            slip_share: averages.map(|averages| averages.slip_share),
-            regime: job.regime(),
-        };
-        set.jobs.push(seed, &facts);
-        job.slips.iter().for_each(|slip| set.push(slip));
+    for PooledJob { seed, facts, slips } in jobs {
+        set.jobs.push(*seed, facts);
+        slips.iter().for_each(|slip| set.push(slip));
     }
     set.finish().0.row
 }

@@ -24,7 +24,7 @@ pub(crate) use cells::{CellOfGrid, Cells};
 pub use cells::{CellRow, divide};
 pub use gather::reduce_jobs;
 #[cfg(test)]
-pub(crate) use gather::row_of;
+pub(crate) use gather::{PooledJob, pool_of, row_of};
 pub use histogram::HistogramBin;
 pub use moments::{Moments, quantile};
 pub use reduced::{Statistic, advise, read_reduced, read_sets};
