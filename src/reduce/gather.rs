@@ -185,20 +185,20 @@ impl Gathered {
         Self { jobs, limits, slips: SetSlips::default(), waiting: Vec::new(), points: Vec::new() }
     }
 
-    fn push(&mut self, slip: &Slip) {
+    fn push(&mut self, seed: u64, slip: &Slip) {
         let Parameters { ramp_time, drive_velocity, .. } = self.jobs.parameters;
         if ramp_time > 0.0 {
-            self.slips.push(slip, &PhaseLimits::at(slip.modulation.eta(drive_velocity)));
+            self.slips.push(seed, slip, &PhaseLimits::at(slip.modulation.eta(drive_velocity)));
         } else {
-            self.slips.push(slip, &self.limits);
+            self.slips.push(seed, slip, &self.limits);
         }
     }
 
     fn finish(mut self) -> (FinishedSet, Vec<(u64, Point)>) {
         let mut waiting = std::mem::take(&mut self.waiting);
         waiting.sort_by_key(|(seed, _)| *seed);
-        for (_, slip) in &waiting {
-            self.push(slip);
+        for (seed, slip) in &waiting {
+            self.push(*seed, slip);
         }
         (self.slips.finish(self.jobs), self.points)
     }
@@ -232,7 +232,7 @@ fn slips_of(
             if set.jobs.is_out_of_order {
                 set.waiting.push((job.seed, slip));
             } else {
-                set.push(&slip);
+                set.push(job.seed, &slip);
             }
         }
     }
@@ -266,18 +266,25 @@ pub(crate) fn pool_of(layout: &Layout<'_>) -> Result<Vec<(Parameters, Vec<Pooled
     }
     let mut pool: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
     pool.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
-        left.modulation_amplitude.total_cmp(&right.modulation_amplitude)
+        let key = |set: &Parameters| (set.modulation_amplitude, set.eta());
+        key(left).partial_cmp(&key(right)).expect("numbers")
     });
     Ok(pool)
+}
+
+/// The set of these jobs.
+#[cfg(test)]
+pub(super) fn set_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item = &'a PooledJob>) -> FinishedSet {
+    let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
+    for PooledJob { seed, facts, slips } in jobs {
+        set.jobs.push(*seed, facts);
+        slips.iter().for_each(|slip| set.push(*seed, slip));
+    }
+    set.finish().0
 }
 
 /// The row of a set of these jobs.
 #[cfg(test)]
 pub(crate) fn row_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
-    let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
-    for PooledJob { seed, facts, slips } in jobs {
-        set.jobs.push(*seed, facts);
-        slips.iter().for_each(|slip| set.push(slip));
-    }
-    set.finish().0.row
+    set_of(parameters, jobs).row
 }

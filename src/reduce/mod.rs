@@ -20,6 +20,8 @@ mod statistic;
 pub use crate::sweep::{Interval, SetRow};
 pub use backbone::BackboneBin;
 #[cfg(test)]
+pub(crate) use backbone::bin_of_sets;
+#[cfg(test)]
 pub(crate) use cells::{CellOfGrid, Cells};
 pub use cells::{CellRow, divide};
 pub use gather::reduce_jobs;

@@ -11,6 +11,7 @@ use crate::model::selected::Selected;
 use crate::model::theory::random_load_mean;
 use crate::observe::{Regime, Slip};
 use crate::results::tables::JobOutcome;
+use crate::sweep::Interval;
 pub use crate::sweep::SetRow;
 use std::f64::consts::TAU;
 
@@ -77,8 +78,9 @@ impl SetJobs {
 pub(super) struct SetSlips {
     slips: Vec<SlipStats>,
     starts: Vec<usize>,
+    /// Seeds of the jobs that have slips.
+    seeds: Vec<u64>,
     below: u64,
-    drop: Moments,
     peak_force: Moments,
     duration: Moments,
     distance: Moments,
@@ -91,13 +93,13 @@ pub(super) struct SetSlips {
 }
 
 impl SetSlips {
-    pub(super) fn push(&mut self, slip: &Slip, limits: &PhaseLimits) {
-        if slip.number == 0 || self.starts.is_empty() {
+    pub(super) fn push(&mut self, seed: u64, slip: &Slip, limits: &PhaseLimits) {
+        if slip.number == 0 || self.seeds.last() != Some(&seed) {
             self.starts.push(self.slips.len());
+            self.seeds.push(seed);
         }
         self.slips.push(SlipStats::of(slip, limits));
         self.below += u64::from(slip.phase.is_some_and(|phase| limits.is_below(phase)));
-        self.drop.push(slip.drop);
         self.peak_force.push(slip.peak_force);
         self.duration.push(slip.duration);
         self.distance.push(slip.distance);
@@ -117,13 +119,14 @@ impl SetSlips {
         let drops = estimate(&by_job, |slip| Some([slip.drop]));
         // The whole turns go first: they would cost the sine its digits.
         let locking = estimate(&by_job, |slip| non_nan(slip.periods).map(|periods| unit(TAU * periods.fract())));
-        let phases = estimate(&by_job, |slip| non_nan(slip.phase).map(unit));
-        let loads = estimate(&by_job, |slip| non_nan(slip.load_phase).map(unit));
+        let of_angle =
+            |angle: fn(&SlipStats) -> f64| sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred();
+        let (phase_deviations, phases) = of_angle(|slip| slip.phase);
+        let (load_deviations, loads) = of_angle(|slip| slip.load_phase);
 
         let mut sorted: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.interval)).collect();
         let mut periods: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.periods)).collect();
-        let (mut tau, mut mean_periods) = (Moments::default(), Moments::default());
-        tau.extend(sorted.iter().copied());
+        let mut mean_periods = Moments::default();
         mean_periods.extend(periods.iter().copied());
         sorted.sort_by(f64::total_cmp);
         periods.sort_by(f64::total_cmp);
@@ -135,6 +138,15 @@ impl SetSlips {
             real.hypot(imaginary)
         });
         let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| quantile(&sorted, share));
+        let (tau_deviation, tau_deviation_interval) = deviation(&by_job, &intervals, |slip| non_nan(slip.interval));
+        let (drop_deviation, drop_deviation_interval) = deviation(&by_job, &drops, |slip| Some(slip.drop));
+        let median_interval = tau_50.and_then(|median| {
+            let is_below = |interval: f64| [f64::from(u8::from(interval <= median))];
+            let shares = estimate(&by_job, |slip| non_nan(slip.interval).map(is_below)).shares_about_median()?;
+            let [low, high] = shares.map(|share| quantile(&sorted, share));
+            Some(Interval { low: low?, high: high? })
+        });
+        let mean = |[mean]: [f64; 1]| mean;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
         let whole = |periods: f64| periods.round() as u64;
         let row = SetRow {
@@ -148,15 +160,17 @@ impl SetSlips {
             slip_share: jobs.slip_share.mean(),
             attached_fraction: jobs.attached_fraction.mean(),
             slips: self.slips.len() as u64,
-            intervals: tau.count(),
+            intervals: intervals.count(),
             effective_slips: phases.effective(),
             effective_intervals: intervals.effective(),
-            tau_mean: tau.mean(),
+            tau_mean: intervals.mean().map(mean),
             tau_interval: intervals.interval(),
-            tau_deviation: tau.deviation(),
+            tau_deviation,
+            tau_deviation_interval,
             tau_05,
             tau_25,
             tau_50,
+            median_interval,
             tau_75,
             tau_95,
             periods_mean: mean_periods.mean(),
@@ -174,9 +188,10 @@ impl SetSlips {
             share_below: has_limit.then(|| self.below as f64 / phases.count() as f64),
             is_locked: rayleigh_p.is_some_and(|p| p < LOCKED_PROBABILITY)
                 && resultant_length.is_some_and(|length| length > LOCKED_LENGTH),
-            drop_mean: self.drop.mean(),
+            drop_mean: drops.mean().map(mean),
             drop_interval: drops.interval(),
-            drop_deviation: self.drop.deviation(),
+            drop_deviation,
+            drop_deviation_interval,
             peak_force_mean: self.peak_force.mean(),
             mean_friction: jobs.friction.mean(),
             mean_friction_interval: jobs.friction.interval(),
@@ -189,7 +204,9 @@ impl SetSlips {
             front_speed_mean: self.front_speed.mean(),
             slow_front_speed_mean: self.slow_front_speed.mean(),
         };
-        FinishedSet { row, intervals: sorted, phases, loads, below: self.below }
+        let phases = OfSet { estimate: phases, deviations: phase_deviations };
+        let loads = OfSet { estimate: loads, deviations: load_deviations };
+        FinishedSet { row, intervals: sorted, seeds: self.seeds, phases, loads, below: self.below }
     }
 
     fn by_job(&self) -> Vec<&[SlipStats]> {
@@ -198,9 +215,32 @@ impl SetSlips {
     }
 }
 
-/// The mean of a quantity that some of the slips have.
+/// A quantity that some of the slips have.
+fn sequences<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> Option<[f64; D]>) -> Sequences<D> {
+    Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity)))
+}
+
+/// Its mean.
 fn estimate<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats) -> Option<[f64; D]>) -> Estimate<D> {
-    Sequences::of(jobs.iter().map(|job| job.iter().filter_map(&quantity))).estimate()
+    sequences(jobs, quantity).estimate()
+}
+
+/// Its standard deviation.
+fn deviation(
+    jobs: &[&[SlipStats]],
+    of: &Estimate<1>,
+    quantity: impl Fn(&SlipStats) -> Option<f64>,
+) -> (Option<f64>, Option<Interval>) {
+    let [mean] = of.mean().unwrap_or_default();
+    estimate(jobs, |slip| quantity(slip).map(|value| [(value - mean) * (value - mean)])).deviation()
+}
+
+/// Unit vectors of a set.
+#[derive(Clone, Debug)]
+pub(super) struct OfSet {
+    pub(super) estimate: Estimate<2>,
+    /// Their deviations from the mean, job by job.
+    pub(super) deviations: Sequences<2>,
 }
 
 /// A set whose slips are all there.
@@ -209,10 +249,11 @@ pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
-    /// Its phases, as unit vectors.
-    pub(super) phases: Estimate<2>,
+    /// Seeds of its jobs that have slips.
+    pub(super) seeds: Vec<u64>,
+    pub(super) phases: OfSet,
     /// Its load phases, for η < 1.
-    pub(super) loads: Estimate<2>,
+    pub(super) loads: OfSet,
     pub(super) below: u64,
 }
 
@@ -241,7 +282,7 @@ pub(super) mod tests {
     fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
         let limits = PhaseLimits::at(jobs.parameters.eta());
         let mut set = SetSlips::default();
-        slips.into_iter().for_each(|slip| set.push(&slip, &limits));
+        slips.into_iter().for_each(|slip| set.push(0, &slip, &limits));
         set.finish(jobs).row
     }
 

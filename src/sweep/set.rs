@@ -71,9 +71,11 @@ columns! {
         tau_mean: Option<f64> = "s", "mean interval";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
+        tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals";
         tau_25: Option<f64> = "s", "25 % quantile of the intervals";
         tau_50: Option<f64> = "s", "median of the intervals";
+        median_interval as "tau_50": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_75: Option<f64> = "s", "75 % quantile of the intervals";
         tau_95: Option<f64> = "s", "95 % quantile";
         periods_mean: Option<f64> = "", "mean of the intervals over T at their onset";
@@ -97,6 +99,7 @@ columns! {
         drop_mean: Option<f64> = "N", "mean stress drop";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
+        drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
         mean_friction: Option<f64> = "N", "time-averaged shear force, mean over jobs";
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
@@ -182,6 +185,6 @@ mod tests {
         for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {
             assert_eq!(of(other), None, "{other}");
         }
-        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 6);
+        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 9);
     }
 }

@@ -280,7 +280,7 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
     let table: Vec<(String, usize, &[&str])> = vec![
         (precise("\"tau\""), 3, &["of = \"tau\"", "no statistic of a set", "tau_mean"]),
         (precise("\"tau_meen\""), 3, &["did you mean tau_mean?"]),
-        (precise("\"tau_sd\""), 3, &["of = \"tau_sd\"", "no confidence interval", "mean_friction"]),
+        (precise("\"tau_25\""), 3, &["of = \"tau_25\"", "no confidence interval", "mean_friction"]),
         (precise("[]"), 3, &["at least one statistic"]),
         (precise("[\"tau_mean\",\n3]"), 4, &["of = 3", "in quotes"]),
         (precise("\"phase_mean\""), 4, &["relative = 0.01", "an angle", "absolute"]),
