@@ -15,6 +15,8 @@ pub struct Measurements {
     pub ruptures: u64,
     /// Averages over time; `None` if no cycle was whole.
     pub averages: Option<Averages>,
+    /// What the interval that had not ended when the job did is at least, in s; `None` if there is none.
+    pub running_interval: Option<f64>,
     /// Whether it ended since no slip came for too long.
     pub has_given_up: bool,
     /// How the solver ended and what it did.
@@ -24,9 +26,10 @@ pub struct Measurements {
 impl Measurements {
     /// What an observer has measured in a simulation that ended with this summary.
     pub fn new(observer: SlipObserver, summary: Summary) -> Self {
-        let (averages, ruptures, has_given_up) = (observer.averages(), observer.ruptures, observer.has_given_up);
+        let (averages, running_interval) = (observer.averages(), observer.running_interval());
+        let (ruptures, has_given_up) = (observer.ruptures, observer.has_given_up);
         let (slips, precursors) = observer.into_rows();
-        Self { slips, precursors, ruptures, averages, has_given_up, summary }
+        Self { slips, precursors, ruptures, averages, running_interval, has_given_up, summary }
     }
 
     /// How the slider moved; `None` without averages.

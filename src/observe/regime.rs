@@ -5,6 +5,8 @@ use crate::table::value::words;
 /// What a job measures as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Averages {
+    /// The time that they are over, in s.
+    pub time: f64,
     /// Time average of the shear force, in N.
     pub friction: f64,
     /// Time average of the fraction of contacts that are attached.

@@ -289,10 +289,21 @@ impl SlipObserver {
         };
         let time = end.time - start.time;
         (time > 0.0).then(|| Averages {
+            time,
             friction: (end.impulse - start.impulse) / time,
             attached_fraction: (end.attached_time - start.attached_time) / (time * self.contacts as f64),
             slip_share: (end.slipping - start.slipping) / time,
         })
+    }
+
+    /// What the interval is at least, in s, within which the job ends here, past start-up or as it gives up. The onset of the
+    /// next slip may already have passed, at the largest shear force since the last one; if the job gives up, it has not.
+    pub fn running_interval(&self) -> Option<f64> {
+        let is_past_start_up = self.slips_seen >= self.recording.discard;
+        let is_whole = self.slips.len() as u64 >= self.recording.slips;
+        let end = if self.has_given_up { self.now.time } else { self.since_slip.time };
+        let last = self.last_onset.filter(|_| self.has_given_up || is_past_start_up && !is_whole)?;
+        Some(end - last)
     }
 
     /// The present instant with all that is counted, after sliding since the last slip; from the last event on at its rate.

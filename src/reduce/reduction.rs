@@ -182,6 +182,7 @@ mod tests {
         Measurements {
             slips: (0..slips).map(slip).collect(),
             averages: Some(Averages {
+                time: 1.0,
                 friction: 430.0,
                 attached_fraction: 0.7 + 0.01 * parameters.seed as f64,
                 ..Averages::default()

@@ -117,11 +117,14 @@ columns! {
         ruptures: Option<u64> = "", "ruptures of any size, start-up included";
         breaks: Option<u64> = "", "contacts broken";
         reattachments: Option<u64> = "", "contacts reattached";
+        averaged_time: Option<f64> = "s", "time that the three averages which follow are over";
         mean_friction: Option<f64> = "N", "time average of the shear force: over whole cycles past start-up, and over what was slid after the last slip";
         attached_fraction: Option<f64> = "", "time average of the fraction of contacts that are attached, over the same time";
         slip_share: Option<f64> = "", "share of that time within slips, or sliding without one";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, by that share";
         simulated_time: Option<f64> = "s", "model time reached";
+        running_interval: Option<f64> = "s",
+            "what the interval is at least that had not ended when the job did; null if it ended with its last slip, or before one";
         steps: Option<u64> = "", "steps of the solver";
         leaps: Option<u64> = "", "of these, leaps over quiet time";
         grid_steps: Option<u64> = "", "of these, steps of the grid; 0 if motion was resolved in Taylor steps";
@@ -142,10 +145,12 @@ impl JobRecord {
             ruptures: measured.map(|measured| measured.ruptures),
             breaks: summary.map(|summary| summary.breaks),
             reattachments: summary.map(|summary| summary.reattachments),
+            averaged_time: averages.map(|averages| averages.time),
             mean_friction: averages.map(|averages| averages.friction),
             attached_fraction: averages.map(|averages| averages.attached_fraction),
             slip_share: averages.map(|averages| averages.slip_share),
             regime: measured.and_then(Measurements::regime),
+            running_interval: measured.and_then(|measured| measured.running_interval),
             simulated_time: summary.map(|summary| summary.end_time),
             steps: summary.map(|summary| summary.steps),
             leaps: summary.map(|summary| summary.leaps),

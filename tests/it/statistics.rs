@@ -120,6 +120,33 @@ fn modulated_intervals_sit_on_multiples_of_the_period_at_29_and_58_hz() {
     }
 }
 
+#[test]
+fn a_job_that_ends_within_an_interval_knows_what_it_is_at_least() {
+    let parameters = Parameters { blocks: 10, contacts_per_block: 5, ..Parameters::default() }.validated().unwrap();
+    let run = |max_time| {
+        let recording = Recording { slips: 20, max_time, ..Recording::default() };
+        measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap()
+    };
+    let whole = run(None);
+    assert_eq!(whole.running_interval, None);
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for step in 1..60 {
+        let end = whole.slips[2].onset + 0.013 * f64::from(step);
+        let cut = run(Some(end));
+        let Some(next) = whole.slips.get(cut.slips.len()) else { break };
+        let (running, interval) = (cut.running_interval.unwrap(), next.interval.unwrap());
+        assert!(running <= interval && running >= 0.0, "{running} of {interval}");
+        (least, most) = (least.min(running / interval), most.max(running / interval));
+        // Nothing is known of intervals of start-up.
+        assert_eq!(run(Some(0.01)).running_interval, None);
+    }
+    assert!(least < 0.1 && most > 0.9, "{least} to {most}");
+    // One that gives up has seen the whole time since its last slip.
+    let recording = Recording { give_up_after: Some(0.5e-5), ..Recording::default() };
+    let given_up = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
+    assert!(given_up.has_given_up && given_up.slips.is_empty());
+}
+
 /// Follows a simulation to its first break.
 struct FirstBreak {
     /// Stiffness of the contacts of each block, in N/m.
