@@ -80,7 +80,9 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     if arguments.hard_cases {
         return run_hard_cases(arguments);
     }
-    if let Some(setting) = arguments.settings.iter().find(|setting| setting.split('=').next() == Some("seed")) {
+    if let Some(setting) =
+        arguments.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
+    {
         let problem = format!("--set {setting}: a study has seeds of its own; --seeds says how many");
         return Err(UsageError(problem).into());
     }

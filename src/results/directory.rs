@@ -113,7 +113,15 @@ impl<'a> Results<'a> {
         }
         let mut differences = found.version_differences();
         differences.extend(found.sweep().differences(sweep));
-        found.refuse(&differences, "choose another directory with --out, or undo the change")?;
+        let mut way_out = "choose another directory with --out, or undo the change".to_owned();
+        let [before, now] = [found.sweep(), sweep].map(|sweep| sweep.recording().slips);
+        if differences.len() == 1 && now > before {
+            way_out = format!(
+                "for more slips add seeds here and keep slips = {before}, or choose another directory with --out; both cost the \
+                 same, as no job can go on where it ended"
+            );
+        }
+        found.refuse(&differences, &way_out)?;
         Ok(found)
     }
 

@@ -151,7 +151,10 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         ),
         ("run good.toml --out plain.txt", &["plain.txt: is neither empty nor a results directory", "--out"]),
         ("run other-model.toml --out good", &["good: holds other results", "model.N: 3 -> 4", "undo the change"]),
-        ("run other-recording.toml --out good", &["record.slips: 2 -> 3", "choose another directory with --out"]),
+        (
+            "run other-recording.toml --out good",
+            &["record.slips: 2 -> 3", "add seeds here and keep slips = 2, or choose another directory with --out"],
+        ),
         ("run other-solver.toml --out good", &["solver.tolerance: 0.001 -> 1e-7", "--out"]),
         ("status", &["<DIR>"]),
         ("status missing", &["missing: there is no such directory; name one that a run made, such as results/fig3"]),
