@@ -23,7 +23,7 @@ columns! {
         eta_low: f64 = "", "lower edge of the bin, included";
         eta_high: f64 = "", "upper edge, excluded";
         eta_centre: f64 = "", "geometric centre";
-        sets: u64 = "", "parameter sets";
+        sets: u64 = "", "parameter sets, of two slips or more";
         locked_sets: u64 = "", "locked parameter sets";
         slips: u64 = "", "slips of all sets";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
@@ -68,10 +68,9 @@ struct Bin {
 
 /// A sum of unit vectors over sets that have seeds in common.
 ///
-/// A seed has the same contacts in all sets, so that the slips of sets which resemble each other deviate alike from the
-/// means of their sets. These deviations are summed over sets, seed by seed and slip by slip: products of the sums hold
-/// the variances of the sets and the covariances of the jobs of the same seed, pooled over all pairs of sets. Two seeds
-/// of many slips are enough.
+/// Slips of the same seed may deviate alike from the means of sets that resemble each other. Deviations are summed over
+/// sets, seed by seed and slip by slip: products of the sums hold the variances of the sets and the covariances of jobs
+/// of the same seed, pooled over all pairs of sets.
 #[derive(Clone, Debug, Default)]
 struct Together {
     count: u64,
@@ -79,8 +78,6 @@ struct Together {
     deviations: BTreeMap<u64, Vec<[f64; 2]>>,
     /// Sum of the squares of what was summed.
     squares: f64,
-    /// Vectors whose variance is unknown, as their set has no other.
-    single: u64,
 }
 
 impl Together {
@@ -94,11 +91,7 @@ impl Together {
     ) {
         self.count += count;
         self.total = plus(self.total, total);
-        if of_set.estimate.count() == 1 {
-            self.single += count;
-            return;
-        }
-        for (&seed, job) in seeds.iter().zip(of_set.deviations.jobs()) {
+        for (&seed, job) in seeds.iter().zip(of_set.0.jobs()) {
             let sums = self.deviations.entry(seed).or_default();
             sums.resize(sums.len().max(job.len()), [0.0; 2]);
             for (sum, &deviation) in sums.iter_mut().zip(job) {
@@ -109,18 +102,10 @@ impl Together {
         }
     }
 
-    /// Adds the vectors of a set.
-    fn extend(&mut self, seeds: &[u64], of_set: &OfSet) {
-        self.push((of_set.estimate.count(), of_set.estimate.total()), seeds, of_set, |deviation| deviation);
-    }
-
     fn estimate(self) -> Estimate<2> {
         let squares: f64 = self.deviations.values().flatten().copied().map(square).sum();
         let excess = if self.squares > 0.0 { squares / self.squares } else { 1.0 };
-        // The variance of a single vector is taken as that of a uniform phase, 1/2 in every direction, which is the
-        // largest.
-        let known = 0.5 * self.single as f64;
-        Sequences::of(self.deviations.into_values()).estimate().of_sums((self.count, self.total), excess, known)
+        Sequences::of(self.deviations.into_values()).estimate().of_sums((self.count, self.total), excess)
     }
 }
 
@@ -128,7 +113,9 @@ impl Together {
 #[cfg(test)]
 pub(crate) fn bin_of_sets(sets: &[(Parameters, Vec<&PooledJob>)]) -> BackboneBin {
     let mut backbone = Backbone::default();
-    sets.iter().for_each(|(parameters, jobs)| backbone.push(&set_of(parameters, jobs.iter().copied())));
+    for (parameters, jobs) in sets {
+        backbone.push(&set_of(parameters, jobs.iter().copied()));
+    }
     backbone.finish()[0]
 }
 
@@ -159,23 +146,25 @@ fn bin_of(eta: f64) -> i32 {
 }
 
 impl Backbone {
-    /// Adds a set. One without modulation has no phase and is left out, one with a ramp no single η.
+    /// Adds a set. One without modulation has no phase and is left out, one with a ramp no single η, and of one with a single
+    /// slip nothing says how far it is off.
     pub(super) fn push(&mut self, set: &FinishedSet) {
-        if set.row.parameters.ramp_time > 0.0 {
+        if set.row.parameters.ramp_time > 0.0 || set.phases.1.count() < 2 {
             return;
         }
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        bin.phases.extend(&set.seeds, &set.phases);
-        bin.loads.extend(&set.seeds, &set.loads);
+        for (pool, of_set) in [(&mut bin.phases, &set.phases), (&mut bin.loads, &set.loads)] {
+            pool.push((of_set.1.count(), of_set.1.total()), &set.seeds, of_set, |deviation| deviation);
+        }
         bin.below += set.below;
-        let count = set.phases.estimate.count() as f64;
+        let count = set.phases.1.count() as f64;
         let expected = random_load_mean(set.row.eta);
         bin.expected = [bin.expected[0] + count * expected[0], bin.expected[1] + count * expected[1]];
         if set.row.is_locked {
             // The mean direction is off by the deviations across it, over the length of their sum.
-            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.estimate.total());
+            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total());
             let error = |[dx, dy]: [f64; 2]| {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]
@@ -291,12 +280,12 @@ mod tests {
         backbone.finish()[0]
     }
 
-    fn width(bin: BackboneBin) -> f64 {
+    fn width(bin: &BackboneBin) -> f64 {
         bin.phase_mean_high.unwrap() - bin.phase_mean_low.unwrap()
     }
 
     #[test]
-    fn variances_add_over_sets_of_other_seeds_and_single_slips_count_as_uniform_phases() {
+    fn variances_add_over_sets_of_other_seeds_and_single_slips_do_not_count() {
         let alternating: Vec<f64> = (0..40).map(|number| if number % 2 == 0 { -0.7 } else { -1.1 }).collect();
         let alternating = alternating.as_slice();
         let one = bin(&[(0, alternating)]);
@@ -304,11 +293,10 @@ mod tests {
         assert!((one.effective_slips.unwrap() - 40.0).abs() < 1e-9);
         assert!((four.effective_slips.unwrap() - 160.0).abs() < 1e-9);
         // Half as wide, and a little less with more degrees of freedom.
-        assert!((0.45..0.5).contains(&(width(four) / width(one))), "{}", width(four) / width(one));
-        // A hundred single slips at the same phase: sin(half) = 1.96 sqrt(1/200).
-        let single = bin(&[(0, [-0.9].as_slice()); 100]);
-        assert!((width(single) - 2.0 * libm::asin(1.959_964 * 0.005_f64.sqrt())).abs() < 1e-6);
-        assert_eq!(bin(&[(0, &[-0.9])]).phase_mean_low, None, "one slip says nothing about the spread");
+        assert!((0.45..0.5).contains(&(width(&four) / width(&one))), "{}", width(&four) / width(&one));
+        // One slip says nothing about the spread.
+        let with_single = bin(&[(0, alternating), (1, &[-0.9])]);
+        assert_eq!((with_single.sets, with_single.slips), (1, 40));
     }
 
     #[test]
@@ -317,11 +305,11 @@ mod tests {
         let phases: Vec<f64> = (0..40).map(|_| -0.9 + 0.1 * draws.normal()).collect();
         let one = bin(&[(0, &phases)]);
         let six = bin(&[(0, phases.as_slice()); 6]);
-        assert!((width(six) / width(one) - 1.0).abs() < 1e-9, "{}", width(six) / width(one));
+        assert!((width(&six) / width(&one) - 1.0).abs() < 1e-9, "{}", width(&six) / width(&one));
         assert!((six.effective_slips.unwrap() / one.effective_slips.unwrap() - 1.0).abs() < 1e-9);
         // So do means of locked sets.
-        let locked = |bin: BackboneBin| bin.locked_phase_mean_high.unwrap() - bin.locked_phase_mean_low.unwrap();
-        assert!((locked(six) / locked(one) - 1.0).abs() < 1e-9 && (locked(one) / width(one) - 1.0).abs() < 1e-9);
+        let locked = |bin: &BackboneBin| bin.locked_phase_mean_high.unwrap() - bin.locked_phase_mean_low.unwrap();
+        assert!((locked(&six) / locked(&one) - 1.0).abs() < 1e-9 && (locked(&one) / width(&one) - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 
-use super::moments::Moments;
 use super::sequence::Estimate;
 use crate::sweep::Interval;
 use std::f64::consts::PI;
@@ -18,14 +17,6 @@ const OF_SQUARES: f64 = 0.25;
 impl Interval {
     fn about(mean: f64, half: f64) -> Self {
         Self { low: mean - half, high: mean + half }
-    }
-}
-
-impl Moments {
-    /// Of the mean of independent values; `None` for fewer than two.
-    pub fn interval(&self) -> Option<Interval> {
-        let n = self.count() as f64;
-        Some(Interval::about(self.mean()?, student(n - 1.0) * self.deviation()? / n.sqrt()))
     }
 }
 
@@ -106,6 +97,13 @@ impl Estimate<2> {
         let half = if sine < length { libm::asin(sine / length) } else { PI };
         Some(Interval::about(direction, half))
     }
+}
+
+/// The mean of independent values, and its interval.
+#[cfg(test)]
+pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
+    let mean = super::sequence::Sequences::independent(values.iter().map(|&value| [value]).collect()).estimate();
+    (mean.mean().map(|[mean]| mean), mean.interval())
 }
 
 /// Student's t for a two-sided probability of [`CONFIDENCE`], at >= 1 degrees of freedom, to 1e-6.

@@ -1,16 +1,15 @@
 //! The sets of jobs, gathered from the tables: jobs once, slips as often as memory asks for.
 //!
 //! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
-//! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before. Jobs lie in
-//! that order already, but for sweeps that an extension gave lower seeds; slips of such sets wait until all are there.
+//! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
-//! Memory: a few hundred bytes per set, 8 bytes per job, 40 for each of [`MAX_SLIPS`] slips, and as much again for those of
-//! the set at hand; where the tables hold more, the slips are read again for the next sets.
+//! Memory: a few hundred bytes per set, 40 per job, 200 more for the jobs of [`MAX_SLIPS`] slips and 40 to 80 for each
+//! of these, and as much again for those of the set at hand; where the tables hold more, the slips are read again for
+//! the next sets.
 
 use super::PhaseLimits;
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
-use super::slip_stats::SlipStats;
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
@@ -23,11 +22,8 @@ use crate::table::file::{Dataset, DatasetError};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 
-/// Slips that are held at once: 170 MB.
+/// Slips that are held at once: some 300 MB.
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
-/// A waiting slip is held whole, and takes the memory of this many others.
-const WAITING: u64 = (size_of::<Slip>() / size_of::<SlipStats>()) as u64;
-
 columns! {
     /// The set of a job, and the job.
     struct JobOfSet {
@@ -42,10 +38,12 @@ columns! {
     pub(super) struct JobFacts {
         outcome: JobOutcome;
         slips: Option<u64>;
+        averaged_time: Option<f64>;
         mean_friction: Option<f64>;
         attached_fraction: Option<f64>;
         slip_share: Option<f64>;
         regime: Option<Regime>;
+        running_interval: Option<f64>;
     }
 }
 
@@ -85,26 +83,7 @@ impl<'a> Gathering<'a> {
             let new = |set_id: &String| SetJobs { set_id: set_id.clone(), parameters, ..SetJobs::default() };
             sets.entry(job.set_id).or_insert_with_key(new).push(seed, &job.facts);
         })?;
-        let unordered = sets.values().filter(|set| set.is_out_of_order);
-        let mut unordered: HashMap<String, Vec<(u64, JobFacts)>> =
-            unordered.map(|set| (set.set_id.clone(), Vec::new())).collect();
-        if !unordered.is_empty() {
-            each_job(&jobs, is_wanted, |job, parameters| {
-                if let Some(jobs) = unordered.get_mut(&job.set_id) {
-                    jobs.push((parameters.seed, job.facts));
-                }
-            })?;
-        }
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
-        for set in &mut sets {
-            let Some(mut jobs) = unordered.remove(&set.set_id) else { continue };
-            jobs.sort_by_key(|(seed, _)| *seed);
-            let SetJobs { set_id, parameters, .. } = std::mem::take(set);
-            *set = SetJobs { set_id, parameters, is_out_of_order: true, ..SetJobs::default() };
-            for (seed, facts) in &jobs {
-                set.push(*seed, facts);
-            }
-        }
         sets.sort_by(by_parameters);
         Ok(Self { sets, slips, is_wanted })
     }
@@ -155,12 +134,11 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
     let mut chunks: Vec<Vec<SetJobs>> = Vec::new();
     let mut slips = 0;
     for set in sets {
-        let more = if set.is_out_of_order { set.slips.saturating_mul(WAITING) } else { set.slips };
-        slips = more.saturating_add(slips);
+        slips = set.slips.saturating_add(slips);
         match chunks.last_mut() {
             Some(chunk) if slips <= max_slips => chunk.push(set),
             _ => {
-                slips = more;
+                slips = set.slips;
                 chunks.push(vec![set]);
             }
         }
@@ -173,8 +151,6 @@ struct Gathered {
     jobs: SetJobs,
     limits: PhaseLimits,
     slips: SetSlips,
-    /// Those that wait for slips of lower seeds, with their seeds.
-    waiting: Vec<(u64, Slip)>,
     /// Points among them, with their place in table order.
     points: Vec<(u64, Point)>,
 }
@@ -182,7 +158,7 @@ struct Gathered {
 impl Gathered {
     fn new(jobs: SetJobs) -> Self {
         let limits = PhaseLimits::at(jobs.parameters.eta());
-        Self { jobs, limits, slips: SetSlips::default(), waiting: Vec::new(), points: Vec::new() }
+        Self { jobs, limits, slips: SetSlips::default(), points: Vec::new() }
     }
 
     fn push(&mut self, seed: u64, slip: &Slip) {
@@ -194,12 +170,7 @@ impl Gathered {
         }
     }
 
-    fn finish(mut self) -> (FinishedSet, Vec<(u64, Point)>) {
-        let mut waiting = std::mem::take(&mut self.waiting);
-        waiting.sort_by_key(|(seed, _)| *seed);
-        for (seed, slip) in &waiting {
-            self.push(*seed, slip);
-        }
+    fn finish(self) -> (FinishedSet, Vec<(u64, Point)>) {
         (self.slips.finish(self.jobs), self.points)
     }
 }
@@ -229,11 +200,7 @@ fn slips_of(
             if here % spacing == 0 {
                 set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
             }
-            if set.jobs.is_out_of_order {
-                set.waiting.push((job.seed, slip));
-            } else {
-                set.push(job.seed, &slip);
-            }
+            set.push(job.seed, &slip);
         }
     }
     Ok(sets)
@@ -278,7 +245,9 @@ pub(super) fn set_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item =
     let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
     for PooledJob { seed, facts, slips } in jobs {
         set.jobs.push(*seed, facts);
-        slips.iter().for_each(|slip| set.push(*seed, slip));
+        for slip in slips {
+            set.push(*seed, slip);
+        }
     }
     set.finish().0
 }

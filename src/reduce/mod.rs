@@ -7,7 +7,8 @@ mod circular;
 mod confidence;
 mod gather;
 mod histogram;
-mod moments;
+mod product_limit;
+mod quantile;
 mod reduced;
 mod reduction;
 mod rounds;
@@ -24,11 +25,13 @@ pub(crate) use backbone::bin_of_sets;
 #[cfg(test)]
 pub(crate) use cells::{CellOfGrid, Cells};
 pub use cells::{CellRow, divide};
+#[cfg(test)]
+pub(crate) use confidence::mean_of;
 pub use gather::reduce_jobs;
 #[cfg(test)]
 pub(crate) use gather::{PooledJob, pool_of, row_of};
 pub use histogram::HistogramBin;
-pub use moments::{Moments, quantile};
+pub use quantile::quantile;
 pub use reduced::{Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};

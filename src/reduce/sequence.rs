@@ -28,6 +28,11 @@ pub(super) struct Sequences<const D: usize> {
 }
 
 impl<const D: usize> Sequences<D> {
+    /// From all values, and where jobs begin.
+    pub(super) const fn new(values: Vec<[f64; D]>, starts: Vec<usize>) -> Self {
+        Self { values, starts }
+    }
+
     /// From the values of each job.
     pub(super) fn of<Job: IntoIterator<Item = [f64; D]>>(jobs: impl IntoIterator<Item = Job>) -> Self {
         let (mut values, mut starts) = (Vec::new(), Vec::new());
@@ -195,12 +200,8 @@ impl<const D: usize> Default for Estimate<D> {
 
 impl<const D: usize> Estimate<D> {
     /// The mean of `count` values with this total, if these are sums of deviations of such values from known means.
-    /// `excess` is the variance of the sums over that of independent deviations; some values add a variance of `known` to
-    /// that of the total in every direction.
-    pub(super) fn of_sums(mut self, (count, total): (u64, [f64; D]), excess: f64, known: f64) -> Self {
-        for covariance in &mut self.covariances {
-            (0..D).for_each(|index| covariance.0[index][index] += known);
-        }
+    /// `excess` is the variance of the sums over that of independent deviations.
+    pub(super) fn of_sums(self, (count, total): (u64, [f64; D]), excess: f64) -> Self {
         Self { count, total, inflation: (excess * self.inflation).max(1.0), ..self }
     }
 

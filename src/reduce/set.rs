@@ -3,16 +3,18 @@
 use super::PhaseLimits;
 use super::circular::unit;
 use super::gather::JobFacts;
-use super::moments::{Moments, quantile};
+use super::product_limit::ProductLimit;
+use super::quantile::quantile;
 use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::model::theory::random_load_mean;
-use crate::observe::{Regime, Slip};
+use crate::observe::{Averages, Regime, Slip};
 use crate::results::tables::JobOutcome;
 use crate::sweep::Interval;
 pub use crate::sweep::SetRow;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
@@ -20,6 +22,9 @@ const LOCKED_PROBABILITY: f64 = 1e-3;
 /// Least resultant length of a locked set. With many slips the faintest preference becomes significant; at 1/2 the phases
 /// keep within about a sixth of a turn (s.d. 1.2 rad).
 const LOCKED_LENGTH: f64 = 0.5;
+
+/// Quantities of slips that only have a mean.
+const SUMS: usize = 9;
 
 /// Quantiles of τ that are reported.
 const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -38,24 +43,17 @@ pub(super) struct SetJobs {
     pub slips: u64,
     /// Jobs that gave up, since no slip came.
     pub without_slips: u64,
-    /// Time-averaged shear force of the jobs, in N.
-    pub friction: Moments,
-    /// Time-averaged fraction of contacts that are attached, of the jobs.
-    pub attached_fraction: Moments,
-    /// Share of time within slips, of the jobs.
-    pub slip_share: Moments,
+    /// What the jobs are on average over time, by their seeds.
+    pub averages: BTreeMap<u64, Averages>,
+    /// Seeds of jobs that ended within an interval, and what was seen of it, in s.
+    pub running: Vec<(u64, f64)>,
     /// How the slider moved in the jobs; mixed if they differ.
     pub regime: Option<Regime>,
-    /// Seed of the last of them, and whether one came after a higher seed.
-    pub last_seed: Option<u64>,
-    pub is_out_of_order: bool,
 }
 
 impl SetJobs {
     /// A job of the set has ended.
     pub(super) fn push(&mut self, seed: u64, job: &JobFacts) {
-        self.is_out_of_order |= self.last_seed.is_some_and(|last| last >= seed);
-        self.last_seed = Some(seed);
         if job.outcome == JobOutcome::Failed {
             self.failed += 1;
             return;
@@ -63,9 +61,12 @@ impl SetJobs {
         self.finished += 1;
         self.slips = self.slips.saturating_add(job.slips.unwrap_or(0));
         self.without_slips += u64::from(job.outcome == JobOutcome::NoSlips);
-        self.friction.extend(job.mean_friction);
-        self.attached_fraction.extend(job.attached_fraction);
-        self.slip_share.extend(job.slip_share);
+        if let (Some(time), Some(friction), Some(attached_fraction), Some(slip_share)) =
+            (job.averaged_time, job.mean_friction, job.attached_fraction, job.slip_share)
+        {
+            self.averages.insert(seed, Averages { time, friction, attached_fraction, slip_share });
+        }
+        self.running.extend(job.running_interval.map(|interval| (seed, interval)));
         self.regime = match (self.regime, job.regime) {
             (Some(regime), Some(other)) if regime != other => Some(Regime::Mixed),
             (regime, other) => other.or(regime),
@@ -73,63 +74,82 @@ impl SetJobs {
     }
 }
 
-/// Gathers the slips of a set, job after job.
+impl SetJobs {
+    /// An average over the time of all jobs: by pseudo-values, one for each job, which weigh it by its time.
+    fn over_time(&self, of: impl Fn(&Averages) -> f64) -> Estimate<1> {
+        let sum = |of: &dyn Fn(&Averages) -> f64| self.averages.values().map(of).sum::<f64>();
+        let time = sum(&|job| job.time);
+        let average = sum(&|job| job.time * of(job)) / time;
+        let weight = self.averages.len() as f64 / time;
+        let pseudo = self.averages.values().map(|job| [average + (of(job) - average) * job.time * weight]);
+        Sequences::independent(pseudo.collect()).estimate()
+    }
+}
+
+/// Gathers the slips of a set.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetSlips {
-    slips: Vec<SlipStats>,
-    starts: Vec<usize>,
-    /// Seeds of the jobs that have slips.
-    seeds: Vec<u64>,
+    /// By their seeds.
+    jobs: BTreeMap<u64, JobSlips>,
     below: u64,
-    peak_force: Moments,
-    duration: Moments,
-    distance: Moments,
-    edge_distance: Moments,
-    least_attached: Moments,
-    onset_cut: Moments,
-    precursors: Moments,
-    front_speed: Moments,
-    slow_front_speed: Moments,
+}
+
+/// The slips of a job, and counts and sums of what only has a mean.
+#[derive(Clone, Debug, Default)]
+struct JobSlips {
+    slips: Vec<SlipStats>,
+    sums: [(u64, f64); SUMS],
 }
 
 impl SetSlips {
     pub(super) fn push(&mut self, seed: u64, slip: &Slip, limits: &PhaseLimits) {
-        if slip.number == 0 || self.seeds.last() != Some(&seed) {
-            self.starts.push(self.slips.len());
-            self.seeds.push(seed);
+        let job = self.jobs.entry(seed).or_default();
+        job.slips.push(SlipStats::of(slip, limits));
+        let always = [
+            slip.peak_force,
+            slip.duration,
+            slip.distance,
+            slip.edge_distance,
+            slip.least_attached,
+            f64::from(u8::from(slip.onset_cut)),
+            slip.precursors as f64,
+        ];
+        let values = always.map(Some).into_iter().chain([slip.front_speed, slip.slow_front_speed]);
+        for ((count, sum), value) in job.sums.iter_mut().zip(values) {
+            *count += u64::from(value.is_some());
+            *sum += value.unwrap_or_default();
         }
-        self.slips.push(SlipStats::of(slip, limits));
         self.below += u64::from(slip.phase.is_some_and(|phase| limits.is_below(phase)));
-        self.peak_force.push(slip.peak_force);
-        self.duration.push(slip.duration);
-        self.distance.push(slip.distance);
-        self.edge_distance.push(slip.edge_distance);
-        self.least_attached.push(slip.least_attached);
-        self.onset_cut.push(f64::from(u8::from(slip.onset_cut)));
-        self.precursors.push(slip.precursors as f64);
-        self.front_speed.extend(slip.front_speed);
-        self.slow_front_speed.extend(slip.slow_front_speed);
     }
 
-    pub(super) fn finish(self, jobs: SetJobs) -> FinishedSet {
+    fn means(&self) -> [Option<f64>; SUMS] {
+        std::array::from_fn(|index| {
+            let all = self.jobs.values().map(|job| job.sums[index]);
+            let (count, sum) = all.fold((0, 0.0), |(count, sum), of_job| (count + of_job.0, sum + of_job.1));
+            (count > 0).then(|| sum / count as f64)
+        })
+    }
+
+    pub(super) fn finish(mut self, jobs: SetJobs) -> FinishedSet {
+        let means = self.means();
+        let slips = self.jobs.values().map(|job| job.slips.len() as u64).sum();
+        for &(seed, interval) in &jobs.running {
+            let to_come = SlipStats::to_come(interval, jobs.parameters.modulation_period);
+            self.jobs.entry(seed).or_default().slips.push(to_come);
+        }
+        let by_job: Vec<&[SlipStats]> = self.jobs.values().map(|job| job.slips.as_slice()).collect();
         let eta = jobs.parameters.eta();
         let limits = PhaseLimits::at(eta);
-        let by_job = self.by_job();
-        let intervals = estimate(&by_job, |slip| non_nan(slip.interval).map(|interval| [interval]));
-        let drops = estimate(&by_job, |slip| Some([slip.drop]));
+        let tau = Intervals::new(&by_job, |slip| slip.interval);
+        let over_period = Intervals::new(&by_job, |slip| slip.periods);
+        let intervals = tau.estimate(|slip| [slip.interval]);
+        let drops = estimate(&by_job, |slip| non_nan(slip.drop).map(|drop| [drop]));
         // The whole turns go first: they would cost the sine its digits.
-        let locking = estimate(&by_job, |slip| non_nan(slip.periods).map(|periods| unit(TAU * periods.fract())));
+        let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
         let of_angle =
             |angle: fn(&SlipStats) -> f64| sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred();
-        let (phase_deviations, phases) = of_angle(|slip| slip.phase);
-        let (load_deviations, loads) = of_angle(|slip| slip.load_phase);
-
-        let mut sorted: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.interval)).collect();
-        let mut periods: Vec<f64> = self.slips.iter().filter_map(|slip| non_nan(slip.periods)).collect();
-        let mut mean_periods = Moments::default();
-        mean_periods.extend(periods.iter().copied());
-        sorted.sort_by(f64::total_cmp);
-        periods.sort_by(f64::total_cmp);
+        let (of_phases, of_loads) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
+        let (phases, loads) = (of_phases.1, of_loads.1);
 
         let has_limit = limits.minimum.is_some() && phases.count() > 0;
         let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
@@ -137,15 +157,18 @@ impl SetSlips {
             let [real, imaginary] = random_load_mean(eta);
             real.hypot(imaginary)
         });
-        let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| quantile(&sorted, share));
-        let (tau_deviation, tau_deviation_interval) = deviation(&by_job, &intervals, |slip| non_nan(slip.interval));
-        let (drop_deviation, drop_deviation_interval) = deviation(&by_job, &drops, |slip| Some(slip.drop));
-        let median_interval = tau_50.and_then(|median| {
-            let is_below = |interval: f64| [f64::from(u8::from(interval <= median))];
-            let shares = estimate(&by_job, |slip| non_nan(slip.interval).map(is_below)).shares_about_median()?;
-            let [low, high] = shares.map(|share| quantile(&sorted, share));
-            Some(Interval { low: low?, high: high? })
-        });
+        let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| tau.quantile(share));
+        let square = |of: &Estimate<1>| {
+            let [mean] = of.mean().unwrap_or_default();
+            move |value: f64| [(value - mean) * (value - mean)]
+        };
+        let (tau_square, drop_square) = (square(&intervals), square(&drops));
+        let (tau_deviation, tau_deviation_interval) = tau.estimate(|slip| tau_square(slip.interval)).deviation();
+        let (drop_deviation, drop_deviation_interval) =
+            estimate(&by_job, |slip| non_nan(slip.drop).map(&drop_square)).deviation();
+        let friction = jobs.over_time(|job| job.friction);
+        let attached_fraction = jobs.over_time(|job| job.attached_fraction);
+        let slip_share = jobs.over_time(|job| job.slip_share);
         let mean = |[mean]: [f64; 1]| mean;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a ratio of positive numbers")]
         let whole = |periods: f64| periods.round() as u64;
@@ -157,24 +180,25 @@ impl SetSlips {
             failed_jobs: jobs.failed,
             jobs_without_slips: jobs.without_slips,
             regime: jobs.regime,
-            slip_share: jobs.slip_share.mean(),
-            attached_fraction: jobs.attached_fraction.mean(),
-            slips: self.slips.len() as u64,
-            intervals: intervals.count(),
+            slip_share: slip_share.mean().map(mean),
+            attached_fraction: attached_fraction.mean().map(mean),
+            slips,
+            intervals: tau.sorted.len() as u64,
             effective_slips: phases.effective(),
             effective_intervals: intervals.effective(),
             tau_mean: intervals.mean().map(mean),
             tau_interval: intervals.interval(),
+            tau_bound: tau.bound(),
             tau_deviation,
             tau_deviation_interval,
             tau_05,
             tau_25,
             tau_50,
-            median_interval,
+            median_interval: tau.median_interval(),
             tau_75,
             tau_95,
-            periods_mean: mean_periods.mean(),
-            periods: quantile(&periods, 0.5).map(whole),
+            periods_mean: over_period.estimate(|slip| [slip.periods]).mean().map(mean),
+            periods: over_period.quantile(0.5).map(whole),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
             expected_locking_index: expected.map(|length| length * length),
@@ -192,26 +216,21 @@ impl SetSlips {
             drop_interval: drops.interval(),
             drop_deviation,
             drop_deviation_interval,
-            peak_force_mean: self.peak_force.mean(),
-            mean_friction: jobs.friction.mean(),
-            mean_friction_interval: jobs.friction.interval(),
-            duration_mean: self.duration.mean(),
-            distance_mean: self.distance.mean(),
-            edge_distance_mean: self.edge_distance.mean(),
-            least_attached_mean: self.least_attached.mean(),
-            onset_cut_share: self.onset_cut.mean(),
-            precursors_mean: self.precursors.mean(),
-            front_speed_mean: self.front_speed.mean(),
-            slow_front_speed_mean: self.slow_front_speed.mean(),
+            peak_force_mean: means[0],
+            mean_friction: friction.mean().map(mean),
+            mean_friction_interval: friction.interval(),
+            duration_mean: means[1],
+            distance_mean: means[2],
+            edge_distance_mean: means[3],
+            least_attached_mean: means[4],
+            onset_cut_share: means[5],
+            precursors_mean: means[6],
+            front_speed_mean: means[7],
+            slow_front_speed_mean: means[8],
         };
-        let phases = OfSet { estimate: phases, deviations: phase_deviations };
-        let loads = OfSet { estimate: loads, deviations: load_deviations };
-        FinishedSet { row, intervals: sorted, seeds: self.seeds, phases, loads, below: self.below }
-    }
-
-    fn by_job(&self) -> Vec<&[SlipStats]> {
-        let ends = self.starts.iter().skip(1).copied().chain([self.slips.len()]);
-        self.starts.iter().zip(ends).map(|(&start, end)| &self.slips[start..end]).collect()
+        let intervals = tau.sorted;
+        let seeds = self.jobs.into_keys().collect();
+        FinishedSet { row, intervals, seeds, phases: of_phases, loads: of_loads, below: self.below }
     }
 }
 
@@ -225,23 +244,66 @@ fn estimate<const D: usize>(jobs: &[&[SlipStats]], quantity: impl Fn(&SlipStats)
     sequences(jobs, quantity).estimate()
 }
 
-/// Its standard deviation.
-fn deviation(
-    jobs: &[&[SlipStats]],
-    of: &Estimate<1>,
-    quantity: impl Fn(&SlipStats) -> Option<f64>,
-) -> (Option<f64>, Option<Interval>) {
-    let [mean] = of.mean().unwrap_or_default();
-    estimate(jobs, |slip| quantity(slip).map(|value| [(value - mean) * (value - mean)])).deviation()
+/// Intervals between slips, in some unit.
+struct Intervals<'a> {
+    length: fn(&SlipStats) -> f64,
+    of_jobs: Vec<&'a SlipStats>,
+    starts: Vec<usize>,
+    /// Those that have ended.
+    sorted: Vec<f64>,
+    /// If some still ran.
+    limit: Option<ProductLimit>,
 }
 
-/// Unit vectors of a set.
-#[derive(Clone, Debug)]
-pub(super) struct OfSet {
-    pub(super) estimate: Estimate<2>,
-    /// Their deviations from the mean, job by job.
-    pub(super) deviations: Sequences<2>,
+impl<'a> Intervals<'a> {
+    fn new(jobs: &[&'a [SlipStats]], length: fn(&SlipStats) -> f64) -> Self {
+        let (mut of_jobs, mut starts): (Vec<&SlipStats>, _) = (Vec::new(), Vec::new());
+        for job in jobs {
+            starts.push(of_jobs.len());
+            of_jobs.extend(job.iter().filter(|slip| !length(slip).is_nan()));
+        }
+        let ended = of_jobs.iter().filter(|slip| !slip.is_to_come());
+        let mut sorted: Vec<f64> = ended.map(|slip| length(slip)).collect();
+        sorted.sort_by(f64::total_cmp);
+        let all = of_jobs.iter().map(|slip| (length(slip), !slip.is_to_come()));
+        let limit = (sorted.len() < of_jobs.len()).then(|| ProductLimit::new(all));
+        Self { length, of_jobs, starts, sorted, limit }
+    }
+
+    /// The mean of a value over them; none if the longest still ran.
+    fn estimate<const D: usize>(&self, value: impl Fn(&SlipStats) -> [f64; D]) -> Estimate<D> {
+        let values = self.of_jobs.iter().map(|slip| value(slip)).collect();
+        let values = match &self.limit {
+            None => values,
+            Some(limit) if limit.has_mean() => limit.pseudo_values(values),
+            Some(_) => return Estimate::default(),
+        };
+        Sequences::new(values, self.starts.clone()).estimate()
+    }
+
+    fn quantile(&self, share: f64) -> Option<f64> {
+        match &self.limit {
+            None => quantile(&self.sorted, share),
+            Some(limit) => limit.quantile(share),
+        }
+    }
+
+    fn median_interval(&self) -> Option<Interval> {
+        let median = self.quantile(0.5)?;
+        let shares =
+            self.estimate(|slip| [f64::from(u8::from((self.length)(slip) <= median))]).shares_about_median()?;
+        let [low, high] = shares.map(|share| self.quantile(share));
+        Some(Interval { low: low?, high: high? })
+    }
+
+    /// What the mean is at least, where it is not known.
+    fn bound(&self) -> Option<f64> {
+        self.limit.as_ref().filter(|limit| !limit.has_mean()).map(ProductLimit::least_mean)
+    }
 }
+
+/// Unit vectors of a set: their deviations from the mean, job by job, and the mean.
+pub(super) type OfSet = (Sequences<2>, Estimate<2>);
 
 /// A set whose slips are all there.
 #[derive(Clone, Debug)]
@@ -249,7 +311,7 @@ pub(super) struct FinishedSet {
     pub(super) row: SetRow,
     /// Its intervals in s, sorted.
     pub(super) intervals: Vec<f64>,
-    /// Seeds of its jobs that have slips.
+    /// Seeds of the jobs of these phases.
     pub(super) seeds: Vec<u64>,
     pub(super) phases: OfSet,
     /// Its load phases, for η < 1.
@@ -282,7 +344,11 @@ pub(super) mod tests {
     fn reduced(jobs: SetJobs, slips: impl IntoIterator<Item = Slip>) -> SetRow {
         let limits = PhaseLimits::at(jobs.parameters.eta());
         let mut set = SetSlips::default();
-        slips.into_iter().for_each(|slip| set.push(0, &slip, &limits));
+        let mut seed = 0;
+        for slip in slips {
+            seed += u64::from(slip.number == 0);
+            set.push(seed, &slip, &limits);
+        }
         set.finish(jobs).row
     }
 
@@ -350,6 +416,72 @@ pub(super) mod tests {
         assert_eq!((still.share_below, still.phase_mean, still.locking_index, still.periods), (None, None, None, None));
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
         assert!(!still.is_locked);
+    }
+
+    fn facts(outcome: JobOutcome, time: f64, friction: f64, running_interval: Option<f64>) -> JobFacts {
+        JobFacts {
+            outcome,
+            slips: Some(1),
+            averaged_time: Some(time),
+            mean_friction: Some(friction),
+            attached_fraction: Some(0.5),
+            slip_share: Some(0.1),
+            regime: None,
+            running_interval,
+        }
+    }
+
+    #[test]
+    fn friction_counts_jobs_by_their_time_and_has_the_interval_of_the_textbook() {
+        let of = |jobs: &[(f64, f64)]| {
+            let mut set = SetJobs { parameters: jobs_without_modulation(), ..SetJobs::default() };
+            for (seed, &(time, friction)) in (0..).zip(jobs) {
+                set.push(seed, &facts(JobOutcome::Done, time, friction, None));
+            }
+            reduced(set, [])
+        };
+        let equal = of(&[(2.0, 430.0), (2.0, 434.0)]);
+        assert!((equal.mean_friction.unwrap() - 432.0).abs() < 1e-9);
+        let Interval { low, high } = equal.mean_friction_interval.unwrap();
+        assert!((low - (432.0 - 2.0 * 12.706_205)).abs() < 1e-4 && (high - (432.0 + 2.0 * 12.706_205)).abs() < 1e-4);
+        // Of three quarters of the time at 430.
+        let unequal = of(&[(3.0, 430.0), (1.0, 434.0)]);
+        assert!((unequal.mean_friction.unwrap() - 431.0).abs() < 1e-9);
+        assert_eq!(unequal.slip_share, Some(0.1));
+        assert_eq!(of(&[(3.0, 430.0)]).mean_friction_interval, None);
+    }
+
+    fn jobs_without_modulation() -> Parameters {
+        jobs(0.0, 1.0).parameters
+    }
+
+    #[test]
+    fn intervals_that_still_ran_count_as_longer_than_what_was_seen_and_leave_a_bound_if_they_are_the_longest() {
+        let of = |running: &[(u64, f64)]| {
+            let mut set = SetJobs { parameters: jobs_without_modulation(), ..SetJobs::default() };
+            for &(seed, interval) in running {
+                set.push(seed, &facts(JobOutcome::TimeLimit, 1.0, 430.0, Some(interval)));
+            }
+            let slips = [0.1, 0.3, 0.5].map(|interval| slip(Some(interval), None));
+            reduced(set, slips)
+        };
+        let close = |value: Option<f64>, expected: f64| assert!((value.unwrap() - expected).abs() < 1e-12, "{value:?}");
+        let whole = of(&[]);
+        close(whole.tau_mean, 0.3);
+        assert_eq!((whole.tau_bound, whole.slips), (None, 3));
+        // What ran for 0.2 s stands for 0.3 and 0.5 s, in its own job or in one without slips.
+        for seed in [0, 7] {
+            let row = of(&[(seed, 0.2)]);
+            close(row.tau_mean, 0.1 / 4.0 + 0.375 * 0.8);
+            assert_eq!((row.slips, row.intervals, row.tau_bound), (3, 3, None));
+            assert!(row.tau_interval.unwrap().high > whole.tau_mean.unwrap());
+            assert_eq!(row.tau_50, Some(0.3));
+            close(row.drop_mean, whole.drop_mean.unwrap());
+        }
+        let given_up = of(&[(0, 2.0)]);
+        assert_eq!((given_up.tau_mean, given_up.tau_interval, given_up.tau_deviation), (None, None, None));
+        close(given_up.tau_bound, (0.1 + 0.3 + 0.5 + 2.0) / 4.0);
+        assert_eq!((given_up.tau_50, given_up.tau_95), (Some(0.3), None));
     }
 
     #[test]

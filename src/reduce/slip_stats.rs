@@ -12,7 +12,7 @@ pub(super) struct SlipStats {
     pub(super) periods: f64,
     pub(super) phase: f64,
     pub(super) load_phase: f64,
-    /// Stress drop, in N.
+    /// Stress drop, in N; missing of a slip that is still to come when its job ends.
     pub(super) drop: f64,
 }
 
@@ -26,6 +26,16 @@ impl SlipStats {
             load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
             drop: slip.drop,
         }
+    }
+
+    /// Of a slip that would have come after its job ended: what its interval is at least.
+    pub(super) fn to_come(interval: f64, period: Option<f64>) -> Self {
+        let periods = period.map_or(f64::NAN, |period| interval / period);
+        Self { interval, periods, phase: f64::NAN, load_phase: f64::NAN, drop: f64::NAN }
+    }
+
+    pub(super) const fn is_to_come(&self) -> bool {
+        self.drop.is_nan()
     }
 }
 

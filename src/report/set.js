@@ -122,7 +122,10 @@ class SetView {
       ["regime", value("regime")],
       ["jobs, failed", `${value("jobs")}, ${value("failed_jobs")}`],
       ["slips", value("slips")],
-      ["mean interval", interval("tau_mean")],
+      [
+        "mean interval",
+        report.values("tau_mean_bound")[selected] === null ? interval("tau_mean") : `> ${value("tau_mean_bound")}`,
+      ],
       ["mean stress drop", interval("drop_mean")],
       ["mean friction", interval("mean_friction")],
     ];

@@ -3,7 +3,7 @@
 
 use super::precision::{MIN_SEEDS, need, seeds_for};
 use crate::model::Parameters;
-use crate::reduce::{Moments, PooledJob, SetRow, bin_of_sets, pool_of, row_of};
+use crate::reduce::{PooledJob, SetRow, bin_of_sets, mean_of, pool_of, row_of};
 use crate::results::layout::Layout;
 use crate::sweep::{Precision, STATISTICS, Statistic, StatisticKind, Target};
 use crate::table::storage::Disk;
@@ -74,9 +74,9 @@ fn draws(repetition: u64, is_skewed: bool) -> Vec<f64> {
 fn of_draws(repetitions: u64, least: u64, target: f64, is_skewed: bool) -> Found {
     let all: Vec<Vec<f64>> = (0..repetitions).map(|repetition| draws(repetition, is_skewed)).collect();
     let row = |repetition: u64, seeds: u64| {
-        let mut moments = Moments::default();
-        moments.extend(all[usize::try_from(repetition).unwrap()].iter().copied().take(usize::try_from(seeds).unwrap()));
-        SetRow { mean_friction: moments.mean(), mean_friction_interval: moments.interval(), ..SetRow::default() }
+        let of_seeds = &all[usize::try_from(repetition).unwrap()][..usize::try_from(seeds).unwrap()];
+        let (mean, interval) = mean_of(of_seeds);
+        SetRow { mean_friction: mean, mean_friction_interval: interval, ..SetRow::default() }
     };
     ended(repetitions, least, &precision("mean_friction", Target::Absolute(target)), 0.0, row)
 }
@@ -161,6 +161,7 @@ impl Pool {
     }
 }
 
+#[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
 fn number(row: &SetRow, column: &str) -> Option<f64> {
     row.column(column, |value| value.number()).flatten()
 }

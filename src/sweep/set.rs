@@ -62,14 +62,16 @@ columns! {
         failed_jobs: u64 = "", "jobs that failed";
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
-        slip_share: Option<f64> = "", "share of time within slips, mean over jobs";
-        attached_fraction: Option<f64> = "", "time-averaged fraction of contacts that are attached, mean over jobs";
+        slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
+        attached_fraction: Option<f64> = "", "fraction of contacts that are attached, over the time of all jobs";
         slips: u64 = "", "slips of all seeds";
         intervals: u64 = "", "intervals between slips";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
         effective_intervals: Option<f64> = "", "the same of intervals";
         tau_mean: Option<f64> = "s", "mean interval";
         tau_interval as "tau_mean": Option<Interval> = "s", "lower end of its 95 % confidence interval";
+        tau_bound as "tau_mean_bound": Option<f64> = "s",
+            "what tau_mean is at least, if it is null since the longest interval had not ended when its job did";
         tau_deviation as "tau_sd": Option<f64> = "s", "standard deviation of the intervals";
         tau_deviation_interval as "tau_sd": Option<Interval> = "s", "lower end of its 95 % confidence interval";
         tau_05: Option<f64> = "s", "5 % quantile of the intervals";
@@ -101,7 +103,7 @@ columns! {
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
         drop_deviation_interval as "drop_sd": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         peak_force_mean: Option<f64> = "N", "mean shear force at the onset of slips";
-        mean_friction: Option<f64> = "N", "time-averaged shear force, mean over jobs";
+        mean_friction: Option<f64> = "N", "shear force, over the time of all jobs";
         mean_friction_interval as "mean_friction": Option<Interval> = "N",
             "lower end of its 95 % confidence interval, of jobs as units";
         duration_mean: Option<f64> = "s", "mean duration of slips";
