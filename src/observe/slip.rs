@@ -301,7 +301,8 @@ impl SlipObserver {
     pub fn running_interval(&self) -> Option<f64> {
         let is_past_start_up = self.slips_seen >= self.recording.discard;
         let is_whole = self.slips.len() as u64 >= self.recording.slips;
-        let end = if self.has_given_up { self.now.time } else { self.since_slip.time };
+        let peak = self.rupture.as_ref().and_then(|active| active.onset).unwrap_or(self.since_slip);
+        let end = if self.has_given_up { self.now.time } else { peak.time };
         let last = self.last_onset.filter(|_| self.has_given_up || is_past_start_up && !is_whole)?;
         Some(end - last)
     }

@@ -141,10 +141,15 @@ fn a_job_that_ends_within_an_interval_knows_what_it_is_at_least() {
         assert_eq!(run(Some(0.01)).running_interval, None);
     }
     assert!(least < 0.1 && most > 0.9, "{least} to {most}");
-    // One that gives up has seen the whole time since its last slip.
-    let recording = Recording { give_up_after: Some(0.5e-5), ..Recording::default() };
-    let given_up = measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap();
-    assert!(given_up.has_given_up && given_up.slips.is_empty());
+    // One that gives up knows the whole time since its last slip, if there was any.
+    let gives_up = |drive_velocity| {
+        let parameters = Parameters { drive_velocity, ..parameters.clone() };
+        let recording = Recording { give_up_after: Some(3e-6), ..Recording::default() };
+        measure(&parameters, &recording, Solver::default(), &AtomicBool::new(false)).unwrap()
+    };
+    let (some, none) = (gives_up(1e-4), gives_up(2e-4));
+    assert!(some.has_given_up && some.running_interval.unwrap() >= 3e-6 / 1e-4, "{:?}", some.running_interval);
+    assert!(none.has_given_up && none.slips.is_empty() && none.running_interval.is_none());
 }
 
 /// Follows a simulation to its first break.
