@@ -11,7 +11,7 @@ reduced/sets.parquet.
 import argparse
 from pathlib import Path
 
-from .statistics import Estimate, difference, locking_index
+from .statistics import Estimate, difference, friction_difference, locking_index
 from .tables import Sweep
 
 
@@ -23,7 +23,7 @@ def compare(results: Path, first: str, second: str) -> dict[str, Estimate]:
     found = {"interval": difference(*slips, "interval")}
     if all(rows["T"].notna().any() for rows in slips):
         found["locking_index"] = difference(*slips, "tau_over_T", locking_index)
-    return found | {"mean_friction": difference(*jobs, "mean_friction")}
+    return found | {"mean_friction": friction_difference(*jobs)}
 
 
 def main() -> None:

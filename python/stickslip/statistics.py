@@ -118,6 +118,17 @@ def difference(
     return jackknife(lambda left, right: statistic(left[column]) - statistic(right[column]), *rows)
 
 
+def over_time(jobs: pandas.DataFrame, column: str = "mean_friction") -> float:
+    """An average of jobs over the time of all of them."""
+    return float((jobs[column] * jobs["averaged_time"]).sum() / jobs["averaged_time"].sum())
+
+
+def friction_difference(left: pandas.DataFrame, right: pandas.DataFrame) -> Estimate:
+    """The difference left - right of the mean friction of jobs, paired by seed."""
+    rows = [frame.dropna(subset="mean_friction") for frame in (left, right)]
+    return jackknife(lambda left, right: over_time(left) - over_time(right), *rows)
+
+
 def bootstrap(statistic: Callable[[pandas.DataFrame], float], frame: pandas.DataFrame, unit: str) -> Estimate:
     """A statistic that is not smooth, such as a quantile: percentiles over units drawn with replacement."""
     rows = list(frame.groupby(unit).indices.values())

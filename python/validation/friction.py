@@ -7,7 +7,7 @@ import numpy
 import pandas
 from scipy import stats
 
-from stickslip.statistics import Estimate, difference, jackknife, share
+from stickslip.statistics import Estimate, friction_difference, jackknife, over_time, share
 from stickslip.tables import Sweep, parameters, read, select
 
 from .document import Section
@@ -29,11 +29,11 @@ def friction(results: Path) -> Section:
     sweep = Sweep(results / "friction")
     jobs, slips = sweep.table("jobs"), sweep.slips()
     still, still_slips = select(jobs, Delta=0.0), select(slips, Delta=0.0)
-    peak, stiffness, reference = still_slips["peak_force"].mean(), still["Kd"].iloc[0], still["mean_friction"].mean()
+    peak, stiffness, reference = still_slips["peak_force"].mean(), still["Kd"].iloc[0], over_time(still)
     curves = {f: [] for f in FREQUENCIES}
     for amplitude in sorted(set(jobs["Delta"]) - {0.0}):
         for f, curve in curves.items():
-            change = difference(select(jobs, Delta=amplitude, T=1 / f), still, "mean_friction")
+            change = friction_difference(select(jobs, Delta=amplitude, T=1 / f), still)
             curve.append((stiffness * amplitude / peak, 100 * change.value / reference))
     tenth = {f: first_below(curve, -10) for f, curve in curves.items()}
     at_velocities(section, Sweep(results / "friction-drives"))
