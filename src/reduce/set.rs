@@ -72,9 +72,7 @@ impl SetJobs {
             (regime, other) => other.or(regime),
         };
     }
-}
 
-impl SetJobs {
     /// An average over the time of all jobs: by pseudo-values, one for each job, which weigh it by its time.
     fn over_time(&self, of: impl Fn(&Averages) -> f64) -> Estimate<1> {
         let sum = |of: &dyn Fn(&Averages) -> f64| self.averages.values().map(of).sum::<f64>();
