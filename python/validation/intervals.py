@@ -103,9 +103,10 @@ def stick_slip(results: Path) -> Section:
         f"{seen.text(2)} have any, of {VISIBLE * peak:.1f} N",
         seen.low > 0.5,
     )
+    parts = ", ".join(f"{len(rows) / len(slips):.0%}" for rows in of_modes)
     section.verdict = (
         "holds in part",
-        f"τ has {len(modes)} modes, not two, with {', '.join(f'{len(rows) / len(slips):.0%}' for rows in of_modes)} of"
+        f"τ has {len(modes)} modes{'' if len(modes) == 2 else ', not two'}, with {parts} of"
         f" the slips; {two_or_three[SIZES[0]].value:.2f} of the slips, not most, have two or three precursors",
     )
     most = [size for size, found in two_or_three.items() if found.low > 0.5]
