@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 const TINY: &str = "name = \"tiny\"\n[model]\nN = 3\nNs = 4\n[axes]\nseed = { count = 3 }\n[record]\nslips = 2\n";
 
 /// Jobs of some 20 ms, of which several make a part.
-const DEAR: &str = "name = \"dear\"\n[axes]\nseed = { count = 300 }\n[record]\nslips = 8\n";
+const DEAR: &str = "name = \"dear\"\n[axes]\nseed = { count = 300 }\n[record]\nslips = 16\n";
 
 /// Names of the parts as the logs have them, in order.
 fn committed(folder: &Folder, directory: &str) -> Vec<String> {
