@@ -9,7 +9,7 @@ use super::sequence::{Estimate, Sequences};
 use super::slip_stats::{SlipStats, non_nan};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
-use crate::model::theory::random_load_mean;
+use crate::model::theory::{finite_resultant, random_load_mean};
 use crate::observe::{Averages, Regime, Slip};
 use crate::results::tables::JobOutcome;
 use crate::sweep::Interval;
@@ -153,7 +153,7 @@ impl SetSlips {
         let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
         let expected = (phases.count() > 0).then(|| {
             let [real, imaginary] = random_load_mean(eta);
-            real.hypot(imaginary)
+            finite_resultant(real.hypot(imaginary), phases.count())
         });
         let [tau_05, tau_25, tau_50, tau_75, tau_95] = QUANTILES.map(|share| tau.quantile(share));
         let square = |of: &Estimate<1>| {
@@ -176,6 +176,7 @@ impl SetSlips {
             eta,
             finished_jobs: jobs.finished,
             failed_jobs: jobs.failed,
+            is_control: false,
             jobs_without_slips: jobs.without_slips,
             regime: jobs.regime,
             slip_share: slip_share.mean().map(mean),
@@ -199,11 +200,16 @@ impl SetSlips {
             periods: over_period.quantile(0.5).map(whole),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
-            expected_locking_index: expected.map(|length| length * length),
+            locking_index_drive: None,
+            locking_index_excess: None,
+            locking_excess_interval: None,
             phase_mean: phases.direction(limits.top),
             phase_interval: phases.direction_interval(limits.top),
             resultant_length,
             length_interval: phases.length_interval(),
+            resultant_drive: None,
+            resultant_excess: None,
+            resultant_excess_interval: None,
             expected_resultant: expected,
             rayleigh_p,
             load_rayleigh_p: loads.rayleigh(),

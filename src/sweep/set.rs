@@ -60,6 +60,7 @@ columns! {
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
         finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
         failed_jobs: u64 = "", "jobs that failed";
+        is_control as "control": bool = "", "whether its jobs were run as a control alone (`control = true`), and not for themselves";
         jobs_without_slips: u64 = "", "of the jobs run to an end, those that gave up since no slip came";
         regime: Option<Regime> = "", "`stick-slip`, `mixed` or `sliding`, as all jobs; `mixed` if they differ";
         slip_share: Option<f64> = "", "share of time within slips, over the time of all jobs";
@@ -84,15 +85,21 @@ columns! {
         periods: Option<u64> = "", "n of tau = n T: the median of the intervals over T at their onset, rounded";
         locking_index: Option<f64> = "", "|<exp(2 pi i tau / T)>|: 1 if every interval is a whole number of periods";
         locking_interval as "locking_index": Option<Interval> = "", "lower end of its 95 % confidence interval";
-        expected_locking_index: Option<f64> = "",
-            "the same of slips at random loads that exceed all before, which is no locking: expected_resultant squared; null without modulation";
+        locking_index_drive: Option<f64> = "",
+            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
+        locking_index_excess: Option<f64> = "", "locking_index less locking_index_drive: what the slider adds";
+        locking_excess_interval as "locking_index_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         phase_mean: Option<f64> = "rad", "circular mean of the phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
+        resultant_drive: Option<f64> = "",
+            "the same by the drive alone: slips at the very loads of the control, under this modulation; null without a control";
+        resultant_excess: Option<f64> = "", "resultant_length less resultant_drive: what the slider adds";
+        resultant_excess_interval as "resultant_excess": Option<Interval> = "", "lower end of its 95 % confidence interval";
         expected_resultant: Option<f64> = "",
-            "the same of slips at random loads that exceed all before; null without modulation";
+            "mean resultant length of as many independent slips at random loads that exceed all before; null without modulation";
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
         load_rayleigh_p: Option<f64> = "",
             "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
@@ -149,7 +156,7 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
         // parameters, and what is expected whatever happens, tell nothing of a set.
         let Cow::Borrowed(key) = column.name else { return None };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given = Symbol::from_key(key).is_some() || key.starts_with("expected_");
+        let is_given = Symbol::from_key(key).is_some() || key.starts_with("expected_") || key == "control";
         let kind = match column.kind {
             Kind::Flag | Kind::Text | Kind::Count => StatisticKind::Class,
             Kind::Real if !has_interval(key) => StatisticKind::Number,
@@ -187,6 +194,6 @@ mod tests {
         for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {
             assert_eq!(of(other), None, "{other}");
         }
-        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 9);
+        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 11);
     }
 }
