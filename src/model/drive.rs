@@ -6,8 +6,8 @@
 //! cycle has no end.
 
 use super::Parameters;
-use super::theory::eta;
-use std::f64::consts::TAU;
+use super::theory::{eta, load_maximum_phase};
+use std::f64::consts::{PI, TAU};
 
 /// The far end of the driving spring, within one cycle of the modulation.
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +114,42 @@ impl Drive {
         if self.is_modulated() { TAU * ((time - self.cycle_start) / self.period).fract() } else { 0.0 }
     }
 
+    /// When the driven end first gets as far as it would be at a time in s of the present cycle without modulation, in s: the
+    /// first t with u(t) >= V0 `time`.
+    pub fn first_passage(&self, time: f64) -> f64 {
+        const STEPS: u32 = 60;
+        if !self.is_modulated() {
+            return time;
+        }
+        let periods = (time - self.cycle_start) / self.period;
+        // u is θ + η (cos θ - 1) in units of V0 T/2π, at most θ, and so not further before this turn begins.
+        let (whole, level, eta) = (periods.floor(), TAU * periods.fract(), self.eta());
+        let load = |angle: f64| angle + eta * (libm::cos(angle) - 1.0);
+        // It grows from 0 to the maximum, and from the minimum on.
+        let (mut low, mut high) = match load_maximum_phase(eta) {
+            Some(maximum) if level <= load(maximum) => (0.0, maximum),
+            Some(maximum) => (PI - maximum, TAU),
+            None => (0.0, TAU),
+        };
+        let mut angle = 0.5 * (low + high);
+        for _ in 0..STEPS {
+            let (sine, cosine) = libm::sincos(angle);
+            let rest = level - (angle + eta * (cosine - 1.0));
+            if rest > 0.0 {
+                low = angle
+            } else {
+                high = angle
+            }
+            let newton = angle + rest / (1.0 - eta * sine);
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if (next - angle).abs() <= f64::EPSILON * TAU {
+                break;
+            }
+            angle = next;
+        }
+        self.cycle_start + (whole + angle / TAU) * self.period
+    }
+
     /// Displacement u(t) in m and velocity u'(t) in m/s of the driven end, at a time in s.
     pub fn motion(&self, time: f64) -> (f64, f64) {
         let ramp = self.velocity * time;
@@ -158,6 +194,38 @@ mod tests {
         }
         // The mean frequency over the ramp is ln(0.05/0.03)/0.02 Hz.
         assert!((f64::from(joints) - 2.0 * 25.54).abs() < 2.0, "{joints}");
+    }
+
+    #[test]
+    fn the_first_passage_is_where_the_driven_end_first_gets_that_far() {
+        let drive = |amplitude: f64, period: f64| {
+            Drive::new(&Parameters {
+                modulation_amplitude: amplitude,
+                modulation_period: Some(period),
+                ..Parameters::default()
+            })
+        };
+        let drives = [drive(1e-7, 0.03), drive(1e-6, 0.034), drive(4.77e-7, 0.03), drive(3e-6, 0.002), ramped()];
+        for mut drive in drives {
+            let mut walked = drive;
+            let (mut step, mut furthest) = (0_u32, 0.0_f64);
+            for number in 1..200 {
+                let time = 0.0107 * f64::from(number);
+                drive.advance_to(time);
+                let passage = drive.first_passage(time);
+                let level = drive.velocity * time;
+                assert!(passage >= time - 1e-12 && passage <= time + drive.period);
+                assert!((drive.motion(passage).0 - level).abs() < 1e-15, "{number}");
+                // Nowhere before.
+                while f64::from(step) * 1e-5 < passage - 1e-9 {
+                    let now = f64::from(step) * 1e-5;
+                    walked.advance_to(now);
+                    furthest = furthest.max(walked.motion(now).0);
+                    step += 1;
+                }
+                assert!(furthest < level + 1e-15, "{number}: {furthest:e} before {level:e}");
+            }
+        }
     }
 
     #[test]

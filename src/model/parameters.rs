@@ -162,6 +162,18 @@ impl Parameters {
         eta(self.modulation_frequency(), self.modulation_amplitude, self.drive_velocity)
     }
 
+    /// The same without modulation, in canonical form.
+    pub fn without_modulation(&self) -> Self {
+        Self {
+            modulation_amplitude: 0.0,
+            modulation_period: None,
+            turning_period: None,
+            turning_amplitude: None,
+            ramp_time: 0.0,
+            ..self.clone()
+        }
+    }
+
     /// Wave crossing time `t_c = N sqrt(m/K_int)`, in s: no front spans a longer gap between breaks. For one block, its
     /// period 2π sqrt(m/(`K_s` + `K_d`)).
     pub fn wave_crossing_time(&self) -> f64 {

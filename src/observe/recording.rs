@@ -22,6 +22,8 @@ fields! {
             "Minimum drop of the shear force to look for; none: drops are not looked for";
         Energies("energies") energies: bool = false, "", FLAG,
             "Whether the work of the drive and its losses are recorded for each slip; resolves in Taylor steps, at some ten times the cost";
+        Control("control") control: bool = false, "", FLAG,
+            "Whether each modulated set is also run without modulation, for what the drive alone explains";
         GiveUpAfter("give_up_after") give_up_after: Option<f64> = None, "m", POSITIVE,
             "Distance `V0 t` of the drive without a slip after which a job ends, with the outcome `no slips`; none: 20 typical intervals between slips and two periods";
     }

@@ -8,15 +8,16 @@
 //! the next sets.
 
 use super::PhaseLimits;
+use super::drive_alone::Controls;
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
-use crate::results::layout::Layout;
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
 use crate::results::{Results, ResultsError};
+use crate::sweep::Sweep;
 use crate::table::columns::columns;
 use crate::table::file::{Dataset, DatasetError};
 use std::cmp::Ordering;
@@ -55,7 +56,7 @@ pub fn reduce_jobs(
     results: &Results<'_>,
     is_wanted: impl Fn(&Parameters) -> bool,
 ) -> Result<Vec<SetRow>, ResultsError> {
-    let gathered = Gathering::of_jobs(results.layout(), &is_wanted)?;
+    let gathered = Gathering::of_jobs(results, &is_wanted)?;
     let mut rows = Vec::new();
     gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
         rows.push(set.row);
@@ -69,11 +70,14 @@ pub(super) struct Gathering<'a> {
     pub(super) sets: Vec<SetJobs>,
     slips: Dataset<'a>,
     is_wanted: Wanted<'a>,
+    sweep: &'a Sweep,
+    controls: Controls,
 }
 
 impl<'a> Gathering<'a> {
     /// The sets of the wanted jobs, in the order of their parameters.
-    pub(super) fn of_jobs(layout: &Layout<'a>, is_wanted: Wanted<'a>) -> Result<Self, DatasetError> {
+    pub(super) fn of_jobs(results: &'a Results<'a>, is_wanted: Wanted<'a>) -> Result<Self, DatasetError> {
+        let (layout, sweep) = (results.layout(), results.sweep());
         // Listed once: what other runs commit meanwhile is left out as a whole.
         let jobs = layout.dataset(JOBS)?;
         let slips = committed_files(layout, SLIPS, &jobs)?;
@@ -85,7 +89,8 @@ impl<'a> Gathering<'a> {
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
         sets.sort_by(by_parameters);
-        Ok(Self { sets, slips, is_wanted })
+        let controls = Controls::read(layout, sweep, sets.iter().map(|set| &set.parameters))?;
+        Ok(Self { sets, slips, is_wanted, sweep, controls })
     }
 
     /// Hands on set after set, each with every `spacing`-th slip of the table as a point and its place in the table.
@@ -97,7 +102,8 @@ impl<'a> Gathering<'a> {
     ) -> Result<(), DatasetError> {
         for chunk in chunks(self.sets, max_slips) {
             for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
-                let (set, points) = set.finish();
+                let (mut set, points) = set.finish();
+                self.controls.explain(self.sweep, &mut set.row, &set.seeds);
                 finished(set, points)?;
             }
         }
@@ -217,7 +223,7 @@ pub(crate) struct PooledJob {
 
 /// All jobs of a directory by their sets, in the order of parameters and seeds.
 #[cfg(test)]
-pub(crate) fn pool_of(layout: &Layout<'_>) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
+pub(crate) fn pool_of(layout: &crate::results::layout::Layout<'_>) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
     let jobs = layout.dataset(JOBS)?;
     let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
     each_job(&jobs, &|_| true, |JobOfSet { set_id, facts }, parameters| {

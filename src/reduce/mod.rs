@@ -5,6 +5,7 @@ mod backbone;
 mod cells;
 mod circular;
 mod confidence;
+mod drive_alone;
 mod gather;
 mod histogram;
 mod product_limit;

@@ -46,11 +46,12 @@ pub fn read_reduced<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>, D
     Ok(batches.collect::<Result<Vec<Vec<R>>, _>>()?.into_iter().flatten().collect())
 }
 
-/// The sets with at least one interval or a regime, in order, if there are at most `max` of them; else none.
+/// The sets with at least one interval or a regime, controls left out, in order, if there are at most `max` of them; else none.
 pub fn read_sets(layout: &Layout<'_>, max: usize) -> Result<Vec<SetRow>, DatasetError> {
     let mut sets = Vec::new();
     for batch in Dataset::new(layout.storage, vec![layout.reduced_file(SetRow::NAME)]).rows::<SetRow>() {
-        sets.extend(batch?.into_iter().filter(|row| row.intervals > 0 || row.regime.is_some()));
+        let rows = batch?.into_iter().filter(|row| !row.is_control);
+        sets.extend(rows.filter(|row| row.intervals > 0 || row.regime.is_some()));
         if sets.len() > max {
             return Ok(Vec::new());
         }

@@ -35,6 +35,7 @@ pub struct ReductionSummary {
     /// Jobs run to an end.
     pub jobs: u64,
     pub failed_jobs: u64,
+    /// Controls left out, as in all that follows.
     pub sets: u64,
     /// Sets with modulation whose phases are locked.
     pub locked_sets: u64,
@@ -68,7 +69,7 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
 /// Reads the tables, and stages what they are reduced to.
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
-    let gathering = Gathering::of_jobs(layout, &|_| true)?;
+    let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
         bail!(NoJobs { tables: layout.table(JOBS) });
@@ -77,7 +78,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut summary = ReductionSummary {
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
-        sets: all_jobs.len() as u64,
+        sets: 0,
         locked_sets: 0,
         slips: 0,
         points: 0,
@@ -100,6 +101,10 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         let row = &set.row;
         let chosen = set_writer.push(row)?.filter(|_| refinement.is_some());
         refined_sets.extend(chosen.map(|number| (number, row.clone())));
+        if row.is_control {
+            return Ok(());
+        }
+        summary.sets += 1;
         histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);
         summary.slips += row.slips;

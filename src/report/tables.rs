@@ -71,6 +71,7 @@ columns! {
         regime: Option<Regime>;
         slips: u64;
         is_locked as "locked": bool;
+        is_control as "control": bool;
     }
 }
 
@@ -79,7 +80,7 @@ impl Census {
         let regimes = Regime::ALL.map(|regime| (regime.word(), 0)).into();
         let mut census = Self { regimes, ..Self::default() };
         for batch in sets_file(layout).rows::<Counted>() {
-            for set in batch? {
+            for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
                 census.locked += u64::from(set.is_locked);
@@ -126,7 +127,8 @@ impl Sets {
         };
         let mut number = 0_u64..;
         for batch in sets_file(layout).rows::<SetRow>() {
-            for (row, _) in batch?.into_iter().zip(&mut number).filter(|(_, number)| number.is_multiple_of(spacing)) {
+            let rows = batch?.into_iter().filter(|row| !row.is_control);
+            for (row, _) in rows.zip(&mut number).filter(|(_, number)| number.is_multiple_of(spacing)) {
                 sets.push(sweep, row);
             }
         }

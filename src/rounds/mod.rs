@@ -29,7 +29,8 @@ pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     let points = merged(rounds.flat_map(|round| round.points.iter().cloned()).collect());
     let chosen = Round { points, ..Round::default() };
     let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
-    let numbered = |row: SetRow| Some((sweep.set_with(&row.parameters.parameters)?, row));
+    let numbered =
+        |row: SetRow| Some((sweep.set_with(&row.parameters.parameters)?, row)).filter(|(_, row)| !row.is_control);
     Ok(decide(sweep, &reduce_jobs(results, is_chosen)?.into_iter().filter_map(numbered).collect()))
 }
 
@@ -57,5 +58,5 @@ fn decide(sweep: &Sweep, sets: &BTreeMap<u64, SetRow>) -> Round {
         let seeds = rounds.seeds_at_first(sweep.seed_count());
         points.extend(new.into_iter().flat_map(|set| sweep.points_of_set(set, 0..seeds)));
     }
-    Round { points: merged(points), standing }
+    Round { points: sweep.with_controls(points), standing }
 }

@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
-use super::rounds::{Bounds, Round, Rounds, Standing, merged};
+use super::rounds::{Bounds, Round, Rounds, Standing};
 use crate::model::{Parameters, Symbol};
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -58,6 +58,10 @@ impl Sweep {
     }
 
     pub fn set_of(&self, point: u64) -> u64 {
+        let count = self.point_count();
+        if let (Some(controls), Some(control)) = (&self.controls, point.checked_sub(count)) {
+            return count + controls.set_of(control);
+        }
         let stride = self.seed_stride();
         point - point / stride % self.seed_count() * stride
     }
@@ -121,7 +125,7 @@ impl Sweep {
     pub fn first_round(&self) -> Option<Round> {
         let seeds = self.rounds.as_ref()?.seeds_at_first(self.seed_count());
         let sets = self.first_sets();
-        let points = merged(sets.iter().flat_map(|&set| self.points_of_set(set, 0..seeds)).collect());
+        let points = self.with_controls(sets.iter().flat_map(|&set| self.points_of_set(set, 0..seeds)).collect());
         Some(Round { points, standing: Standing { sets_open: sets.len() as u64, ..Standing::default() } })
     }
 }

@@ -129,6 +129,10 @@ impl Axis {
 }
 
 impl Table {
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
     /// Where a row stands among the sorted ones, against one that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let columns = |fix_period| self.columns.iter().filter(move |column| column.quantity.is_period() == fix_period);

@@ -80,11 +80,11 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
     period(sweep, places)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
         && let Some(((quantity, problem), point)) =
-            sweep.admitted(sweep.points()).find_map(|(_, point)| Some((invalid(&point)?, point)))
+            sweep.admitted(0..sweep.point_count()).find_map(|(_, point)| Some((invalid(&point)?, point)))
     {
         return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
-    let Some((_, first)) = sweep.admitted(sweep.points()).next() else {
+    let Some((_, first)) = sweep.admitted(0..sweep.point_count()).next() else {
         return Err(file.source.refuse(place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
     if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {

@@ -17,7 +17,8 @@ impl Sweep {
                 words.push(format!("--set {}={value}", symbol.key()));
             }
         }
-        for key in RecordingKey::ALL {
+        // A single job has no control.
+        for key in RecordingKey::ALL.into_iter().filter(|&key| key != RecordingKey::Control) {
             let value = self.recording.get(key);
             match key {
                 // Its default is another there.

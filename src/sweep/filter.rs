@@ -90,6 +90,11 @@ impl Condition {
         expression.demanded(true, start).map(Self)
     }
 
+    /// Whether it names a quantity of a kind.
+    pub fn names(&self, is_meant: impl Fn(Quantity) -> bool) -> bool {
+        self.0.names(&is_meant)
+    }
+
     /// Whether a canonical point fulfils it.
     pub fn holds(&self, point: &Point) -> bool {
         self.0.evaluate(point) == 1.0
@@ -106,6 +111,15 @@ impl Expression {
                 let (left, operator, right) = &**combined;
                 (operator.combine)(left.evaluate(point), right.evaluate(point))
             }
+        }
+    }
+
+    fn names(&self, is_meant: &dyn Fn(Quantity) -> bool) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Quantity(quantity) => is_meant(*quantity),
+            Self::Negative(number) => number.names(is_meant),
+            Self::Combined(combined) => combined.0.names(is_meant) || combined.2.names(is_meant),
         }
     }
 

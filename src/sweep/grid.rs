@@ -28,6 +28,8 @@ pub struct Sweep {
     pub(super) solver: Solver,
     pub(super) identity: Identity,
     pub(super) rounds: Option<Rounds>,
+    /// The sweep of its controls; see `controls.rs`.
+    pub(super) controls: Option<Box<Self>>,
 }
 
 impl Sweep {
@@ -66,18 +68,25 @@ impl Sweep {
         self.axes.iter().map(Axis::len).product()
     }
 
+    /// Numbers of the points of the grid, and of the controls after them.
     pub(super) fn points(&self) -> Range<u64> {
-        0..self.point_count()
+        0..self.point_count() + self.controls.as_ref().map_or(0, |controls| controls.point_count())
     }
 
-    /// The jobs in grid order.
+    /// The jobs in grid order, then their controls.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         self.jobs_at(self.points())
     }
 
-    /// The jobs at these points, in grid order.
+    /// The jobs at these points, in order.
     pub(super) fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
-        self.admitted(points).map(|(point, Point { parameters, .. })| {
+        let count = self.point_count();
+        let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
+        let others = points.start.max(count) - count..points.end.max(count) - count;
+        let controls = self.controls.iter().flat_map(move |controls| controls.admitted(others.clone()));
+        let controls = controls.map(move |(number, point)| (count + number, point));
+        let is_own = |(_, point): &(u64, Point)| self.find_in_grid(&point.parameters).is_none();
+        of_grid.chain(controls.filter(is_own)).map(|(point, Point { parameters, .. })| {
             let cost = predicted_cost(&parameters, &self.recording, self.solver);
             Job { point, parameters, cost }
         })
@@ -90,6 +99,11 @@ impl Sweep {
 
     /// Number of the point that is the job with these canonical parameters.
     pub fn find(&self, parameters: &Parameters) -> Option<u64> {
+        let control = || Some(self.point_count() + self.controls.as_ref()?.find_in_grid(parameters)?);
+        self.find_in_grid(parameters).or_else(control)
+    }
+
+    fn find_in_grid(&self, parameters: &Parameters) -> Option<u64> {
         let rows: Vec<u64> = self.axes.iter().map(|axis| axis.find(parameters)).collect::<Option<_>>()?;
         let point = self.point(&rows).canonical();
         let is_job = point.parameters == *parameters && self.admits(&point);
@@ -139,7 +153,7 @@ impl Sweep {
             .any(|quantity| quantity == Quantity::Parameter(symbol) || (symbol == Symbol::T && quantity.is_period()))
     }
 
-    /// Those of these points that are jobs, with their numbers, in canonical form.
+    /// Those of these points of the grid that are jobs, with their numbers, in canonical form.
     pub(super) fn admitted(&self, points: Range<u64>) -> impl Iterator<Item = (u64, Point)> + Clone + Send + '_ {
         self.walk(self.row_counts(), points).filter(|(_, point)| self.admits(point))
     }

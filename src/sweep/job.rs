@@ -34,8 +34,9 @@ impl fmt::Display for Id {
     }
 }
 
-/// Keys and values of the solver and the recording, as a sweep file writes them, but for the longest time and the budget of
-/// events: they change no job that ends by itself, and always count as the default. Values read back to the same bits.
+/// Keys and values of the solver and the recording, as a sweep file writes them, but for the longest time, the budget of
+/// events and the controls: they change no job that ends by itself, and always count as the default. Values read back to the
+/// same bits.
 pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> + use<> {
     let solver = match solver {
         Solver::EventDriven { tolerance, resolve } => vec![
@@ -48,7 +49,8 @@ pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<I
         }
     };
     let default = Recording::default();
-    let recording = Recording { max_time: default.max_time, max_events: default.max_events, ..*recording };
+    let Recording { max_time, max_events, control, .. } = default;
+    let recording = Recording { max_time, max_events, control, ..*recording };
     let solver = solver.into_iter().map(|(key, value)| (format!("solver.{key}"), value));
     solver.chain(RecordingKey::ALL.map(|key| (format!("record.{}", key.key()), recording.get(key).to_string())))
 }
@@ -143,7 +145,7 @@ mod tests {
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 FN=4000 L=0.15 break_on=magnitude seed=0 \
                 solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.discard=5 \
                 record.max_time=none record.max_events=1000000000 record.precursor_size=none record.precursors=false \
-                record.drop_size=none record.energies=false record.give_up_after=none"
+                record.drop_size=none record.energies=false record.control=false record.give_up_after=none"
             )
         );
     }
@@ -177,12 +179,13 @@ mod tests {
     #[test]
     fn solver_and_recording_but_for_bounds_change_every_id() {
         let mut recordings = vec![Recording::default()];
-        let bounded = Recording { max_time: Some(7.0), max_events: 7, ..Recording::default() };
+        let bounded = Recording { max_time: Some(7.0), max_events: 7, control: true, ..Recording::default() };
         let solver = Solver::FixedStep { time_step: 1e-6 };
         let id = |recording| Identity::new(solver, recording).job(&Parameters::default());
         assert_eq!(id(&bounded), id(&Recording::default()));
-        for key in
-            RecordingKey::ALL.into_iter().filter(|key| !matches!(key, RecordingKey::MaxTime | RecordingKey::MaxEvents))
+        for key in RecordingKey::ALL
+            .into_iter()
+            .filter(|key| !matches!(key, RecordingKey::MaxTime | RecordingKey::MaxEvents | RecordingKey::Control))
         {
             let before = recordings.len();
             for value in [Value::Real(7.0), Value::Real(7.0_f64.next_up()), Value::Flag(true)] {

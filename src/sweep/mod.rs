@@ -5,6 +5,7 @@
 //! source.rs      read_axes.rs   grid.rs   job.rs   plan.rs
 //! read.rs        axes.rs                  cost.rs
 //! checks.rs      filter.rs
+//! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set
 //! ```
@@ -17,6 +18,7 @@ mod adaptive;
 mod axes;
 mod checks;
 mod command;
+mod controls;
 mod cost;
 mod filter;
 mod grid;

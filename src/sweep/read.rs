@@ -66,7 +66,8 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let rounds = has_rounds.then_some(Rounds { precision, refinement });
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
-    let sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds };
+    let mut sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds, controls: None };
+    sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places)?;
     if has_rounds {
         let sets = sweep.first_sets().len() as u64;
