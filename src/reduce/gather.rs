@@ -223,7 +223,9 @@ pub(crate) struct PooledJob {
 
 /// All jobs of a directory by their sets, in the order of parameters and seeds.
 #[cfg(test)]
-pub(crate) fn pool_of(layout: &crate::results::layout::Layout<'_>) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
+pub(crate) fn pool_of(
+    layout: &crate::results::layout::Layout<'_>,
+) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
     let jobs = layout.dataset(JOBS)?;
     let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
     each_job(&jobs, &|_| true, |JobOfSet { set_id, facts }, parameters| {

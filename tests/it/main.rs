@@ -4,6 +4,7 @@
 mod accuracy;
 mod bad_input;
 mod batch;
+mod controls;
 mod damage;
 mod deterministic_rows;
 mod differential;

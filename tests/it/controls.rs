@@ -1,0 +1,30 @@
+//! Controls of the built program: what the drive alone explains, added to a finished sweep.
+
+use crate::program::{Folder, json};
+
+const SWEEP: &str = "name = \"small\"\n[model]\nN = 10\nNs = 5\nfrequency = 29\n[axes]\nDelta = [3e-7, 1e-6]\nV0 = [5e-5, 1e-4]\n\
+                     seed = { count = 3 }\n[record]\nslips = 12\n";
+
+#[test]
+fn controls_run_once_for_the_other_values_and_are_no_sets_of_their_own() {
+    let folder = Folder::new();
+    folder.write("plain.toml", SWEEP);
+    folder.write("control.toml", &format!("{SWEEP}control = true\n"));
+    let plain = json(&folder.ends(0, "run plain.toml --out out --json").stdout);
+    assert_eq!(plain["jobs_run"].as_u64(), Some(12));
+    let before = folder.ends(0, "reduce out --json").stdout;
+    // Two velocities of three seeds; nothing else runs again.
+    let added = json(&folder.ends(0, "run control.toml --out out --json").stdout);
+    assert_eq!(added["jobs_run"].as_u64(), Some(6));
+    folder.ends(0, "verify out");
+    let after = folder.ends(0, "reduce out --json").stdout;
+    let of = |text: &str, key: &str| json(text)[key].as_u64();
+    assert_eq!((of(&after, "jobs"), of(&before, "jobs")), (Some(18), Some(12)));
+    for key in ["sets", "slips", "points"] {
+        assert_eq!(of(&after, key), of(&before, key), "{key}");
+    }
+    // In one run from the beginning, and in two shares, the statistics are the same.
+    folder.ends(0, "run control.toml --out whole");
+    let sets = |out: &str| folder.contents(&format!("{out}/reduced"));
+    assert!(sets("out") == sets("whole"));
+}
