@@ -136,9 +136,9 @@ impl Drive {
             let (sine, cosine) = libm::sincos(angle);
             let rest = level - (angle + eta * (cosine - 1.0));
             if rest > 0.0 {
-                low = angle
+                low = angle;
             } else {
-                high = angle
+                high = angle;
             }
             let newton = angle + rest / (1.0 - eta * sine);
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

@@ -46,8 +46,9 @@ impl Controls {
         }
         for batch in committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Onset)>() {
             for (job, onset) in batch? {
-                let slips = controls.get_mut(&job.set_id).map(|set| set.entry(job.seed).or_default());
-                slips.into_iter().for_each(|slips| slips.push(onset));
+                if let Some(set) = controls.get_mut(&job.set_id) {
+                    set.entry(job.seed).or_default().push(onset);
+                }
             }
         }
         Ok(Self(controls))

@@ -176,7 +176,6 @@ impl SetSlips {
             eta,
             finished_jobs: jobs.finished,
             failed_jobs: jobs.failed,
-            is_control: false,
             jobs_without_slips: jobs.without_slips,
             regime: jobs.regime,
             slip_share: slip_share.mean().map(mean),
@@ -200,16 +199,10 @@ impl SetSlips {
             periods: over_period.quantile(0.5).map(whole),
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
-            locking_index_drive: None,
-            locking_index_excess: None,
-            locking_excess_interval: None,
             phase_mean: phases.direction(limits.top),
             phase_interval: phases.direction_interval(limits.top),
             resultant_length,
             length_interval: phases.length_interval(),
-            resultant_drive: None,
-            resultant_excess: None,
-            resultant_excess_interval: None,
             expected_resultant: expected,
             rayleigh_p,
             load_rayleigh_p: loads.rayleigh(),
@@ -231,6 +224,8 @@ impl SetSlips {
             precursors_mean: means[6],
             front_speed_mean: means[7],
             slow_front_speed_mean: means[8],
+            // What the drive alone explains: see `drive_alone.rs`.
+            ..SetRow::default()
         };
         let intervals = tau.sorted;
         let seeds = self.jobs.into_keys().collect();
