@@ -7,6 +7,7 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
+use super::set::Statistic;
 use super::source::{Refused, Section, Source};
 use crate::model::Symbol;
 use crate::solver::{Resolve, Solver};
@@ -78,6 +79,7 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(file.source.refuse(place_of("axes"), problem));
     }
     period(sweep, places)?;
+    controls(sweep, file)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
         && let Some(((quantity, problem), point)) =
             sweep.admitted(0..sweep.point_count()).find_map(|(_, point)| Some((invalid(&point)?, point)))
@@ -144,6 +146,30 @@ fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), Refused> {
             Err(places.refuse(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
         }
         _ => Ok(()),
+    }
+}
+
+/// Controls are those of a modulation, and what the drive alone explains needs them.
+fn controls(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
+    let refuse = |section: &str, problem: String| {
+        let at = file.entry(section).map_or(0, |entry| entry.at);
+        Err(file.source.refuse(at, problem))
+    };
+    if sweep.controls.is_some() {
+        let problem = "control: has no effect while Delta = 0; set Delta > 0 (m), or remove control";
+        let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
+        return if is_modulated { Ok(()) } else { refuse("record", problem.to_owned()) };
+    }
+    let rounds = sweep.rounds.as_ref();
+    let precise =
+        rounds.and_then(|rounds| rounds.precision.as_ref()).map_or(&[][..], |precision| &precision.statistics);
+    let refined = rounds.and_then(|rounds| rounds.refinement.as_ref()).map(|refinement| &refinement.by);
+    let mut named = precise.iter().map(|by| ("precision", by)).chain(refined.map(|by| ("refine", by)));
+    match named.find(|(_, by)| by.needs_control()) {
+        None => Ok(()),
+        Some((section, Statistic { key, .. })) => {
+            refuse(section, format!("[{section}]: {key} needs controls; set control = true in [record]"))
+        }
     }
 }
 

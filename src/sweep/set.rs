@@ -173,6 +173,11 @@ impl Statistic {
         matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
     }
 
+    /// Whether it says what the drive alone explains, or what it does not.
+    pub fn needs_control(self) -> bool {
+        self.key.ends_with("_drive") || self.key.ends_with("_excess")
+    }
+
     pub fn from_key(key: &str) -> Option<Self> {
         STATISTICS.iter().copied().find(|statistic| statistic.key == key)
     }

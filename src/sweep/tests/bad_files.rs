@@ -286,6 +286,12 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
         (precise("\"phase_mean\""), 4, &["relative = 0.01", "an angle", "absolute"]),
         (precision(&format!("of = \"tau_mean\"\n{seeds}")), 2, &["relative is missing", "or absolute"]),
         (precision(&format!("relative = 0.1\n{seeds}")), 2, &["of is missing"]),
+        (
+            precision(&format!("of = \"resultant_excess\"\nrelative = 0.1\n{seeds}")),
+            2,
+            &["resultant_excess needs controls", "control = true in [record]"],
+        ),
+        ("name = \"a\"\n[record]\ncontrol = true\n".to_owned(), 2, &["control: has no effect while Delta = 0"]),
         (precision(&format!("of = \"tau_mean\"\nrelative = 0\n{seeds}")), 4, &["relative = 0", "> 0 and < 1"]),
         (precision(&format!("of = \"tau_mean\"\nrelative = -0.1\n{seeds}")), 4, &["relative = -0.1", "> 0 and < 1"]),
         (precision(&format!("of = \"tau_mean\"\nabsolute = 0\n{seeds}")), 4, &["absolute = 0", "> 0, in s"]),
