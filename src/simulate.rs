@@ -59,7 +59,7 @@ pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
 
 /// The job of a sweep that has one.
 pub fn only_job(sweep: &Sweep) -> Result<Job, RequestError> {
-    let mut jobs = sweep.jobs();
+    let mut jobs = sweep.jobs_of_grid();
     match (jobs.next(), jobs.count()) {
         (Some(job), 0) => Ok(job),
         (_, others) => Err(RequestError::NotOneJob { name: sweep.name().to_owned(), jobs: others + 1 }),

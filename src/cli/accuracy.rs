@@ -134,7 +134,7 @@ fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Re
 /// The sets of a sweep, with seed 0.
 fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
     let mut sets: Vec<Parameters> = Vec::new();
-    for job in sweep.jobs() {
+    for job in sweep.jobs_of_grid() {
         let set = Parameters { seed: 0, ..job.parameters };
         if !sets.contains(&set) {
             sets.push(set);

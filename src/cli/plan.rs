@@ -137,6 +137,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
             report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
         let (choice, which) = match report.at_most {
             Some(_) => (", from which the rounds choose", "in the first round, to which the numbers below refer"),
+            None if sweep.recording().control => ("", "after conditions and duplicates, and their controls"),
             None => ("", "after conditions and duplicates"),
         };
         let mut pairs = vec![

@@ -10,12 +10,10 @@ use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
-use crate::results::layout::Layout;
-use crate::results::parts::committed_files;
-use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::tables::JobOfSlip;
 use crate::sweep::{Interval, SetRow, Sweep};
 use crate::table::columns::columns;
-use crate::table::file::DatasetError;
+use crate::table::file::{Dataset, DatasetError};
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
@@ -33,18 +31,18 @@ columns! {
 pub(super) struct Controls(HashMap<String, BTreeMap<u64, Vec<Onset>>>);
 
 impl Controls {
-    /// Reads those of these jobs.
+    /// Those of these sets, from the table of slips.
     pub(super) fn read<'a>(
-        layout: &Layout<'_>,
+        slips: Dataset<'_>,
         sweep: &Sweep,
-        jobs: impl Iterator<Item = &'a Parameters>,
+        sets: impl Iterator<Item = &'a Parameters>,
     ) -> Result<Self, DatasetError> {
         let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> =
-            jobs.filter_map(|job| Some((sweep.control_of(job)?, BTreeMap::new()))).collect();
+            sets.filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new()))).collect();
         if controls.is_empty() {
             return Ok(Self::default());
         }
-        for batch in committed_files(layout, SLIPS, &layout.dataset(JOBS)?)?.rows::<(JobOfSlip, Onset)>() {
+        for batch in slips.rows::<(JobOfSlip, Onset)>() {
             for (job, onset) in batch? {
                 if let Some(set) = controls.get_mut(&job.set_id) {
                     set.entry(job.seed).or_default().push(onset);
@@ -83,10 +81,10 @@ fn beyond(
     let excess = seen.map(|seen| seen - alone);
     let ends = || {
         let (seen, own, of_drive) = (seen?, interval?, drive.length_interval()?);
-        let half = |own: f64, of_drive: f64| libm::hypot(own, of_drive);
-        let low = excess? - half(seen - own.low, of_drive.high - alone);
-        let high = excess? + half(own.high - seen, alone - of_drive.low);
-        Some(Interval { low, high })
+        Some(Interval {
+            low: excess? - libm::hypot(seen - own.low, of_drive.high - alone),
+            high: excess? + libm::hypot(own.high - seen, alone - of_drive.low),
+        })
     };
     (Some(alone), excess, ends())
 }
@@ -114,5 +112,85 @@ impl Passage {
             last = Some(time);
         }
         Self { phases, periods }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::confidence::tests::Draws;
+    use super::*;
+    use crate::model::selected::Selected;
+    use crate::model::theory::random_load_mean;
+    use std::path::Path;
+
+    const FREQUENCY: f64 = 29.0;
+
+    /// What is found of a set with this amplitude, of which the control has these onsets; nothing is seen of it but `row`.
+    fn explained(amplitude: f64, onsets: &[Vec<f64>], seeds: &[u64], row: SetRow) -> SetRow {
+        let text = format!(
+            "name = \"a\"\n[model]\nDelta = {amplitude:?}\nfrequency = {FREQUENCY:?}\n[axes]\nseed = {{ count = 9 }}\n\
+             [record]\ncontrol = true\n"
+        );
+        let sweep = Sweep::parse(&text, Path::new("test.toml")).unwrap();
+        let parameters = sweep.jobs().next().unwrap().parameters;
+        let slips = |onsets: &Vec<f64>| {
+            let lasts = std::iter::once(None).chain(onsets.iter().map(Some));
+            let slip =
+                |(onset, last): (&f64, Option<&f64>)| Onset { onset: *onset, interval: last.map(|last| onset - last) };
+            onsets.iter().zip(lasts).map(slip).collect::<Vec<_>>()
+        };
+        let control = (0..).zip(onsets.iter().map(slips)).collect();
+        let controls = Controls(HashMap::from([(sweep.control_of(&parameters).unwrap(), control)]));
+        let mut row = SetRow { parameters: Selected::new(parameters), ..row };
+        controls.explain(&sweep, &mut row, seeds);
+        row
+    }
+
+    #[test]
+    fn random_loads_give_the_resultant_of_the_closed_form() {
+        let mut draws = Draws::new(7);
+        let onsets = vec![(0..20_000).map(|number| f64::from(number) + draws.uniform()).collect::<Vec<_>>()];
+        for eta in [0.5, 1.2, 5.0] {
+            let amplitude = eta * 1e-4 / (TAU * FREQUENCY);
+            let [real, imaginary] = random_load_mean(eta);
+            let found = explained(amplitude, &onsets, &[0], SetRow::default()).resultant_drive.unwrap();
+            // A standard error is 0.005 at most.
+            assert!((found - real.hypot(imaginary)).abs() < 0.02, "{eta}: {found}");
+        }
+    }
+
+    #[test]
+    fn onsets_of_common_seeds_whole_periods_apart_have_locked_passages_whatever_the_others() {
+        let apart = |step: f64| (1..40).map(|number| 0.01 + step * f64::from(number)).collect::<Vec<f64>>();
+        let (locked, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
+        let of = |seeds: &[u64]| explained(1e-6, &[locked.clone(), free.clone()], seeds, SetRow::default());
+        let row = of(&[0, 5]);
+        for length in [row.resultant_drive, row.locking_index_drive] {
+            assert!((length.unwrap() - 1.0).abs() < 1e-9, "{length:?}");
+        }
+        assert!(of(&[0, 1]).resultant_drive.unwrap() < 0.99);
+        let none = of(&[5]);
+        assert_eq!((none.resultant_drive, none.locking_index_excess), (None, None));
+    }
+
+    #[test]
+    fn the_interval_of_an_excess_takes_in_both_errors() {
+        let mut draws = Draws::new(3);
+        let mut job = || (0..30).map(|number| 0.11 * f64::from(number) + 0.05 * draws.uniform()).collect::<Vec<_>>();
+        let onsets: Vec<Vec<f64>> = (0..9).map(|_| job()).collect();
+        let of = |half: f64| {
+            let interval = Some(Interval { low: 0.9 - half, high: 0.9 + half });
+            let seen = SetRow { resultant_length: Some(0.9), length_interval: interval, ..SetRow::default() };
+            explained(1e-6, &onsets, &[0, 1, 2, 3, 4, 5, 6, 7, 8], seen)
+        };
+        let row = of(0.05);
+        let (excess, wide, narrow) = (row.resultant_excess.unwrap(), row.resultant_excess_interval, of(0.0));
+        assert!((excess - (0.9 - row.resultant_drive.unwrap())).abs() < 1e-15);
+        let halves =
+            |interval: Option<Interval>| interval.map(|Interval { low, high }| [excess - low, high - excess]).unwrap();
+        for (wide, alone) in halves(wide).into_iter().zip(halves(narrow.resultant_excess_interval)) {
+            assert!(alone > 0.0 && (wide - alone.hypot(0.05)).abs() < 1e-12, "{wide} {alone}");
+        }
+        assert_eq!((row.locking_index_excess, row.locking_excess_interval), (None, None), "none is seen");
     }
 }

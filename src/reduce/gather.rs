@@ -3,7 +3,7 @@
 //! Contract: a function of the wanted jobs and their rows alone. What is summed over the jobs of a set is summed in the order
 //! of their seeds, whatever files they lie in, so that no digit depends on what was run in the directory before.
 //!
-//! Memory: a few hundred bytes per set, 40 per job, 200 more for the jobs of [`MAX_SLIPS`] slips and 40 to 80 for each
+//! Memory: a few hundred bytes per set, 40 per job, 24 per slip of a control, 200 more for the jobs of [`MAX_SLIPS`] slips and 40 to 80 for each
 //! of these, and as much again for those of the set at hand; where the tables hold more, the slips are read again for
 //! the next sets.
 
@@ -89,7 +89,7 @@ impl<'a> Gathering<'a> {
         })?;
         let mut sets: Vec<SetJobs> = sets.into_values().collect();
         sets.sort_by(by_parameters);
-        let controls = Controls::read(layout, sweep, sets.iter().map(|set| &set.parameters))?;
+        let controls = Controls::read(slips.clone(), sweep, sets.iter().map(|set| &set.parameters))?;
         Ok(Self { sets, slips, is_wanted, sweep, controls })
     }
 

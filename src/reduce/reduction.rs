@@ -100,10 +100,10 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     gathering.each_set(max_slips, spacing(total), |set, points| {
         let row = &set.row;
         let chosen = set_writer.push(row)?.filter(|_| refinement.is_some());
-        refined_sets.extend(chosen.map(|number| (number, row.clone())));
         if row.is_control {
             return Ok(());
         }
+        refined_sets.extend(chosen.map(|number| (number, row.clone())));
         summary.sets += 1;
         histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);

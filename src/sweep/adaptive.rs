@@ -118,7 +118,9 @@ impl Sweep {
         let dearest = costs.iter().copied().fold(0.0, f64::max);
         let of_a_seed = costs.iter().sum::<f64>() + (sets - costs.len() as u64) as f64 * dearest;
         let seeds = self.seed_count();
-        Some(Bounds { sets, jobs: sets * seeds, predicted_cost: of_a_seed * seeds as f64 })
+        let (jobs, predicted_cost) = (sets * seeds, of_a_seed * seeds as f64);
+        let controls = self.controls.as_ref().map_or(0, |controls| controls.point_count().min(jobs));
+        Some(Bounds { sets, jobs: jobs + controls, predicted_cost: predicted_cost + controls as f64 * dearest })
     }
 
     /// The first round; `None` for a sweep without.

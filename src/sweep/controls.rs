@@ -51,7 +51,7 @@ impl Sweep {
 
     /// Whether these canonical parameters are a job as a control alone.
     pub fn is_control(&self, parameters: &Parameters) -> bool {
-        self.find(parameters).is_some_and(|point| point >= self.point_count())
+        self.controls.is_some() && self.find(parameters).is_some_and(|point| point >= self.point_count())
     }
 
     /// Id of the set that is the control of a modulated job; `None` if the sweep has no controls.

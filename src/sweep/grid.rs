@@ -78,6 +78,11 @@ impl Sweep {
         self.jobs_at(self.points())
     }
 
+    /// The jobs of the grid, without controls.
+    pub fn jobs_of_grid(&self) -> impl Iterator<Item = Job> + Clone + Send + '_ {
+        self.jobs_at(0..self.point_count())
+    }
+
     /// The jobs at these points, in order.
     pub(super) fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         let count = self.point_count();
