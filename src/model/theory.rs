@@ -54,7 +54,7 @@ pub fn random_load_mean(eta: f64) -> [f64; 2] {
 /// Mean resultant length of `count` independent directions, of which the mean of many has this length: it is longer, as chance
 /// has no direction. That of a vector with a normal error, the same in both directions (Rice, Bell Syst. Tech. J. 24, 46 (1945)).
 pub fn finite_resultant(length: f64, count: u64) -> f64 {
-    /// Where the first term of the expansion is exact to 1e-4 of the difference.
+    /// Where the next term of the expansion is 1/16 of its inverse: some 1e-4 of the difference.
     const LARGE: f64 = 500.0;
     const ANGLES: u32 = 128;
     let variance = (1.0 - length * length).max(0.0) / (2.0 * count as f64);

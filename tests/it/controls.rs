@@ -23,7 +23,12 @@ fn controls_run_once_for_the_other_values_and_are_no_sets_of_their_own() {
     for key in ["sets", "slips", "points"] {
         assert_eq!(of(&after, key), of(&before, key), "{key}");
     }
-    // In one run from the beginning, and in two shares, the statistics are the same.
+    // What the drive alone explains is there, with a seed of the control for each of the set.
+    let rows = folder.file("out/reduced/sets.parquet");
+    for column in ["resultant_drive", "resultant_excess_low", "locking_index_drive", "locking_index_excess_high"] {
+        assert_eq!(rows.reals(column).len(), 4, "{column}");
+    }
+    // In one run from the beginning the statistics are the same.
     folder.ends(0, "run control.toml --out whole");
     let sets = |out: &str| folder.contents(&format!("{out}/reduced"));
     assert!(sets("out") == sets("whole"));
