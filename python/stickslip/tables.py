@@ -32,9 +32,16 @@ class Sweep:
         return read(self.directory / "reduced" / f"{name}.parquet", f"stickslip reduce {self.directory}")
 
     @cache
+    def sets(self) -> pandas.DataFrame:
+        """The reduced sets without those that were run as controls alone."""
+        sets = self.reduced("sets")
+        return sets[~sets["control"]]
+
+    @cache
     def slips(self) -> pandas.DataFrame:
-        """The slips with all parameters of their jobs, and `frequency` = 1/T in Hz and `tau_over_T` = interval/T."""
+        """The slips of these sets with all parameters of their jobs, `frequency` = 1/T in Hz and `tau_over_T` = interval/T."""
         slips = self._checked("slips", join=True).to_pandas()
+        slips = slips[slips["set_id"].isin(self.sets()["set_id"])]
         return slips.assign(frequency=(1 / slips["T"]).round(6), tau_over_T=slips["interval"] / slips["T"])
 
     def _checked(self, name: str, **options: bool) -> Table:

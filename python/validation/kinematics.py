@@ -4,17 +4,15 @@ For η < 1 the load never falls and these are all loads; for η > 1 they lie bet
 """
 
 import math
-from functools import cache
 
 import numpy
 import pandas
 from numpy.typing import ArrayLike
 
 from stickslip._stickslip import minimum_phase
-from stickslip.statistics import rayleigh_p_of, resultant_length
 
-#: A set is locked if its Rayleigh p is below the one and its resultant length above the other (docs/model.md).
-LOCKED_P, LOCKED_LENGTH = 0.001, 0.5
+#: Drive velocity in m/s from which drives are called fast: between two values of the sweep, 1e-5 and 5e-5.
+FAST = 3e-5
 
 
 def load_window(eta: float) -> tuple[float, float]:
@@ -30,32 +28,19 @@ def random_load_phases(eta: float, ranks: ArrayLike) -> numpy.ndarray:
     return numpy.interp(ranks, (load - load[0]) / (load[-1] - load[0]), grid)
 
 
-def random_load_share(eta: float) -> float:
-    """The share of intervals within 0.1 T of a whole number of periods between such slips, if independent."""
-    phases = random_load_phases(eta, (numpy.arange(300) + 0.5) / 300)
-    turns = numpy.subtract.outer(phases, phases) / (2 * math.pi)
-    return float((abs(turns - turns.round()) < 0.1).mean())
-
-
-@cache
-def locked_by_chance(eta: float, slips: int, draws: int) -> tuple[float, float]:
-    """The share of ``draws`` sets of ``slips`` such slips, drawn independently, that count as locked; mean locking index."""
-    phases = random_load_phases(eta, numpy.random.default_rng(2011).random((draws, slips)))
-    lengths = abs(numpy.exp(1j * phases).mean(axis=1))
-    locked = (rayleigh_p_of(slips, lengths) < LOCKED_P) & (lengths > LOCKED_LENGTH)
-    indices = abs(numpy.exp(1j * numpy.diff(phases)).mean(axis=1))
-    return float(locked.mean()), float(indices.mean())
-
-
 def load_phase(slips: pandas.DataFrame) -> pandas.Series:
     """φ + η cos φ in rad, which grows in proportion to the load."""
     return slips["phase"] + slips["eta"] * numpy.cos(slips["phase"])
 
 
-def locked_in_load(sets: pandas.DataFrame, slips: pandas.DataFrame) -> pandas.Series:
-    """Whether sets with η < 1 are locked by their load phases, in which slips at random loads are uniform."""
-    lengths = load_phase(slips).groupby(slips["set_id"]).apply(resultant_length)
-    return (sets["load_rayleigh_p"] < LOCKED_P) & (sets["set_id"].map(lengths) > LOCKED_LENGTH)
+def beyond_drive(sets: pandas.DataFrame, column: str) -> tuple[pandas.Series, pandas.Series]:
+    """Whether sets lie above, and below, what the drive alone gives, with the interval of the difference; by chance 0.025."""
+    return sets[f"{column}_excess_low"] > 0, sets[f"{column}_excess_high"] < 0
+
+
+def beyond_text(sets: pandas.DataFrame, column: str) -> str:
+    above, below = beyond_drive(sets, column)
+    return f"{above.sum()} above, {below.sum()} below, of {len(sets)}"
 
 
 def nucleation_phase(slips: pandas.DataFrame) -> pandas.Series:

@@ -2,12 +2,8 @@
 
 use super::PhaseLimits;
 use super::circular::unit;
-#[cfg(test)]
-use super::gather::{PooledJob, set_of};
 use super::sequence::{Estimate, Sequences};
 use super::set::{FinishedSet, OfSet};
-#[cfg(test)]
-use crate::model::Parameters;
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote, random_load_mean};
 use crate::table::columns::{columns, tables};
 use serde::Serialize;
@@ -107,16 +103,6 @@ impl Together {
         let excess = if self.squares > 0.0 { squares / self.squares } else { 1.0 };
         Sequences::of(self.deviations.into_values()).estimate().of_sums((self.count, self.total), excess)
     }
-}
-
-/// The bin of sets of these jobs, all of them within one.
-#[cfg(test)]
-pub(crate) fn bin_of_sets(sets: &[(Parameters, Vec<&PooledJob>)]) -> BackboneBin {
-    let mut backbone = Backbone::default();
-    for (parameters, jobs) in sets {
-        backbone.push(&set_of(parameters, jobs.iter().copied()));
-    }
-    backbone.finish()[0]
 }
 
 fn plus(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {

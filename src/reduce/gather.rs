@@ -27,7 +27,7 @@ use std::collections::{BTreeMap, HashMap};
 pub(super) const MAX_SLIPS: u64 = 1 << 22;
 columns! {
     /// The set of a job, and the job.
-    struct JobOfSet {
+    pub(super) struct JobOfSet {
         set_id: String;
         facts: JobFacts;
     }
@@ -111,7 +111,7 @@ impl<'a> Gathering<'a> {
     }
 }
 
-fn each_job(
+pub(super) fn each_job(
     files: &Dataset<'_>,
     is_wanted: Wanted<'_>,
     mut job: impl FnMut(JobOfSet, Parameters),
@@ -153,8 +153,8 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 }
 
 /// A set and its slips so far.
-struct Gathered {
-    jobs: SetJobs,
+pub(super) struct Gathered {
+    pub(super) jobs: SetJobs,
     limits: PhaseLimits,
     slips: SetSlips,
     /// Points among them, with their place in table order.
@@ -162,12 +162,12 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn new(jobs: SetJobs) -> Self {
+    pub(super) fn new(jobs: SetJobs) -> Self {
         let limits = PhaseLimits::at(jobs.parameters.eta());
         Self { jobs, limits, slips: SetSlips::default(), points: Vec::new() }
     }
 
-    fn push(&mut self, seed: u64, slip: &Slip) {
+    pub(super) fn push(&mut self, seed: u64, slip: &Slip) {
         let Parameters { ramp_time, drive_velocity, .. } = self.jobs.parameters;
         if ramp_time > 0.0 {
             self.slips.push(seed, slip, &PhaseLimits::at(slip.modulation.eta(drive_velocity)));
@@ -176,7 +176,7 @@ impl Gathered {
         }
     }
 
-    fn finish(self) -> (FinishedSet, Vec<(u64, Point)>) {
+    pub(super) fn finish(self) -> (FinishedSet, Vec<(u64, Point)>) {
         (self.slips.finish(self.jobs), self.points)
     }
 }
@@ -210,58 +210,4 @@ fn slips_of(
         }
     }
     Ok(sets)
-}
-
-/// A job of a directory: what its row says, and its slips.
-#[cfg(test)]
-#[derive(Clone, Debug)]
-pub(crate) struct PooledJob {
-    seed: u64,
-    facts: JobFacts,
-    slips: Vec<Slip>,
-}
-
-/// All jobs of a directory by their sets, in the order of parameters and seeds.
-#[cfg(test)]
-pub(crate) fn pool_of(
-    layout: &crate::results::layout::Layout<'_>,
-) -> Result<Vec<(Parameters, Vec<PooledJob>)>, DatasetError> {
-    let jobs = layout.dataset(JOBS)?;
-    let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
-    each_job(&jobs, &|_| true, |JobOfSet { set_id, facts }, parameters| {
-        let seed = parameters.seed;
-        let (_, set) = sets.entry(set_id).or_insert_with(|| (parameters, BTreeMap::new()));
-        set.insert(seed, PooledJob { seed, facts, slips: Vec::new() });
-    })?;
-    for batch in committed_files(layout, SLIPS, &jobs)?.rows::<(JobOfSlip, Slip)>() {
-        for (job, slip) in batch? {
-            let set = sets.get_mut(&job.set_id).map(|(_, set)| set);
-            set.and_then(|set| set.get_mut(&job.seed)).expect("slips of a job").slips.push(slip);
-        }
-    }
-    let mut pool: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
-    pool.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
-        let key = |set: &Parameters| (set.modulation_amplitude, set.eta());
-        key(left).partial_cmp(&key(right)).expect("numbers")
-    });
-    Ok(pool)
-}
-
-/// The set of these jobs.
-#[cfg(test)]
-pub(super) fn set_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item = &'a PooledJob>) -> FinishedSet {
-    let mut set = Gathered::new(SetJobs { parameters: parameters.clone(), ..SetJobs::default() });
-    for PooledJob { seed, facts, slips } in jobs {
-        set.jobs.push(*seed, facts);
-        for slip in slips {
-            set.push(*seed, slip);
-        }
-    }
-    set.finish().0
-}
-
-/// The row of a set of these jobs.
-#[cfg(test)]
-pub(crate) fn row_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
-    set_of(parameters, jobs).row
 }

@@ -8,6 +8,8 @@ mod confidence;
 mod drive_alone;
 mod gather;
 mod histogram;
+#[cfg(test)]
+mod pool;
 mod product_limit;
 mod quantile;
 mod reduced;
@@ -22,16 +24,14 @@ mod statistic;
 pub use crate::sweep::{Interval, SetRow};
 pub use backbone::BackboneBin;
 #[cfg(test)]
-pub(crate) use backbone::bin_of_sets;
-#[cfg(test)]
 pub(crate) use cells::{CellOfGrid, Cells};
 pub use cells::{CellRow, divide};
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
 pub use gather::reduce_jobs;
-#[cfg(test)]
-pub(crate) use gather::{PooledJob, pool_of, row_of};
 pub use histogram::HistogramBin;
+#[cfg(test)]
+pub(crate) use pool::{Pool, PooledJob};
 pub use quantile::quantile;
 pub use reduced::{Statistic, advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;

@@ -2,8 +2,7 @@
 //! the model.
 
 use super::precision::{MIN_SEEDS, need, seeds_for};
-use crate::model::Parameters;
-use crate::reduce::{PooledJob, SetRow, bin_of_sets, mean_of, pool_of, row_of};
+use crate::reduce::{Pool, PooledJob, SetRow, mean_of};
 use crate::results::layout::Layout;
 use crate::sweep::{Precision, STATISTICS, Statistic, StatisticKind, Target};
 use crate::table::storage::Disk;
@@ -12,7 +11,6 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
-use std::ops::Range;
 use std::path::Path;
 
 const FROM: u64 = 4;
@@ -126,39 +124,24 @@ const SIZES: [(usize, u64); 4] = [(2, 15), (8, 30), (64, 15), (256, 15)];
 const BY_RULE: [f64; 2] = [32.0, 96.0];
 const MAX_JOBS: u64 = 256;
 
-/// Large pools of jobs of the model; a repetition takes some of them. See `scripts/coverage`.
-struct Pool {
-    jobs: Vec<(Parameters, Vec<PooledJob>)>,
+fn read_pool(folder: &Path, name: &str) -> Pool {
+    let folder = folder.join(format!("coverage-{name}"));
+    Pool::of(&Layout::new(&Disk, &folder)).unwrap()
 }
 
-impl Pool {
-    fn of(folder: &Path, name: &str) -> Self {
-        let folder = folder.join(format!("coverage-{name}"));
-        Self { jobs: pool_of(&Layout::new(&Disk, &folder)).unwrap() }
-    }
-
-    /// Distinct jobs of a set, by the number of the repetition: the first some of a keyed permutation.
-    fn of_repetition(&self, set: usize, repetition: u64, most: usize) -> Vec<&PooledJob> {
-        let jobs = &self.jobs[set].1;
-        let mut generator = ChaCha8Rng::seed_from_u64(repetition);
-        let mut moved: HashMap<usize, usize> = HashMap::new();
-        let next = |place: usize| {
-            let other = place + usize::try_from(generator.next_u64() % (jobs.len() - place) as u64).unwrap();
-            let taken = *moved.get(&other).unwrap_or(&other);
-            let here = *moved.get(&place).unwrap_or(&place);
-            moved.insert(other, here);
-            &jobs[taken]
-        };
-        (0..most).map(next).collect()
-    }
-
-    fn row<'a>(&'a self, set: usize, jobs: &[&'a PooledJob]) -> SetRow {
-        row_of(&self.jobs[set].0, jobs.iter().copied())
-    }
-
-    fn truth(&self, set: usize) -> SetRow {
-        self.row(set, &self.jobs[set].1.iter().collect::<Vec<_>>())
-    }
+/// Distinct jobs of a set, by the number of the repetition: the first some of a keyed permutation.
+fn of_repetition(pool: &Pool, set: usize, repetition: u64, most: usize) -> Vec<&PooledJob> {
+    let jobs = &pool.sets[set].1;
+    let mut generator = ChaCha8Rng::seed_from_u64(repetition);
+    let mut moved: HashMap<usize, usize> = HashMap::new();
+    let next = |place: usize| {
+        let other = place + usize::try_from(generator.next_u64() % (jobs.len() - place) as u64).unwrap();
+        let taken = *moved.get(&other).unwrap_or(&other);
+        let here = *moved.get(&place).unwrap_or(&place);
+        moved.insert(other, here);
+        &jobs[taken]
+    };
+    (0..most).map(next).collect()
 }
 
 #[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
@@ -183,27 +166,28 @@ fn share(held: impl Fn(u64) -> bool + Sync) -> f64 {
     100.0 * (0..REPETITIONS).into_par_iter().filter(|&repetition| held(repetition)).count() as f64 / REPETITIONS as f64
 }
 
-/// The coverage of a statistic in all cells of a set: fixed numbers of jobs, then those that end by the rule.
-fn cells(pools: &[Pool; 2], set: usize, statistic: Statistic) -> Vec<f64> {
-    let pool_of = |slips| &pools[usize::from(slips == 30)];
+/// The coverage of a statistic in all cells of a set: fixed numbers of jobs, then those that end by the rule. `truths` are
+/// the rows of all jobs of the pools.
+fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statistic) -> Vec<f64> {
     let fixed = |(jobs, slips)| {
-        let (pool, truth) = (pool_of(slips), pool_of(slips).truth(set));
-        share(|repetition| holds(&pool.row(set, &pool.of_repetition(set, repetition, jobs)), &truth, statistic))
+        let which = usize::from(slips == 30);
+        let (pool, truth) = (&pools[which], &truths[which]);
+        share(|repetition| holds(&pool.row(set, of_repetition(pool, set, repetition, jobs)), truth, statistic))
     };
     let by_rule = |enough: f64| {
-        let (pool, truth) = (&pools[0], pools[0].truth(set));
-        let [low, high] = ends(&truth, statistic).unwrap();
-        let half = 0.5 * (high - low) * (pool.jobs[set].1.len() as f64 / enough).sqrt();
+        let (pool, truth) = (&pools[0], &truths[0]);
+        let [low, high] = ends(truth, statistic).unwrap();
+        let half = 0.5 * (high - low) * (pool.sets[set].1.len() as f64 / enough).sqrt();
         let precision =
             Precision { statistics: vec![statistic], target: Target::Absolute(half), seeds: MIN_SEEDS..=MAX_JOBS };
         share(|repetition| {
-            let jobs = pool.of_repetition(set, repetition, usize::try_from(MAX_JOBS).unwrap());
+            let jobs = of_repetition(pool, set, repetition, usize::try_from(MAX_JOBS).unwrap());
             let mut seeds = MIN_SEEDS;
             loop {
-                let row = pool.row(set, &jobs[..usize::try_from(seeds).unwrap()]);
+                let row = pool.row(set, jobs[..usize::try_from(seeds).unwrap()].iter().copied());
                 match need(&precision, seeds, &row) {
                     Some(more) if more > seeds => seeds = more,
-                    _ => return holds(&row, &truth, statistic),
+                    _ => return holds(&row, truth, statistic),
                 }
             }
         })
@@ -214,14 +198,11 @@ fn cells(pools: &[Pool; 2], set: usize, statistic: Statistic) -> Vec<f64> {
 /// The coverage of the mean phase of all slips of a bin, and of the mean of its locked sets: sets close to each other, with two
 /// seeds in common.
 fn of_backbone(pool: &Pool) -> [f64; 2] {
-    let sets = |seeds: Range<usize>| -> Vec<_> {
-        pool.jobs.iter().map(|(set, jobs)| (set.clone(), jobs[seeds.clone()].iter().collect())).collect()
-    };
-    let seeds = pool.jobs[0].1.len();
-    let truth = bin_of_sets(&sets(0..seeds));
+    let seeds = pool.sets[0].1.len();
+    let truth = pool.bin(0..seeds);
     let (mut held, repetitions) = ([0; 2], seeds / 2);
     for repetition in 0..repetitions {
-        let bin = bin_of_sets(&sets(2 * repetition..2 * repetition + 2));
+        let bin = pool.bin(2 * repetition..2 * repetition + 2);
         let holds = |[low, high, truth]: [Option<f64>; 3]| low <= truth && truth <= high;
         held[0] += u32::from(holds([bin.phase_mean_low, bin.phase_mean_high, truth.phase_mean]));
         held[1] += u32::from(holds([bin.locked_phase_mean_low, bin.locked_phase_mean_high, truth.locked_phase_mean]));
@@ -235,7 +216,9 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
 fn coverage_is_measured() {
     let folder = std::env::var_os("STICKSLIP_POOLS").expect("run scripts/coverage");
     let folder = Path::new(&folder);
-    let pools = ["15", "30"].map(|name| Pool::of(folder, name));
+    let pools = ["15", "30"].map(|name| read_pool(folder, name));
+    let truths: Vec<[SetRow; 2]> =
+        (0..3).map(|set| pools.each_ref().map(|pool| pool.row(set, &pool.sets[set].1))).collect();
     let columns = SIZES.map(|(jobs, slips)| format!("{jobs} × {slips}")).into_iter();
     let columns = columns.chain(BY_RULE.map(|enough| format!("rule, {enough}")));
     let head: Vec<String> = columns.collect();
@@ -244,13 +227,11 @@ fn coverage_is_measured() {
         format!("|---|---|---|{}", "---|".repeat(head.len())),
     ];
     let shown = |values: &[f64]| values.iter().map(|value| format!("{value:.1}")).collect::<Vec<_>>().join(" | ");
-    // The pools have no controls.
-    let is_there = |statistic: &Statistic| statistic.has_interval() && !statistic.needs_control();
-    for statistic in STATISTICS.iter().copied().filter(is_there) {
+    for statistic in STATISTICS.iter().copied().filter(|statistic| statistic.has_interval()) {
         let mut all = Vec::new();
         for (set, locking) in ["weak", "middle", "strong"].into_iter().enumerate() {
-            let truth = number(&pools[0].truth(set), statistic.key).unwrap();
-            let found = cells(&pools, set, statistic);
+            let truth = number(&truths[set][0], statistic.key).unwrap();
+            let found = cells(&pools, &truths[set], set, statistic);
             lines.push(format!("| `{}` | {locking} | {truth:.4} | {} |", statistic.key, shown(&found)));
             all.push(found);
         }
@@ -264,7 +245,7 @@ fn coverage_is_measured() {
     let worst = |level: f64, lines: f64| {
         level - 100.0 * lines * (0.01 * level * (1.0 - 0.01 * level) / REPETITIONS as f64).sqrt()
     };
-    let [slips, locked] = of_backbone(&Pool::of(folder, "dense"));
+    let [slips, locked] = of_backbone(&read_pool(folder, "dense"));
     let backbone = format!(
         "The back-bone: twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 400\n\
          repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean of\n\

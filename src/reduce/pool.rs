@@ -1,0 +1,88 @@
+//! Large pools of jobs of the model, of which repetitions of a measurement take some.
+
+use super::backbone::{Backbone, BackboneBin};
+use super::drive_alone::Controls;
+use super::gather::{Gathered, JobFacts, JobOfSet, each_job};
+use super::set::{FinishedSet, SetJobs, SetRow};
+use crate::model::Parameters;
+use crate::observe::Slip;
+use crate::results::layout::Layout;
+use crate::results::parts::committed_files;
+use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::{Results, ResultsError};
+use crate::sweep::Sweep;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A job: what its row says, and its slips.
+#[derive(Clone, Debug)]
+pub(crate) struct PooledJob {
+    seed: u64,
+    facts: JobFacts,
+    slips: Vec<Slip>,
+}
+
+/// All jobs of a directory by their sets, in the order of amplitude, then η, and seeds; and their controls.
+pub(crate) struct Pool {
+    pub sets: Vec<(Parameters, Vec<PooledJob>)>,
+    sweep: Sweep,
+    controls: Controls,
+}
+
+impl Pool {
+    pub(crate) fn of(layout: &Layout<'_>) -> Result<Self, ResultsError> {
+        let sweep = Results::read(layout)?.sweep().clone();
+        let jobs = layout.dataset(JOBS)?;
+        let slips = committed_files(layout, SLIPS, &jobs)?;
+        let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
+        each_job(&jobs, &|parameters| !sweep.is_control(parameters), |JobOfSet { set_id, facts }, parameters| {
+            let seed = parameters.seed;
+            let (_, set) = sets.entry(set_id).or_insert_with(|| (parameters, BTreeMap::new()));
+            set.insert(seed, PooledJob { seed, facts, slips: Vec::new() });
+        })?;
+        for batch in slips.clone().rows::<(JobOfSlip, Slip)>() {
+            for (job, slip) in batch? {
+                if let Some((_, set)) = sets.get_mut(&job.set_id) {
+                    set.get_mut(&job.seed).expect("slips of a job").slips.push(slip);
+                }
+            }
+        }
+        let controls = Controls::read(slips, &sweep, sets.values().map(|(set, _)| set))?;
+        let mut sets: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
+        sets.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
+            let key = |set: &Parameters| (set.modulation_amplitude, set.eta());
+            key(left).partial_cmp(&key(right)).expect("numbers")
+        });
+        Ok(Self { sets, sweep, controls })
+    }
+
+    fn finish<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> (FinishedSet, Vec<u64>) {
+        let mut set = Gathered::new(SetJobs { parameters: self.sets[set].0.clone(), ..SetJobs::default() });
+        let mut seeds = Vec::new();
+        for PooledJob { seed, facts, slips } in jobs {
+            seeds.push(*seed);
+            set.jobs.push(*seed, facts);
+            for slip in slips {
+                set.push(*seed, slip);
+            }
+        }
+        seeds.sort_unstable();
+        (set.finish().0, seeds)
+    }
+
+    /// The row of a set of these of its jobs.
+    pub(crate) fn row<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
+        let (mut finished, seeds) = self.finish(set, jobs);
+        self.controls.explain(&self.sweep, &mut finished.row, &seeds);
+        finished.row
+    }
+
+    /// The bin of all sets with these of their jobs; all of them lie within one.
+    pub(crate) fn bin(&self, jobs: Range<usize>) -> BackboneBin {
+        let mut backbone = Backbone::default();
+        for (set, (_, all)) in self.sets.iter().enumerate() {
+            backbone.push(&self.finish(set, &all[jobs.clone()]).0);
+        }
+        backbone.finish()[0]
+    }
+}
