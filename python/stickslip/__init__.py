@@ -12,9 +12,8 @@
 All quantities are in SI units; tables carry them (`results.slips().units`). Keys are those of a sweep file:
 `help(stickslip.simulate)` lists them with units and defaults.
 
-Further modules: `statistics` (circular statistics, estimates with confidence intervals), `tables` (pandas frames), and
-``python -m stickslip.compare_sets`` (the difference of two parameter sets, seed by seed). They need what
-`pip install "stickslip[analysis]"` installs.
+Further modules: `statistics` (circular statistics, estimates with confidence intervals) and `tables` (pandas frames). They
+need what `pip install "stickslip[analysis]"` installs.
 """
 
 from ._stickslip import VERSION as __version__

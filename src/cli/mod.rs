@@ -13,6 +13,7 @@ mod progress;
 mod reduce;
 mod report;
 mod run;
+mod show;
 mod signals;
 mod simulate;
 mod status;
@@ -38,7 +39,8 @@ const EXAMPLES: &str = "\
 Examples:
   stickslip init mine.toml                   a commented sweep file to start from
   stickslip plan sweeps/fig3.toml            what would run, and what it would cost
-  stickslip run sweeps/fig3.toml             run or resume it, down to its figures
+  stickslip run sweeps/fig3.toml             run or resume it, down to its result and figures
+  stickslip show results/fig3                the result again, a line for each parameter set
   stickslip simulate --slips 10 --plot a.png one realisation, drawn
 
 Exit codes: 0 done, 1 failed jobs remain, 2 bad usage or bad sweep file, 3 stopped early but resumable,
@@ -51,6 +53,7 @@ enum Command {
     Run(run::Arguments),
     Batch(batch::Arguments),
     Status(status::Arguments),
+    Show(show::Arguments),
     Reduce(reduce::Arguments),
     Plot(Box<plot::Arguments>),
     Report(report::Arguments),
@@ -97,6 +100,7 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Run(arguments) => run::run(&arguments),
         Command::Batch(arguments) => batch::batch(&arguments, program),
         Command::Status(arguments) => status::status(&arguments),
+        Command::Show(arguments) => show::show(&arguments),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Plot(arguments) => plot::plot(&arguments),
         Command::Report(arguments) => report::report(&arguments),

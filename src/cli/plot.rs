@@ -3,7 +3,8 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::run::no_standing_figure;
-use crate::figure::{Format, Look, OwnFigure, Size, Style, columns, draw_all, draw_own, write_own};
+use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
+use crate::reduce::set_columns;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
@@ -106,7 +107,7 @@ pub fn format_of(file: &Path) -> Result<Format> {
 
 /// Prints the columns of the table of sets.
 fn list() -> Result<()> {
-    let columns = columns();
+    let columns = set_columns();
     let name = columns.iter().map(|column| column.name.len()).max().unwrap_or(0);
     let unit = columns.iter().map(|column| column.unit.len()).max().unwrap_or(0);
     columns.iter().try_for_each(|column| {

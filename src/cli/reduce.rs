@@ -54,7 +54,7 @@ pub fn report_missing(results: &Results<'_>) -> Result<()> {
 pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'static str, String)> {
     let text = |path: &Path| shown(path).to_string();
     vec![
-        ("jobs", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
+        ("jobs reduced", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
         ("parameter sets", format!("{}, {} locked", summary.sets, summary.locked_sets)),
         ("slips", summary.slips.to_string()),
         ("reduced data", text(&layout.reduced())),

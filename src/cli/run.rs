@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag};
 use super::threads::ThreadsFlag;
-use super::{output, reduce, signals, status, time};
+use super::{output, reduce, show, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
@@ -131,19 +131,34 @@ fn work(
             reporter.follow(event);
         }
     })?;
+    let is_complete = report.jobs_left == 0 && !report.stopped;
+    let reduced = if !is_complete || arguments.no_reduce {
+        Ok(None)
+    } else if arguments.shard.is_some() {
+        reduce_and_draw(layout)
+    } else {
+        let reduced = joined.reduce(|| reduce_and_draw(layout));
+        if matches!(reduced, Ok(None)) {
+            output::report("all jobs are done; another worker reduces them");
+        }
+        reduced.map(Option::flatten)
+    };
+    // What was run is told even if it could not be reduced.
     if arguments.json {
         output::json(FORMAT, &report)?;
     } else {
-        output::pairs(&summary_lines(&report))?;
+        let lines = reduced.as_ref().ok().and_then(Option::as_ref).map(|reduced| reduced.lines.clone());
+        output::pairs(&[summary_lines(&report), lines.unwrap_or_default()].concat())?;
     }
-    let is_complete = report.jobs_left == 0 && !report.stopped;
-    if is_complete && !arguments.no_reduce {
-        let reduce = || reduce_and_draw(layout, arguments);
-        if arguments.shard.is_some() {
-            reduce()?;
-        } else if joined.reduce(reduce)?.is_none() {
-            output::report("all jobs are done; another worker reduces them");
+    if let Some(Reduced { result, figures, .. }) = reduced?.filter(|_| !arguments.json) {
+        output::print(&format!("\n{result}\n"))?;
+        figures.iter().try_for_each(|path| output::print(&format!("figure  {}\n", shown(path))))?;
+        if figures.is_empty() {
+            output::report(&no_standing_figure(layout));
         }
+    }
+    if is_complete && arguments.shard.is_some() {
+        reduce::report_missing(&Results::read(layout)?)?;
     }
     let written = reporter.as_ref().map(|reporter| reporter.finish(&report)).transpose()?.flatten();
     if let Some(path) = written.filter(|_| !arguments.json) {
@@ -175,29 +190,28 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     Exit::Done
 }
 
-/// Reduces and draws what is there: other shards may be at work still.
-fn reduce_and_draw(layout: &Layout<'_>, arguments: &Arguments) -> Result<()> {
+/// What is told of a reduction.
+struct Reduced {
+    lines: Vec<(&'static str, String)>,
+    /// The sets and what was found of them.
+    result: String,
+    figures: Vec<PathBuf>,
+}
+
+/// Reduces and draws what is there: other shards may be at work still. `None` if nothing is.
+fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let results = Results::read(layout)?;
     let summary = match crate::reduce::reduce(&results) {
         Err(error) if error.is::<NoJobs>() => {
             output::report("no part is committed yet, so there is nothing to reduce");
-            return Ok(());
+            return Ok(None);
         }
         summary => summary?,
     };
     let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
-    if !arguments.json {
-        let mut pairs = reduce::summary_lines(&summary, layout);
-        pairs.extend(status::no_slips(&results));
-        output::pairs(&pairs)?;
-        for path in &figures {
-            output::print(&format!("figure  {}\n", shown(path)))?;
-        }
-        if figures.is_empty() {
-            output::report(&no_standing_figure(layout));
-        }
-    }
-    if arguments.shard.is_some() { reduce::report_missing(&results) } else { Ok(()) }
+    let mut lines = reduce::summary_lines(&summary, layout);
+    lines.extend(status::no_slips(&results));
+    Ok(Some(Reduced { lines, result: show::summary(&results)?, figures }))
 }
 
 /// What to do where no standing figure has its data.

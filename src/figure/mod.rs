@@ -39,7 +39,7 @@ mod values;
 mod work_precision;
 
 pub use draw::{draw_all, draw_own, write_own};
-pub use own::{OwnFigure, columns};
+pub use own::OwnFigure;
 pub use picture::{Format, Picture};
 pub use simulation::simulation;
 pub use style::{Look, Size, Style};

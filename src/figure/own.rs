@@ -9,10 +9,9 @@ use super::panel::{self, Layer, Panel};
 use super::picture::{Dot, Picture, Stroke};
 use super::sets::ascending;
 use super::style::{BAR_WIDTH, GREY, INKS, Look, RADIUS, dot};
-pub use super::values::columns;
-use super::values::{FREQUENCY_COLUMN, Values};
+use super::values::{axis_label, setting, short_label};
 use crate::model::Symbol;
-use crate::reduce::SetRow;
+use crate::reduce::{FREQUENCY, SetRow, Values};
 use clap::Args;
 use std::cmp::Ordering;
 
@@ -81,6 +80,7 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
 
 /// An axis as it is asked for.
 struct Asked<'a> {
+    option: &'static str,
     values: Values,
     is_log: bool,
     limits: Limits,
@@ -90,19 +90,19 @@ struct Asked<'a> {
 /// Draws a dot for each set; sets that differ in a parameter on the x axis alone are joined by a line.
 pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Picture, BadOption> {
     let asked = |option, name: &Option<String>, limits: Option<Limits>, label| -> Result<Asked<'_>, BadOption> {
-        let values = Values::of(rows, option, name.as_deref().unwrap_or_default())?;
+        let values = of(rows, option, name.as_deref().unwrap_or_default())?;
         let is_log = figure.log.as_ref().is_some_and(|axes| axes.contains(option));
-        Ok(Asked { values, is_log, limits: limits.unwrap_or_default(), label })
+        Ok(Asked { option, values, is_log, limits: limits.unwrap_or_default(), label })
     };
     let x = asked("x", &figure.x, figure.xlim, figure.xlabel.as_deref())?;
     let y = asked("y", &figure.y, figure.ylim, figure.ylabel.as_deref())?;
-    let colour = figure.colour.as_ref().map(|name| Values::of(rows, "colour", name)).transpose()?;
-    let panels = figure.panels.as_ref().map(|name| Values::of(rows, "panels", name)).transpose()?;
+    let colour = figure.colour.as_ref().map(|name| of(rows, "colour", name)).transpose()?;
+    let panels = figure.panels.as_ref().map(|name| of(rows, "panels", name)).transpose()?;
     let sets: Vec<usize> = (0..rows.len()).filter(|&set| x.has(set) && y.has(set)).collect();
     let [x_name, y_name] = [&x, &y].map(|asked| &asked.values.column.name);
     if sets.is_empty() {
         let kind = if x.is_log || y.is_log { "no set has a value > 0" } else { "no set has a value" };
-        return Err(y.values.refuse(&format!("{kind} of both {x_name} and {y_name}; nothing can be drawn")));
+        return Err(y.refuse(&format!("{kind} of both {x_name} and {y_name}; nothing can be drawn")));
     }
     let (x_axis, y_axis) = (x.axis(&sets)?, y.axis(&sets)?);
     let place = |set: usize| x.values.numbers[set].zip(y.values.numbers[set]);
@@ -110,7 +110,7 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     let inside = places.filter(|&(x, y)| x_axis.contains(x) && y_axis.contains(y)).count();
     if inside == 0 {
         let problem = format!("none of {} sets lies within --xlim and --ylim; give wider ones", sets.len());
-        return Err(x.values.refuse(&problem));
+        return Err(x.refuse(&problem));
     }
 
     let hues = colour.as_ref().map(hues).transpose()?;
@@ -121,7 +121,7 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     let radius = if inside > FEW_SETS { SMALL_RADIUS } else { RADIUS };
     let mut entries = hues.as_ref().map_or_else(Vec::new, |hues| hues.entries(RADIUS));
     if let Some(colour) = colour.as_ref().filter(|colour| sets.iter().any(|&set| colour.numbers[set].is_none())) {
-        entries.push(entry(Mark::Dot(dot(GREY)), format!("no {}", colour.name())));
+        entries.push(entry(Mark::Dot(dot(GREY)), format!("no {}", colour.label().symbol)));
     }
     let left_out = rows.len() - inside;
     let note = match left_out {
@@ -169,10 +169,23 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
     Ok(panel::draw(&format!("{y_name}-{x_name}"), &look.with_note(&note), layout, &entries, panels))
 }
 
+fn of(rows: &[SetRow], option: &str, name: &str) -> Result<Values, BadOption> {
+    Values::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))
+}
+
+/// Why an option cannot name a column.
+fn refuse(option: &str, values: &Values, problem: &str) -> BadOption {
+    BadOption::new(option, &values.column.name, problem)
+}
+
 impl Asked<'_> {
+    fn refuse(&self, problem: &str) -> BadOption {
+        refuse(self.option, &self.values, problem)
+    }
+
     fn refuse_limits(&self, problem: &str) -> BadOption {
         let [low, high] = [self.limits.0, self.limits.1].map(|end| end.map_or_else(String::new, |end| end.to_string()));
-        BadOption::new(&format!("{}lim", self.values.option), &format!("{low}:{high}"), problem)
+        BadOption::new(&format!("{}lim", self.option), &format!("{low}:{high}"), problem)
     }
 
     /// Whether a set has a place on the axis.
@@ -183,20 +196,20 @@ impl Asked<'_> {
     /// The axis, from one limit or end of the data to the other.
     fn axis(&self, sets: &[usize]) -> Result<Axis, BadOption> {
         const SLACK: f64 = 1e-9;
-        let label = self.label.map_or_else(|| self.values.label(), str::to_owned);
-        let short_label = self.label.is_none().then(|| self.values.short_label());
+        let label = self.label.map_or_else(|| axis_label(&self.values), str::to_owned);
+        let short_label = self.label.is_none().then(|| short_label(&self.values));
         if self.values.is_worded() {
             let (name, count) = (&self.values.column.name, self.values.words.len());
             if self.is_log {
                 let problem = format!("{name} holds words; a logarithmic axis takes numbers");
-                return Err(BadOption::new("log", self.values.option, &problem));
+                return Err(BadOption::new("log", self.option, &problem));
             }
             if self.limits != (None, None) {
                 return Err(self.refuse_limits(&format!("{name} holds words; limits are for numbers")));
             }
             if count > MAX_WORDS {
                 let problem = format!("has {count} words, and {MAX_WORDS} fit an axis; take another column");
-                return Err(self.values.refuse(&problem));
+                return Err(self.refuse(&problem));
             }
             let words: Vec<&str> = self.values.words.iter().map(String::as_str).collect();
             return Ok(Axis::categories(&label, &words).with_short_label(short_label));
@@ -210,7 +223,7 @@ impl Asked<'_> {
         };
         let values = sets.iter().flat_map(ends);
         let natural = if self.is_log { logarithmic_bounds(values) } else { bounds(values).map(widened) };
-        let (low, high) = natural.ok_or_else(|| self.values.refuse("has no finite value"))?;
+        let (low, high) = natural.ok_or_else(|| self.refuse("has no finite value"))?;
         // Values at a limit are shown, however they are rounded.
         let low = self.limits.0.map_or(low, |end| end - SLACK * end.abs());
         let high = self.limits.1.map_or(high, |end| end + SLACK * end.abs());
@@ -235,11 +248,15 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
 fn hues(values: &Values) -> Result<Hues, BadOption> {
     let (count, inks) = (values.words.len(), INKS.len());
     if count > inks {
-        return Err(values.refuse(&format!("has {count} words, and there are {inks} colours; take another column")));
+        return Err(refuse(
+            "colour",
+            values,
+            &format!("has {count} words, and there are {inks} colours; take another column"),
+        ));
     }
     let mut known = values.numbers.iter().copied().flatten().peekable();
-    known.peek().ok_or_else(|| values.refuse("no set has a value of it"))?;
-    Ok(Hues::of(&values.short_label(), known, |value| values.setting(value)))
+    known.peek().ok_or_else(|| refuse("colour", values, "no set has a value of it"))?;
+    Ok(Hues::of(&short_label(values), known, |value| setting(values, value)))
 }
 
 /// The sets of each panel and its title.
@@ -247,7 +264,7 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     let Some(values) = panels else { return Ok(vec![(String::new(), sets.to_vec())]) };
     let of = |value: f64| {
         let members: Vec<usize> = sets.iter().copied().filter(|&set| values.numbers[set] == Some(value)).collect();
-        (values.setting(value), members)
+        (setting(values, value), members)
     };
     let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten()).into_iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
@@ -256,12 +273,12 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
         1..=MAX_PANELS => return Ok(groups),
         count => format!("has {count} values, and {MAX_PANELS} panels fit a page; show it with --colour"),
     };
-    Err(values.refuse(&problem))
+    Err(refuse("panels", values, &problem))
 }
 
 /// Sets that differ in the x axis alone, if that is a parameter, η or 1/T, in the order of x.
 fn lines(rows: &[SetRow], x_name: &str, sets: &[usize], x: &Values) -> Vec<Vec<usize>> {
-    let symbol = if ["eta", FREQUENCY_COLUMN].contains(&x_name) { Some(Symbol::T) } else { Symbol::from_key(x_name) };
+    let symbol = if ["eta", FREQUENCY].contains(&x_name) { Some(Symbol::T) } else { Symbol::from_key(x_name) };
     let Some(symbol) = symbol else { return Vec::new() };
     let others = |set: usize| {
         let others = Symbol::ALL.into_iter().filter(|other| *other != symbol && *other != Symbol::Seed);
@@ -397,7 +414,7 @@ pub(super) mod tests {
     #[test]
     fn only_sets_that_differ_in_x_alone_are_joined() {
         let rows = rows(8);
-        let x = Values::of(&rows, "x", "V0").unwrap();
+        let x = Values::of(&rows, "V0").unwrap();
         let sets: Vec<usize> = (0..8).collect();
         assert_eq!(lines(&rows, "V0", &sets, &x), [vec![1, 3, 5, 7], vec![0, 2, 4, 6]]);
         assert!(lines(&rows, "tau_mean", &sets, &x).is_empty() && lines(&rows, "Delta", &sets, &x).is_empty());
@@ -405,7 +422,7 @@ pub(super) mod tests {
         for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
             row.parameters.parameters.modulation_period = Some(period);
         }
-        let x = Values::of(&periods, "x", "frequency").unwrap();
+        let x = Values::of(&periods, "frequency").unwrap();
         assert_eq!(lines(&periods, "frequency", &[0, 1, 2], &x), [vec![2, 0, 1]]);
     }
 

@@ -1,8 +1,10 @@
 //! Sets compared: in what they differ, what each is called, and the grid on which they lie.
 
 use super::axis::{Axis, logarithmic_bounds};
-use crate::model::{Description, Parameters, Symbol, Value};
+use crate::model::{Parameters, Symbol, Value};
 use crate::reduce::SetRow;
+use crate::sweep::{Label, label};
+pub(super) use crate::sweep::{symbol_of, three_digits};
 
 /// Steps that differ by less than this share are even: sweep files hold rounded numbers.
 const EVEN: f64 = 0.02;
@@ -83,39 +85,11 @@ pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
     format!("{} = {value} {}", symbol_of(symbol), description.unit).trim_end().to_owned()
 }
 
-/// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
-pub(super) fn symbol_of(symbol: Symbol) -> String {
-    let description = symbol.description();
-    let name = if description.symbol.is_empty() { description.key } else { description.symbol };
-    match name.split_once('_') {
-        Some((letter, "s")) => format!("{letter}ₛ"),
-        Some((letter, "r")) => format!("{letter}ᵣ"),
-        // There is no letter for other subscripts.
-        Some(_) => description.key.to_owned(),
-        None => name.replace("V0", "V₀"),
-    }
-}
-
 /// The label of an axis of a parameter: what it is, its symbol and its unit.
 pub(super) fn parameter(symbol: Symbol) -> String {
-    let Description { meaning, unit, .. } = symbol.description();
-    let what = meaning.split([',', ';']).next().unwrap_or_default();
-    let label = format!("{} {}", capitalised(what), symbol_of(symbol));
+    let Label { symbol, what, unit } = label(symbol.key());
+    let label = format!("{what} {symbol}");
     if unit.is_empty() { label } else { format!("{label} ({unit})") }
-}
-
-pub(super) fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
-pub(super) fn three_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    // Through the decimal form, so that 29.000000000000004 is 29.
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
 /// What some parameters have in common, in symbols.

@@ -4,6 +4,7 @@
 mod backbone;
 mod cells;
 mod circular;
+mod compare;
 mod confidence;
 mod drive_alone;
 mod gather;
@@ -20,12 +21,14 @@ mod sequence;
 mod set;
 mod slip_stats;
 mod statistic;
+mod values;
 
 pub use crate::sweep::{Interval, SetRow};
 pub use backbone::BackboneBin;
 #[cfg(test)]
 pub(crate) use cells::{CellOfGrid, Cells};
 pub use cells::{CellRow, divide};
+pub use compare::compare;
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
 pub use gather::reduce_jobs;
@@ -38,6 +41,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
+pub use values::{FREQUENCY, Values, set_columns, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};

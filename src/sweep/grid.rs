@@ -84,7 +84,7 @@ impl Sweep {
     }
 
     /// The jobs at these points, in order.
-    pub(super) fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
+    pub fn jobs_at(&self, points: Range<u64>) -> impl Iterator<Item = Job> + Clone + Send + '_ {
         let count = self.point_count();
         let of_grid = self.admitted(points.start.min(count)..points.end.min(count));
         let others = points.start.max(count) - count..points.end.max(count) - count;

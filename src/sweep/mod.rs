@@ -5,9 +5,10 @@
 //! source.rs      read_axes.rs   grid.rs   job.rs   plan.rs
 //! read.rs        axes.rs                  cost.rs
 //! checks.rs      filter.rs
+//!                expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
-//! set.rs: what is known of a set
+//! set.rs: what is known of a set; labels.rs: how it is called before people
 //! ```
 //!
 //! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
@@ -20,9 +21,11 @@ mod checks;
 mod command;
 mod controls;
 mod cost;
+mod expression;
 mod filter;
 mod grid;
 mod job;
+mod labels;
 mod plan;
 mod quantity;
 mod read;
@@ -36,8 +39,10 @@ mod source;
 mod tests;
 
 pub use cost::predicted_cost;
+pub use expression::{Expression, ExpressionError};
 pub use grid::Sweep;
 pub use job::{Id, Identity, Job};
+pub use labels::{Label, capitalised, label, symbol_of, three_digits};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
 pub use set::{Interval, STATISTICS, SetRow, Statistic, StatisticKind};

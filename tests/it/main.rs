@@ -29,6 +29,7 @@ mod report;
 mod rounds;
 mod runs;
 mod sharing;
+mod show;
 mod simulate;
 mod statistics;
 mod unreadable;

@@ -6,7 +6,6 @@ import pytest
 from scipy import stats
 
 from stickslip import statistics
-from stickslip.compare_sets import compare
 from stickslip.tables import Sweep
 
 
@@ -93,13 +92,3 @@ def test_the_locking_index_of_a_set_is_that_of_its_slips(results):
     assert len(reduced) == 1
     # The same sums in another order.
     pd.testing.assert_series_equal(found, reduced, rtol=1e-12, check_names=False)
-
-
-def test_sets_of_a_sweep_are_compared_by_their_ids(results):
-    sets = pd.read_parquet(results / "reduced" / "sets.parquet").sort_values("Delta", ignore_index=True)
-    found = compare(results, sets["set_id"][1], sets["set_id"][0])
-    assert set(found) == {"interval", "mean_friction"}, "the locking index needs two modulated sets"
-    # As many slips for each seed.
-    for column, reduced in (("interval", sets["tau_mean"]), ("mean_friction", sets["mean_friction"])):
-        assert found[column].value == pytest.approx(reduced[1] - reduced[0], rel=1e-9)
-        assert found[column].units == 5

@@ -1,0 +1,299 @@
+//! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
+
+use super::exit::{Exit, UsageError};
+use super::output;
+use crate::model::{Parameters, Symbol};
+use crate::reduce::{FREQUENCY, SetRow, Values, compare, read_reduced, sets_where};
+use crate::results::Results;
+use crate::results::layout::Layout;
+use crate::sweep::{Sweep, three_digits};
+use crate::table::shown::shown;
+use crate::table::storage::Disk;
+use anyhow::Result;
+use clap::Args;
+use serde_json::{Map, Value as Json};
+use std::path::PathBuf;
+
+/// Show the result of a sweep: a line for each parameter set, with 95 % intervals
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Results directory
+    #[arg(value_name = "DIR")]
+    directory: PathBuf,
+    /// A second one: what differs, seed by seed, between the sets of both that agree in all that either varies
+    #[arg(value_name = "OTHER", conflicts_with_all = ["columns", "condition", "sort"])]
+    other: Option<PathBuf>,
+    /// Columns of the sets, or formulas of such, separated by commas [default: what differs, and what was found]
+    #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Only sets for which a condition on their columns holds, in SI
+    #[arg(long = "where", value_name = "CONDITION")]
+    condition: Option<String>,
+    /// Column to sort by, least first; -COLUMN: largest first
+    #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
+    sort: Option<String>,
+    /// Print CSV, in SI
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// Print JSON, in SI
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  stickslip show results/fig3
+  stickslip show results/fig3 --where 'V0 > 1e-4 and resultant_length > 0.5' --sort -resultant_excess
+  stickslip show results/soft results/stiff                   what another Kd changes, say
+  stickslip show results/fig3 --columns V0,eta,tau_mean,tau_sd/tau_mean --csv > fig3.csv
+
+Columns are those of stickslip plot --list.";
+
+/// Version of the JSON.
+const FORMAT: u32 = 1;
+
+/// Sets that the end of a run shows.
+const FIRST: usize = 12;
+
+/// What is found of a set, where there is anything.
+const FOUND: [&str; 9] = [
+    "regime",
+    "slips",
+    "tau_mean",
+    "tau_sd",
+    "mean_friction",
+    "friction_coefficient",
+    "resultant_length",
+    "resultant_drive",
+    "resultant_excess",
+];
+
+pub fn show(arguments: &Arguments) -> Result<Exit> {
+    let layout = Layout::new(&Disk, &arguments.directory);
+    let results = Results::read(&layout)?;
+    if let Some(other) = &arguments.other {
+        let columns = compare(&results, &Results::read(&Layout::new(&Disk, other))?)?;
+        if columns.is_empty() {
+            let problem = "no set agrees with one of the first in all parameters that either varies";
+            return Err(UsageError(format!("{}: {problem}", shown(other))).into());
+        }
+        return print(arguments, &columns, &[]);
+    }
+    let mut rows = sets(&results)?;
+    if let Some(condition) = &arguments.condition {
+        rows = sets_where(rows, condition).map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
+    }
+    if let Some(column) = &arguments.sort {
+        sort(&mut rows, column)?;
+    }
+    let columns = if arguments.columns.is_empty() { usual_columns(&rows) } else { arguments.columns.clone() };
+    let columns: Vec<Values> = columns
+        .iter()
+        .map(|name| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}"))))
+        .collect::<Result<_, _>>()?;
+    print(arguments, &columns, &rows)?;
+    if !arguments.json && !arguments.csv {
+        for note in notes(&results, &rows) {
+            output::print(&format!("{note}\n"))?;
+        }
+    }
+    Ok(Exit::Done)
+}
+
+/// Prints columns as is asked; `rows` are the sets, if they are of one directory.
+fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<Exit> {
+    let count = columns.first().map_or(0, |values| values.numbers.len());
+    if arguments.json {
+        let sets: Vec<Map<String, Json>> = (0..count).map(|set| record(columns, set).into_iter().collect()).collect();
+        output::json(FORMAT, &serde_json::json!({ "sets": sets }))?;
+    } else if arguments.csv {
+        print_csv(columns, count)?;
+    } else {
+        output::print(&aligned(columns, rows, count))?;
+    }
+    Ok(Exit::Done)
+}
+
+/// The first sets of a directory that has just been reduced, and what ended otherwise.
+pub fn summary(results: &Results<'_>) -> Result<String> {
+    let rows = sets(results)?;
+    let columns: Vec<Values> = usual_columns(&rows).iter().filter_map(|name| Values::of(&rows, name).ok()).collect();
+    let mut text = aligned(&columns, &rows, FIRST);
+    if rows.len() > FIRST {
+        let root = output::quoted_path(results.layout().root());
+        text += &format!("… {} more: stickslip show {root}\n", rows.len() - FIRST);
+    }
+    for note in notes(results, &rows) {
+        text += &format!("{note}\n");
+    }
+    Ok(text)
+}
+
+/// The reduced sets, controls left out.
+fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
+    let layout = results.layout();
+    if !layout.storage.exists(&layout.reduced_file("sets"))? {
+        crate::reduce::reduce(results)?;
+    }
+    Ok(read_reduced::<SetRow>(layout)?.into_iter().filter(|row| !row.is_control).collect())
+}
+
+/// The parameters in which sets differ, and what was found of them.
+fn usual_columns(rows: &[SetRow]) -> Vec<String> {
+    let differ = |symbol: &Symbol| {
+        let mut values = rows.iter().map(|row| row.parameters.get(*symbol));
+        let first = values.next();
+        *symbol != Symbol::Seed && values.any(|value| Some(value) != first)
+    };
+    let swept: Vec<Symbol> = Symbol::ALL.into_iter().filter(differ).collect();
+    let mut columns: Vec<String> = Vec::new();
+    for symbol in swept {
+        let key = if symbol == Symbol::T { FREQUENCY } else { symbol.key() };
+        columns.push(key.to_owned());
+    }
+    if columns.iter().any(|column| column == FREQUENCY) {
+        columns.push("eta".to_owned());
+    }
+    let is_there = |name: &str| Values::of(rows, name).is_ok_and(|values| values.numbers.iter().any(Option::is_some));
+    columns.extend(FOUND.into_iter().filter(|name| is_there(name)).map(str::to_owned));
+    columns
+}
+
+fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
+    let (name, is_falling) = column.strip_prefix('-').map_or((column, false), |name| (name, true));
+    let values = Values::of(rows, name).map_err(|problem| UsageError(format!("--sort {column}: {problem}")))?;
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.sort_by(|&left, &right| {
+        let sign = if is_falling { -1.0 } else { 1.0 };
+        // Sets without a value come last.
+        let key = |set: usize| values.numbers[set].map_or(f64::INFINITY, |number| sign * number);
+        key(left).total_cmp(&key(right))
+    });
+    *rows = order.into_iter().map(|set| rows[set].clone()).collect();
+    Ok(())
+}
+
+/// A value of a set with its interval, in SI, by the names of the table of sets.
+fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
+    let mut record = Vec::new();
+    for values in columns {
+        let name = &values.column.name;
+        let word = values.numbers[set].filter(|_| values.is_worded()).and_then(|value| values.word(value));
+        let value = word.map_or_else(|| Json::from(values.numbers[set]), Json::from);
+        record.push((name.to_string(), value));
+        if values.intervals.iter().any(Option::is_some) {
+            let (low, high) = values.intervals[set].unzip();
+            record.push((format!("{name}_low"), low.into()));
+            record.push((format!("{name}_high"), high.into()));
+        }
+    }
+    record
+}
+
+fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for set in 0..sets {
+        let record = record(columns, set);
+        if set == 0 {
+            writer.write_record(record.iter().map(|(name, _)| name))?;
+        }
+        writer.write_record(record.iter().map(|(_, value)| match value {
+            Json::Null => String::new(),
+            Json::String(word) => word.clone(),
+            value => value.to_string(),
+        }))?;
+    }
+    output::print(&String::from_utf8(writer.into_inner()?)?)
+}
+
+/// A table for people: symbols and units at its head, values with half of their 95 % intervals.
+fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
+    let cells: Vec<Vec<String>> = columns.iter().map(|values| column(values, rows, most)).collect();
+    let widths: Vec<usize> =
+        cells.iter().map(|cells| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0)).collect();
+    let mut text = String::new();
+    for line in 0..cells.first().map_or(0, Vec::len) {
+        let padded = cells.iter().zip(&widths).zip(columns).map(|((cells, &width), values)| {
+            let cell = &cells[line];
+            if values.is_worded() { format!("{cell:width$}") } else { format!("{cell:>width$}") }
+        });
+        text += padded.collect::<Vec<_>>().join("  ").trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+/// The head of a column and its first cells.
+fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
+    let label = values.label();
+    let largest = values.numbers.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let (factor, unit) = label.scale(largest);
+    let mut cells = vec![if unit.is_empty() { label.symbol } else { format!("{} ({unit})", label.symbol) }];
+    for (set, &number) in values.numbers.iter().enumerate().take(most) {
+        let bound = rows.get(set).and_then(|row| row.tau_bound).filter(|_| values.column.name == "tau_mean");
+        cells.push(match (number, values.intervals[set]) {
+            (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
+            (Some(value), Some((low, high))) => with_error(factor * value, 0.5 * factor * (high - low)),
+            (Some(value), None) => three_digits(factor * value),
+            (None, _) => bound.map_or_else(|| "–".to_owned(), |bound| format!("> {}", three_digits(factor * bound))),
+        });
+    }
+    cells
+}
+
+/// A value and the half-width of its interval, with the digits that this leaves.
+fn with_error(value: f64, half: f64) -> String {
+    if half.is_nan() || half <= 0.0 {
+        return three_digits(value);
+    }
+    // Two digits of an error that begins with 1.
+    let exponent = libm::floor(libm::log10(half));
+    let digits = if half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
+    let digits = digits.clamp(0.0, 18.0) as usize;
+    format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
+/// no longer has.
+fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
+    let (sweep, mut notes) = (results.sweep(), Vec::new());
+    let without: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_without_slips > 0).collect();
+    if let Some(first) = without.first() {
+        let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
+        let sets = output::count(without.len() as u64, "set");
+        let command = command_of(sweep, &first.parameters.parameters);
+        notes.push(format!("{jobs} of {sets} without slips; the first: {command}"));
+    }
+    let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
+    if failed > 0 {
+        let root = output::quoted_path(results.layout().root());
+        notes.push(format!("{} failed: stickslip status {root} says why", output::count(failed, "job")));
+    }
+    let gone = rows.iter().filter(|row| sweep.set_with(&row.parameters.parameters).is_none()).count();
+    if gone > 0 {
+        notes.push(format!("{} of these the sweep no longer has", output::count(gone as u64, "set")));
+    }
+    notes
+}
+
+/// The command that shows a job of a set, its first.
+fn command_of(sweep: &Sweep, parameters: &Parameters) -> String {
+    let job = sweep.set_with(parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
+    job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_the_digits_that_their_errors_leave() {
+        let shown = [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06)];
+        assert_eq!(
+            shown.map(|(value, half)| with_error(value, half)),
+            ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06"]
+        );
+    }
+}

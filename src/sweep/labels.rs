@@ -1,0 +1,153 @@
+//! How a column is called before people: its symbol, what it is in a few words, and the unit that suits its values.
+
+use super::set::SetRow;
+use crate::model::{Description, Symbol};
+use crate::table::columns::Row;
+
+/// Column, symbol, and what it is where its meaning does not say so in a few words.
+const LABELS: [(&str, &str, &str); 33] = [
+    ("eta", "η", "η = 2πΔ / (T V₀)"),
+    ("frequency", "1/T", "Modulation frequency"),
+    ("failed_jobs", "failed", "Failed jobs"),
+    ("slip_share", "slip share", "Share of time within slips"),
+    ("attached_fraction", "attached", "Attached contacts"),
+    ("tau_mean", "⟨τ⟩", ""),
+    ("tau_sd", "σ(τ)", "S.d. of the intervals"),
+    ("tau_05", "τ(5 %)", ""),
+    ("tau_25", "τ(25 %)", ""),
+    ("tau_50", "median τ", ""),
+    ("tau_75", "τ(75 %)", ""),
+    ("tau_95", "τ(95 %)", "95 % quantile of the intervals"),
+    ("periods_mean", "⟨τ/T⟩", "Mean interval in periods"),
+    ("periods", "n", "Periods per slip"),
+    ("locking_index", "locking", "Locking index of τ"),
+    ("locking_index_drive", "locking, drive", "Locking index by the drive alone"),
+    ("locking_index_excess", "locking, excess", "Locking index beyond the drive's"),
+    ("phase_mean", "⟨φ⟩", "Mean phase"),
+    ("resultant_length", "R", "Resultant length of the phase"),
+    ("resultant_drive", "R, drive", "Resultant length by the drive alone"),
+    ("resultant_excess", "R, excess", "Resultant length beyond the drive's"),
+    ("expected_resultant", "R, random loads", "Resultant length at random loads"),
+    ("drop_mean", "⟨ΔF⟩", ""),
+    ("drop_sd", "σ(ΔF)", "S.d. of the stress drop"),
+    ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
+    ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
+    ("friction_coefficient", "μ", "Friction coefficient ⟨Fₛ⟩/F_N"),
+    ("slip_distance_mean", "slip distance", "Mean slip distance"),
+    ("edge_distance_mean", "edge distance", "Mean slip distance of the driven edge"),
+    ("least_attached_mean", "least attached", "Least attached contacts in a slip"),
+    ("precursors_mean", "precursors", ""),
+    ("front_speed_mean", "front speed", ""),
+    ("slow_front_speed_mean", "slow fronts", "Mean speed of slow fronts"),
+];
+
+/// Longest meaning, in bytes, that is what a column is in a few words.
+const LONGEST: usize = 40;
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Label {
+    pub symbol: String,
+    /// What it is, without its symbol, for the axis of a figure.
+    pub what: String,
+    /// Its SI unit; empty for a pure number or a word.
+    pub unit: &'static str,
+}
+
+/// What ends the names of columns of a comparison.
+const COMPARED: [(&str, &str); 3] = [("_a", ", A"), ("_b", ", B"), ("_difference", ", B − A")];
+
+/// The label of a column of the sets, or of a comparison of such; a formula is its own.
+pub fn label(column: &str) -> Label {
+    for (end, words) in COMPARED {
+        if let Some(column) = column.strip_suffix(end) {
+            let Label { symbol, what, unit } = label(column);
+            return Label { symbol: symbol + words, what: what + words, unit };
+        }
+    }
+    if let Some(symbol) = Symbol::from_key(column) {
+        let Description { meaning, unit, .. } = symbol.description();
+        let what = meaning.split([',', ';']).next().unwrap_or_default();
+        return Label { symbol: symbol_of(symbol), what: capitalised(what), unit };
+    }
+    let known = LABELS.iter().find(|(key, ..)| *key == column);
+    let described = SetRow::columns().into_iter().find(|known| known.name == column);
+    let plain = column.replace('_', " ");
+    let symbol = known.map_or_else(|| plain.clone(), |(_, symbol, _)| (*symbol).to_owned());
+    let meaning = described.as_ref().map(|column| column.meaning).filter(|meaning| meaning.len() <= LONGEST);
+    let what = match (known, meaning) {
+        (Some((.., what)), _) if !what.is_empty() => (*what).to_owned(),
+        (_, Some(meaning)) => capitalised(meaning),
+        _ => capitalised(&plain),
+    };
+    let unit = described.map_or(if column == "frequency" { "Hz" } else { "" }, |column| column.unit);
+    Label { symbol, what, unit }
+}
+
+impl Label {
+    /// The factor to the unit in which values up to this are read best, and that unit: times and lengths below 1 in
+    /// thousandths or millionths, all else as it is.
+    pub fn scale(&self, largest: f64) -> (f64, &'static str) {
+        match self.unit {
+            "s" if largest < 1e-3 => (1e6, "µs"),
+            "s" if largest < 1.0 => (1e3, "ms"),
+            "m" if largest < 1e-3 => (1e6, "µm"),
+            "m" if largest < 1.0 => (1e3, "mm"),
+            unit => (1.0, unit),
+        }
+    }
+}
+
+/// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
+pub fn symbol_of(symbol: Symbol) -> String {
+    let description = symbol.description();
+    let name = if description.symbol.is_empty() { description.key } else { description.symbol };
+    match name.split_once('_') {
+        Some((letter, "s")) => format!("{letter}ₛ"),
+        Some((letter, "r")) => format!("{letter}ᵣ"),
+        // There is no letter for other subscripts.
+        Some(_) => description.key.to_owned(),
+        None => name.replace("V0", "V₀"),
+    }
+}
+
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Three digits, without those that say nothing.
+pub fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Through the decimal form, so that 29.000000000000004 is 29.
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_labelled_is_a_column_and_every_number_has_words() {
+        let columns = SetRow::columns();
+        for (key, ..) in LABELS {
+            let is_derived = ["frequency", "friction_coefficient"].contains(&key);
+            assert!(is_derived || columns.iter().any(|column| column.name == key), "{key}");
+        }
+        for column in columns {
+            let Label { symbol, what, unit } = label(&column.name);
+            assert!(!symbol.contains('_') && !what.contains('_'), "{}: {symbol}, {what}", column.name);
+            assert_eq!(unit, column.unit);
+        }
+    }
+
+    #[test]
+    fn times_and_lengths_are_told_in_the_unit_that_suits_the_largest() {
+        let scaled = |column: &str, largest| label(column).scale(largest);
+        assert_eq!((scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)), ((1e3, "ms"), (1.0, "s")));
+        assert_eq!((scaled("Delta", 1e-6), scaled("V0", 1e-6)), ((1e6, "µm"), (1.0, "m/s")));
+        assert_eq!(label("tau_sd / tau_mean").symbol, "tau sd / tau mean");
+    }
+}
