@@ -119,15 +119,12 @@ fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<E
 pub fn summary(results: &Results<'_>) -> Result<String> {
     let rows = sets(results)?;
     let columns: Vec<Values> = usual_columns(&rows).iter().filter_map(|name| Values::of(&rows, name).ok()).collect();
-    let mut text = aligned(&columns, &rows, FIRST);
+    let mut notes = notes(results, &rows);
     if rows.len() > FIRST {
         let root = output::quoted_path(results.layout().root());
-        text += &format!("… {} more: stickslip show {root}\n", rows.len() - FIRST);
+        notes.insert(0, format!("… {} more: stickslip show {root}", rows.len() - FIRST));
     }
-    for note in notes(results, &rows) {
-        text += &format!("{note}\n");
-    }
-    Ok(text)
+    Ok(notes.into_iter().fold(aligned(&columns, &rows, FIRST), |text, note| text + &note + "\n"))
 }
 
 /// The reduced sets, controls left out.
