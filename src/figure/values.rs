@@ -141,10 +141,10 @@ mod tests {
     #[test]
     fn a_column_of_words_becomes_places_and_one_with_an_interval_has_bars() {
         let mut rows = super::super::own::tests::rows(3);
-        rows[1].is_locked = true;
-        let locked = Values::of(&rows, "x", "locked").unwrap();
+        rows[1].has_phase = true;
+        let phased = Values::of(&rows, "x", "has_phase").unwrap();
         assert_eq!(
-            (locked.numbers, locked.words),
+            (phased.numbers, phased.words),
             (vec![Some(0.0), Some(1.0), Some(0.0)], vec!["no".into(), "yes".into()])
         );
         let tau = Values::of(&rows, "y", "tau_mean").unwrap();
@@ -178,6 +178,6 @@ mod tests {
         assert_eq!(label("rayleigh_p"), "rayleigh_p");
         assert_eq!(label("Delta"), "Amplitude of the modulation Δ (m)");
         let short = |name: &str| Values::of(&[], "x", name).unwrap().short_label();
-        assert_eq!(["Delta", "tau_mean", "locked"].map(short), ["Δ (m)", "tau_mean (s)", "locked"]);
+        assert_eq!(["Delta", "tau_mean", "has_phase"].map(short), ["Δ (m)", "tau_mean (s)", "has_phase"]);
     }
 }

@@ -26,7 +26,7 @@ class Explorer {
       .flatMap(([keys]) => keys.split(", "))
       .filter((key) => report.swept.some((swept) => swept.key === key));
     const [first, second] = keys.filter((key) => isNumeric(report.columns.get(key)));
-    const colour = report.isModulated ? "locked" : regimes.size > 1 ? "regime" : (second ?? "");
+    const colour = report.isModulated ? "has_phase" : regimes.size > 1 ? "regime" : (second ?? "");
     this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
   }
 
@@ -224,22 +224,22 @@ class Explorer {
       colour: red,
     });
     const bins = byName(report.backbone);
-    const [from, to, locked, low, high] = [
+    const [from, to, means, low, high] = [
       "eta_low",
       "eta_high",
-      "locked_phase_mean",
-      "locked_phase_mean_low",
-      "locked_phase_mean_high",
+      "set_phase_mean",
+      "set_phase_mean_low",
+      "set_phase_mean_high",
     ].map((name) => bins.get(name).values);
     // At the mean of their sets, as in the figure.
     const centre = from.map((least, bin) => {
-      const isIn = (eta, set) => report.values("locked")[set] && eta >= least && eta < to[bin];
+      const isIn = (eta, set) => report.values("has_phase")[set] && eta >= least && eta < to[bin];
       const logs = report.values("eta").filter(isIn).map(Math.log);
       return Math.exp(logs.reduce((sum, log) => sum + log, 0) / logs.length);
     });
     const binTip = (k) => [
-      make("strong", {}, `${counted(bins.get("locked_sets").values[k], "locked set")} at η = ${number(centre[k])}`),
-      `mean φ = ${number(locked[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
+      make("strong", {}, `${counted(bins.get("phased_sets").values[k], "set")} with a phase at η = ${number(centre[k])}`),
+      `mean φ = ${number(means[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
     ];
     this.phase.show({
       x: { label: "η = 2πΔ / (T V0)", log: true },
@@ -249,10 +249,10 @@ class Explorer {
         { ...curve(1), dash: [5, 4] },
         curve(2),
         { type: "intervals", x: centre, low, high, colour: mean, mayLeave: true },
-        { type: "points", x: centre, y: locked, colours: [mean], size: 4, tip: binTip },
+        { type: "points", x: centre, y: means, colours: [mean], size: 4, tip: binTip },
       ],
       key: [
-        [mean, "mean of locked sets, 95 %"],
+        [mean, "mean of sets with a phase, 95 %"],
         [red, "−2√(π/η); dashed: φ_min, Eq. 2", "stroke"],
       ],
       empty: "no slip under modulation",
