@@ -37,7 +37,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of sets with a phase"));
     }
     if slips.iter().any(|slip| !slip.0.has_phase) {
-        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
+        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
@@ -78,10 +78,10 @@ mod tests {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
-        assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "4", "12"]));
+        assert!(texts(&points, &["V₀ = 1e-4 m/s", "slips of sets without a phase", "τ = nT", "4", "12"]));
         let first = points[0];
         points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..first }));
-        assert!(texts(&points, &["V₀ (m/s)", "slips of sets with a phase", "other slips"]));
+        assert!(texts(&points, &["V₀ (m/s)", "slips of sets with a phase", "slips of sets without a phase"]));
     }
 
     #[test]

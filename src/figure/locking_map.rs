@@ -62,7 +62,7 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let excess = |set: &SetRow| set.resultant_excess;
     if modulated.iter().any(|set| excess(set).is_some()) {
         let most = modulated.iter().filter_map(|set| excess(set)).map(f64::abs).fold(MIN_EXCESS, f64::max);
-        let scale = Axis::rounded("", -most, most);
+        let scale = Axis::linear("", -most, most);
         let cells = map.coloured(|set| excess(set).map(|excess| diverging(scale.place(excess))));
         let colours = (0..=SHADES).map(|step| diverging(f64::from(step) / f64::from(SHADES))).collect();
         panels.push((cells, Vec::new(), ColourBar { colours, ..ColourBar::of_axis(EXCESS, &scale) }));

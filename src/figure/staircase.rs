@@ -63,7 +63,7 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
         indices.push(Layer::Curve(values(|set| set.locking_index), Stroke::solid(ink, 1.2)));
         indices.push(Layer::Curve(values(|set| set.locking_index_drive), drive_alone(ink)));
     }
-    let lower = Panel::new(160.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
+    let lower = Panel::new(200.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
     Some(panel::draw("staircase", look, Layout::column(558.0), &entries, vec![Panel::new(310.0, x, y, ratios), lower]))
 }
 

@@ -1,5 +1,8 @@
 // Charts of all sets, and what is said of their points.
 
+/** Columns of what the drive alone explains of others. */
+const DRIVE_ALONE = { resultant_length: "resultant_drive", locking_index: "locking_index_drive" };
+
 class Explorer {
   constructor(report, select) {
     this.report = report;
@@ -312,6 +315,20 @@ class Explorer {
       tip,
       pick,
     };
+    const drive = report.hasControls && report.columns.get(DRIVE_ALONE[y.name]);
+    const alone = drive
+      ? [
+          {
+            ...points,
+            y: drive.values,
+            group: this.setGroup.map((group) => (group === HIDDEN ? group : 0)),
+            colours: [cssColour("muted")],
+            size: 2.5,
+            tip: (set) => this.setTip(set, [x.name, drive.name]),
+          },
+        ]
+      : [];
+    if (drive) key.push([cssColour("muted"), "by the drive alone"]);
     const ends = ["low", "high"].map((end) => report.columns.get(`${y.name}_${end}`)?.values);
     const bars = ends[0]
       ? [
@@ -339,7 +356,7 @@ class Explorer {
             },
           ];
     if (bars.length) key.push(["transparent", "vertical bars: 95 % confidence interval"]);
-    this.free.show({ ...axes, layers: [...bars, points, ...own], key });
+    this.free.show({ ...axes, layers: [...bars, ...alone, points, ...own], key });
   }
 }
 

@@ -61,6 +61,7 @@ class SetTable {
       ...(report.status.jobs_failed ? ["failed_jobs"] : []),
       ...["regime", "slips", "tau_mean", "tau_sd"],
       ...(report.isModulated ? ["locking_index", "phase_mean", "has_phase", "resultant_length"] : []),
+      ...(report.hasControls ? ["resultant_drive", "resultant_excess", "locking_index_excess"] : []),
       ...["drop_mean", "mean_friction"],
     ];
     this.usual = names.filter((name) => usual.includes(name) && name !== "set_id");
