@@ -20,15 +20,15 @@ import stickslip
 
 
 def phase_eta(results):
-    """Phases of slips, their means over locked sets, and where Eq. 2 lets slips begin."""
+    """Phases of slips, means of sets that have a phase, and where Eq. 2 lets slips begin."""
     opened = stickslip.open(results)
     points = opened.points().to_pandas().dropna(subset="phase")
     bins = opened.backbone().to_pandas()
     figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
-    for locked, colour in ((False, "0.6"), (True, "black")):
-        slips = points[points["locked"] == locked]
-        axes.plot(slips["eta"], slips["phase"], ".", color=colour, markersize=2, label="locked" if locked else "others")
-    axes.plot(bins["eta_centre"], bins["locked_phase_mean"], "o", color="tab:blue", label="mean of locked sets")
+    for has_phase, colour, label in ((False, "0.6", "no phase"), (True, "black", "sets with a phase")):
+        slips = points[points["has_phase"] == has_phase]
+        axes.plot(slips["eta"], slips["phase"], ".", color=colour, markersize=2, label=label)
+    axes.plot(bins["eta_centre"], bins["set_phase_mean"], "o", color="tab:blue", label="mean of sets with a phase")
     eta = np.geomspace(1, max(10, points["eta"].max()))
     axes.plot(eta, -2 * np.sqrt(np.pi / eta), color="tab:red", label=r"$-2\sqrt{\pi/\eta}$")
     axes.plot(bins["eta_centre"], bins["phi_min"], "x", color="tab:red", label=r"$\phi_{\min}$, Eq. 2")

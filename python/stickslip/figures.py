@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from .results import Results
 
-#: The program's colours: slips of locked sets and others, averages, theory, bars; and lines side by side (Okabe and Ito).
-LOCKED, OTHERS, AVERAGE, THEORY, BARS = "black", "#8c8c8c", "#1f55c4", "#d62020", "#9db4d6"
+#: The program's colours: slips of sets with a phase and others, averages, theory, bars; and lines side by side (Okabe and Ito).
+PHASED, OTHERS, AVERAGE, THEORY, BARS = "black", "#8c8c8c", "#1f55c4", "#d62020", "#9db4d6"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 STYLE: Any = {
@@ -42,7 +42,7 @@ MAX_PANELS = 8
 MAX_MULTIPLES = 40
 #: Least ratio of two n with a line each: closer ones would merge.
 MIN_RATIO = 1.4
-#: Locked sets with a mean of their own; of more, bins are shown.
+#: Sets with a mean phase of their own; of more, bins are shown.
 MAX_MEANS = 60
 #: Size of a slip.
 MARKER = 3.5
@@ -71,7 +71,7 @@ class Plot:
 
     @_styled()
     def phase_eta(self, axes: "Axes | None" = None) -> "Axes":
-        """Phases of slips (rad) against eta, with means over locked sets and where Eq. 2 lets slips begin (Fig. 3e)."""
+        """Phases of slips (rad) against eta, with means of sets that have a phase and where Eq. 2 lets slips begin (Fig. 3e)."""
         points = self._slips("phase")
         axes = axes or _new_axes()
         low, high = 0.8 * points["eta"].min(), 1.25 * points["eta"].max()
@@ -100,7 +100,7 @@ class Plot:
             low, high = of_n["T"].min() / 1.25, of_n["T"].max() * 1.25
             axes.plot([low, high], [n, n], color=colour, linewidth=1, zorder=0)
             axes.annotate(f"{n:.0f}", (high, n), (3, 0), textcoords="offset points", color=colour, va="center")
-            of_n = of_n[of_n["locked"]]
+            of_n = of_n[of_n["has_phase"]]
             axes.plot(of_n["T"], of_n["tau_over_T"], ".", color=colour, markersize=MARKER)
         label = r"Slip interval $\tau/T$; coloured: near $n$"
         axes.set(xscale="log", yscale="log", xlabel="Modulation period $T$ (s)", ylabel=label)
@@ -136,13 +136,13 @@ class Plot:
         return panels[:, 0]
 
     def _mean_phases(self) -> "tuple[pandas.Series, pandas.Series, numpy.ndarray, str]":
-        """eta, mean phase of locked sets (rad), lower and upper bars, and what they are: sets, or bins of many sets."""
-        columns = ["eta", "phase_mean", "phase_mean_low", "phase_mean_high", "locked"]
+        """eta, mean phase of sets that have one (rad), lower and upper bars, and what they are: sets, or bins of many sets."""
+        columns = ["eta", "phase_mean", "phase_mean_low", "phase_mean_high", "has_phase"]
         found = self._results.sets(columns).to_pandas()
-        found, what = found[found["locked"]].drop(columns="locked"), "mean of a locked set"
+        found, what = found[found["has_phase"]].drop(columns="has_phase"), "mean of a set with a phase"
         if len(found) > MAX_MEANS:
-            columns = ["eta_centre", *(f"locked_{column}" for column in columns[1:4])]
-            found, what = self._results.backbone(columns).to_pandas().dropna(), "mean of locked sets"
+            columns = ["eta_centre", *(f"set_{column}" for column in columns[1:4])]
+            found, what = self._results.backbone(columns).to_pandas().dropna(), "mean of sets with a phase"
         eta, mean, low, high = (found[column] for column in found)
         return eta, mean, abs(found[[low.name, high.name]].sub(mean, axis=0)).T.to_numpy(), what
 
@@ -155,9 +155,9 @@ class Plot:
 
 
 def _scatter(axes: "Axes", points: "pandas.DataFrame", x: str, y: str) -> None:
-    """Slips, those of locked sets over the others."""
-    for locked, colour, label in ((False, OTHERS, "other slips"), (True, LOCKED, "slips of locked sets")):
-        of_kind = points[points["locked"] == locked]
+    """Slips, those of sets with a phase over the others."""
+    for has_phase, colour, label in ((False, OTHERS, "other slips"), (True, PHASED, "slips of sets with a phase")):
+        of_kind = points[points["has_phase"] == has_phase]
         axes.plot(of_kind[x], of_kind[y], ".", color=colour, markersize=MARKER, alpha=0.5, markeredgewidth=0, label=label)
 
 
@@ -192,9 +192,9 @@ def _named(one: "pandas.Series") -> str:
 
 
 def _frequent(points: "pandas.DataFrame") -> list[float]:
-    """The n of the most slips, of locked sets if there are any, not too close to each other, in order."""
-    locked = points[points["locked"] & (points["periods"] > 0)]
-    counts = (locked if len(locked) else points[points["periods"] > 0])["periods"].value_counts()
+    """The n of the most slips, of sets with a phase if there are any, not too close to each other, in order."""
+    phased = points[points["has_phase"] & (points["periods"] > 0)]
+    counts = (phased if len(phased) else points[points["periods"] > 0])["periods"].value_counts()
     chosen: list[float] = []
     for n in counts.index:
         if len(chosen) < len(COLOURS) and all(max(n, other) >= MIN_RATIO * min(n, other) for other in chosen):

@@ -130,7 +130,7 @@ def dependences(results: Path) -> Section:
         "`sweeps/size.toml`, `sweeps/contacts.toml` and `sweeps/disorder.toml`, Δ = 1 µm",
         ("size", "contacts", "disorder"),
     )
-    are_locked, beyond = [], []
+    bunched, beyond = [], []
     for sweep, column, symbol in (("size", "N", "N"), ("contacts", "Ns", "N_s"), ("disorder", "disorder", "Δf_s/f_s")):
         slips = Sweep(results / sweep).slips()
         slips = slips.assign(disorder=(slips["dfs"] / slips["fs"]).round(3))
@@ -141,7 +141,7 @@ def dependences(results: Path) -> Section:
             jackknife(lambda rows: resultant_length(rows["phase"]), rows)
             for _, rows in modulated[modulated["frequency"].isin(FREQUENCIES)].groupby([column, "frequency"])
         ]
-        are_locked += [length.low > 0.5 for length in lengths]
+        bunched += [length.low > 0.5 for length in lengths]
         sets = select(Sweep(results / sweep).sets(), Delta=1e-6)
         beyond.append(f"{beyond_text(sets, 'resultant')} ({symbol})")
         section.rows.append(
@@ -154,7 +154,7 @@ def dependences(results: Path) -> Section:
         )
     section.remark(
         f"At {', '.join(map(str, FREQUENCIES))} Hz the resultant of φ lies above 0.5 with its interval in"
-        f" {sum(are_locked)} of {len(are_locked)} cases; beyond what the drive alone gives it lies in {'; '.join(beyond)}."
+        f" {sum(bunched)} of {len(bunched)} cases; beyond what the drive alone gives it lies in {'; '.join(beyond)}."
     )
     return section
 

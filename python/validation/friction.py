@@ -43,7 +43,7 @@ def friction(results: Path) -> Section:
     )
     section.remark(
         f"F_m = {peak:.1f} N is the mean peak force, {reference:.1f} N the mean friction at Δ = 0.",
-        "Weak modulation can raise friction: locked slips wait for a maximum of the load while the force grows, at 29 Hz"
+        "Weak modulation can raise friction: slips wait for a maximum of the load while the force grows, at 29 Hz"
         f" and ΔF/F_m = {stiffness * 6e-7 / peak:.2f} for {waits:.0f} ms instead of {free:.0f} ms.",
         f"Strong modulation lowers it, by 10 % {weakest} and {strongest}.",
     )

@@ -204,7 +204,7 @@ def many_periods(results: Path) -> Section:
     slips = slips.assign(near=near_whole(slips["tau_over_T"]))
     whole, bunched = (share(rows["near"], rows["set_id"]) for rows in (slips, slips[slips["resultant_length"] > 0.5]))
     section.check("", "more than the 0.2 of chance within 0.1 T of nT, for η > 1", whole.text(), whole.low > 0.2)
-    section.check("once locked (resultant of φ above 0.5)", "more than 0.5", bunched.text(), bunched.low > 0.5)
+    section.check("once locked", "more than 0.5 where the resultant of φ is above 0.5", bunched.text(), bunched.low > 0.5)
     sets = Sweep(results / "drive-alone").sets()
     sets = sets[sets["eta"] > 1]
     for low, high in pairwise((1, 2, 4, 11)):
@@ -248,20 +248,20 @@ def stress_drops(results: Path) -> Section:
         return pandas.concat([beside_line(those) for _, those in rows.groupby("periods")]).std()
 
     of_tau = {"without modulation": jackknife(common, still)}
-    locked, chances, spreads = [], [], []
+    modulated, chances, spreads = [], [], []
     for frequency in FREQUENCIES:
         rows = select(slips, Delta=1e-6, frequency=frequency).dropna(subset="periods")
         free = still.assign(periods=(still["interval"] * frequency).round())
         of_tau[f"at {frequency} Hz"] = jackknife(common, rows)
-        locked.append(jackknife(left, rows))
+        modulated.append(jackknife(left, rows))
         chances.append(jackknife(left, free))
         spreads.append(f"{rows['drop'].std():.1f}")
     section.check(
         "",
         "at given τ (s.d. about a line for each n) drops vary less than unmodulated",
-        f"{at_frequencies(locked, 1, ' N')}; unmodulated {', '.join(one.text(1) for one in chances)} N;"
+        f"{at_frequencies(modulated, 1, ' N')}; unmodulated {', '.join(one.text(1) for one in chances)} N;"
         f" s.d. of all {', '.join(spreads)} N",
-        *(one.high < chance.low for one, chance in zip(locked, chances, strict=True)),
+        *(one.high < chance.low for one, chance in zip(modulated, chances, strict=True)),
     )
     section.remark(
         "Force grows at the rate K_d V0 between slips, so drops follow τ; the square of their correlation is"

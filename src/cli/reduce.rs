@@ -24,7 +24,7 @@ pub struct Arguments {
 }
 
 /// Version of [`ReductionSummary`] as JSON.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 pub fn reduce(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
@@ -55,7 +55,7 @@ pub fn summary_lines(summary: &ReductionSummary, layout: &Layout<'_>) -> Vec<(&'
     let text = |path: &Path| shown(path).to_string();
     vec![
         ("jobs reduced", format!("{}, {} failed", summary.jobs, summary.failed_jobs)),
-        ("parameter sets", format!("{}, {} locked", summary.sets, summary.locked_sets)),
+        ("parameter sets", format!("{}, {} with a phase", summary.sets, summary.phased_sets)),
         ("slips", summary.slips.to_string()),
         ("reduced data", text(&layout.reduced())),
     ]

@@ -1,4 +1,4 @@
-//! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over locked sets.
+//! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over sets that have a phase.
 
 use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
 use super::colour_bar::ColourBar;
@@ -15,9 +15,9 @@ use std::f64::consts::PI;
 
 const WIDTH: f64 = 580.0;
 const HEIGHT: f64 = 390.0;
-/// Slips one by one, those of locked sets over the others.
+/// Slips one by one, those of sets with a phase over the others.
 const OTHER: Dot = Dot { ink: GREY, radius: 1.6, opacity: 0.45 };
-const LOCKED: Dot = Dot { ink: BLACK, ..OTHER };
+const PHASED: Dot = Dot { ink: BLACK, ..OTHER };
 const AVERAGE: Dot = dot(BLUE);
 /// Around it, so that it is seen on dark cells.
 const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
@@ -48,10 +48,11 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
     let averages = averages(bins, sets);
     let mut entries: Vec<Entry> = Vec::new();
     if density.is_none() {
-        entries.extend([entry(Mark::Dot(LOCKED), "slips of locked sets"), entry(Mark::Dot(OTHER), "other slips")]);
+        entries
+            .extend([entry(Mark::Dot(PHASED), "slips of sets with a phase"), entry(Mark::Dot(OTHER), "other slips")]);
     }
     entries.extend([
-        entry(Mark::Bar(AVERAGE), "mean of locked sets, 95 %"),
+        entry(Mark::Bar(AVERAGE), "mean of sets with a phase, 95 %"),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
@@ -67,9 +68,9 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
             let cells = cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density))));
             vec![Layer::Cells(cells.collect(), OVERLAP)]
         }
-        None => [(false, OTHER), (true, LOCKED)]
-            .map(|(is_locked, dot)| {
-                let slips = placed.iter().filter(|slip| slip.0.is_locked == is_locked);
+        None => [(false, OTHER), (true, PHASED)]
+            .map(|(has_phase, dot)| {
+                let slips = placed.iter().filter(|slip| slip.0.has_phase == has_phase);
                 Layer::Dots(slips.map(|slip| slip.1).collect(), dot)
             })
             .into(),
@@ -94,14 +95,14 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
 /// η, mean phase in rad, and the ends of its interval.
 type Average = (f64, f64, Option<Ends>);
 
-/// Mean phases of the locked sets of each bin, at the mean η of these sets, with their intervals.
+/// Mean phases of the sets of each bin that have one, at the mean η of these sets, with their intervals.
 fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
     let average = |bin: &BackboneBin| {
         let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
-        let locked = sets.iter().filter(|set| set.is_locked).map(|set| set.parameters.eta()).filter(within);
-        let (count, sum) = locked.fold((0.0, 0.0), |(count, sum), eta| (count + 1.0, sum + libm::log(eta)));
+        let phased = sets.iter().filter(|set| set.has_phase).map(|set| set.parameters.eta()).filter(within);
+        let (count, sum) = phased.fold((0.0, 0.0), |(count, sum), eta| (count + 1.0, sum + libm::log(eta)));
         let eta = if count > 0.0 { libm::exp(sum / count) } else { bin.eta_centre };
-        Some((eta, bin.locked_phase_mean?, bin.locked_phase_mean_low.zip(bin.locked_phase_mean_high)))
+        Some((eta, bin.set_phase_mean?, bin.set_phase_mean_low.zip(bin.set_phase_mean_high)))
     };
     bins.iter().filter_map(average).collect()
 }
@@ -192,7 +193,7 @@ mod tests {
             eta_low: 2.0,
             eta_high: 5.0,
             eta_centre: 3.5,
-            locked_phase_mean: Some(-1.0),
+            set_phase_mean: Some(-1.0),
             ..BackboneBin::default()
         };
         let found = averages(&[bin], &sets);

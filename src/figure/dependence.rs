@@ -1,5 +1,5 @@
 //! Dependence on a parameter: locking index, resultant length of the phases, mean and spread of the intervals, a line
-//! for each modulation.
+//! for each modulation, and a dashed one for what the drive alone explains.
 
 use super::axis::{Axis, bounds};
 use super::frame::Layout;
@@ -7,7 +7,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Picture};
 use super::sets::{Grid, ascending, modulation, parameter, swept};
-use super::style::{INKS, Look, RADIUS, WHITE, curve, dot};
+use super::style::{BLACK, INKS, Look, RADIUS, WHITE, curve, dot, drive_alone};
 use crate::model::{BreakOn, Parameters, Symbol, Value};
 use crate::reduce::{SetRow, Statistic};
 
@@ -25,21 +25,29 @@ const MILLISECONDS: f64 = 1e3;
 
 pub(super) type Getter = fn(&SetRow) -> Option<Statistic>;
 
-/// A quantity of a panel: its label, its value, and whether it lies between 0 and 1.
-type Quantity = (&'static str, Getter, bool);
+/// A quantity of a panel: its label, its value, and of a share, between 0 and 1, its part by the drive alone.
+type Quantity = (&'static str, Getter, Option<Getter>);
 
 const QUANTITIES: [Quantity; 4] = [
-    ("Mean interval τ (ms)", |set| Some(Statistic::of(set.tau_mean, set.tau_interval)?.times(MILLISECONDS)), false),
+    ("Mean interval τ (ms)", |set| Some(Statistic::of(set.tau_mean, set.tau_interval)?.times(MILLISECONDS)), None),
     (
         "Standard deviation of τ (ms)",
         |set| {
             let deviation = set.tau_deviation.filter(|deviation| *deviation > 0.0);
             Some(Statistic::of(deviation, None)?.times(MILLISECONDS))
         },
-        false,
+        None,
     ),
-    ("Locking index", |set| Statistic::of(set.locking_index, set.locking_interval), true),
-    ("Resultant length of φ", |set| Statistic::of(set.resultant_length, set.length_interval), true),
+    (
+        "Locking index",
+        |set| Statistic::of(set.locking_index, set.locking_interval),
+        Some(|set| Statistic::of(set.locking_index_drive, None)),
+    ),
+    (
+        "Resultant length of φ",
+        |set| Statistic::of(set.resultant_length, set.length_interval),
+        Some(|set| Statistic::of(set.resultant_drive, None)),
+    ),
 ];
 
 /// Draws sets in which, besides the modulation, one parameter has 3 values or more, for each of up to six
@@ -56,23 +64,29 @@ pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
         _ => lines.axis(),
     };
     let panel = |quantity: Quantity| {
-        Some(Panel::new(HEIGHT, x.clone(), y_axis(quantity, sets)?, lines.layers(quantity.1, |_| false)))
+        let mut layers = lines.layers(quantity.1, |_| false);
+        layers.extend(quantity.2.into_iter().flat_map(|drive| lines.of_drive(drive)));
+        Some(Panel::new(HEIGHT, x.clone(), y_axis(quantity, sets)?, layers))
     };
     let panels: Vec<Panel<'_>> = QUANTITIES.into_iter().filter_map(panel).collect();
     if panels.is_empty() {
         return None;
     }
     let layout = Layout { columns: panels.len().min(2), column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
-    Some(panel::draw("dependence", look, layout, &lines.legend(), panels))
+    let mut legend = lines.legend();
+    if sets.iter().any(|set| set.resultant_drive.is_some()) {
+        legend.push(entry(Mark::Line(drive_alone(BLACK)), "by the drive alone"));
+    }
+    Some(panel::draw("dependence", look, layout, &legend, panels))
 }
 
 /// Shares from 0, or from a half, to 1; times from 0, or logarithmic if they span much; `None` if no set has a value.
-fn y_axis((label, value, is_share): Quantity, sets: &[SetRow]) -> Option<Axis> {
+fn y_axis((label, value, drive): Quantity, sets: &[SetRow]) -> Option<Axis> {
     let ends = sets.iter().filter_map(value).flat_map(Statistic::ends);
-    if !is_share {
+    let Some(drive) = drive else {
         return Axis::of_data(label, ends.map(|end| end.max(0.0)), WIDE, 0.0);
-    }
-    let (low, _) = bounds(ends)?;
+    };
+    let (low, _) = bounds(ends.chain(sets.iter().filter_map(drive).map(|statistic| statistic.value)))?;
     Some(Axis::linear(label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
 }
 
@@ -104,6 +118,14 @@ impl<'a> Lines<'a> {
     pub(super) fn legend(&self) -> Vec<Entry> {
         let names = self.lines.iter().map(|line| modulation(&line[0].parameters));
         names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect()
+    }
+
+    /// The part of the drive alone of a statistic.
+    fn of_drive<'l>(&self, value: Getter) -> Vec<Layer<'l>> {
+        let place = |set: &&SetRow| Some((number(&set.parameters, self.symbol)?, value(set)?.value));
+        let curve =
+            |(line, ink): (&Vec<&SetRow>, _)| Layer::Curve(line.iter().filter_map(place).collect(), drive_alone(ink));
+        self.lines.iter().zip(INKS).map(curve).collect()
     }
 
     /// A statistic of all sets, some of them as open circles.
@@ -197,6 +219,23 @@ mod tests {
         };
         let svg = dependence(&[set(1e-6, 0.02, 4.0), tension(1e-6)], &Look::default()).unwrap().svg();
         assert!(svg.contains(">magnitude<") && svg.contains(">tension<"));
+    }
+
+    #[test]
+    fn what_the_drive_alone_explains_is_dashed_and_inside_the_frame() {
+        let mut sets = [0.0, 0.0137, 0.137].map(|dfs| spread(dfs, 1e-6));
+        let drawn = |sets: &[SetRow]| dependence(sets, &Look::default()).unwrap().svg();
+        let lines = |svg: &str| svg.matches("<path").count();
+        let without = drawn(&sets);
+        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.6));
+        let with = drawn(&sets);
+        assert!(with.contains(">by the drive alone<") && !without.contains("by the drive alone"));
+        // A mark of few dashes, and a curve of many.
+        assert!(lines(&with) - lines(&without) > 30);
+        let low = |sets: &[SetRow]| y_axis(QUANTITIES[3], sets).unwrap().low;
+        assert_eq!(low(&sets), HIGH_SHARE);
+        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.1));
+        assert_eq!(low(&sets), 0.0);
     }
 
     #[test]

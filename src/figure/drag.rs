@@ -149,7 +149,7 @@ mod tests {
             interval: Some(n * period),
             periods: Some(4),
             phase: Some(-0.5),
-            is_locked: true,
+            has_phase: true,
         }
     }
 

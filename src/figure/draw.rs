@@ -155,7 +155,7 @@ mod tests {
             interval: Some(4.0 * period),
             periods: Some(4),
             phase: Some(-0.01 * f64::from(step)),
-            is_locked: step.is_multiple_of(2),
+            has_phase: step.is_multiple_of(2),
         }
     }
 

@@ -1,4 +1,4 @@
-//! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which locked intervals fall.
+//! τ/T against T (Fig. 3b, c): slips, and the whole numbers n on which they fall.
 
 use super::axis::{Axis, logarithmic_bounds};
 use super::frame::Layout;
@@ -16,7 +16,7 @@ const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
 const LINES: u32 = 12;
 
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
-/// τ = nT; `None` without any interval under modulation. Slips of locked sets have the colour of their drive velocity.
+/// τ = nT; `None` without any interval under modulation. Slips of sets that have a phase have the colour of their drive velocity.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let (period, interval) = (point.period?, point.interval?);
@@ -29,22 +29,22 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let few = Axis::counts("τ / T: up to 12 periods", LINES);
 
-    let locked = slips.iter().filter(|slip| slip.0.is_locked);
+    let phased = slips.iter().filter(|slip| slip.0.has_phase);
     let velocity = |value: f64| format!("V₀ = {} m/s", three_digits(value));
-    let hues = Hues::of("V₀ (m/s)", locked.map(|slip| slip.0.drive_velocity), velocity);
+    let hues = Hues::of("V₀ (m/s)", phased.map(|slip| slip.0.drive_velocity), velocity);
     let mut entries: Vec<Entry> = hues.entries(3.0);
     if hues.bar().is_some() {
-        entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of locked sets"));
+        entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of sets with a phase"));
     }
-    if slips.iter().any(|slip| !slip.0.is_locked) {
-        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "other slips"));
+    if slips.iter().any(|slip| !slip.0.has_phase) {
+        entries.push(entry(Mark::Dot(Dot { ink: GREY, ..OTHER }), "slips of sets without a phase"));
     }
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     let panels = [(180.0, all, 1), (340.0, few, LINES)].map(|(height, y, lines)| {
         let mut layers: Vec<Layer<'_>> = (1..=lines).map(|n| Layer::Level(f64::from(n), GRID)).collect();
-        let others = slips.iter().filter(|slip| !slip.0.is_locked).map(|slip| slip.1);
+        let others = slips.iter().filter(|slip| !slip.0.has_phase).map(|slip| slip.1);
         layers.push(Layer::Dots(others.collect(), OTHER));
-        layers.extend(slips.iter().filter(|slip| slip.0.is_locked).map(|&(point, place)| {
+        layers.extend(slips.iter().filter(|slip| slip.0.has_phase).map(|&(point, place)| {
             Layer::Dots(vec![place], Dot { ink: hues.ink(point.drive_velocity), radius: RADIUS, opacity: 0.8 })
         }));
         Panel { bar: hues.bar(), ..Panel::inside(height, x.clone(), y, layers) }
@@ -56,7 +56,7 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
 mod tests {
     use super::*;
 
-    fn point(n: u64, is_locked: bool) -> Point {
+    fn point(n: u64, has_phase: bool) -> Point {
         Point {
             drive_velocity: 1e-4,
             amplitude: 1e-6,
@@ -67,7 +67,7 @@ mod tests {
             interval: Some(n as f64 * 0.01),
             periods: Some(n),
             phase: Some(-0.5),
-            is_locked,
+            has_phase,
         }
     }
 
@@ -78,10 +78,10 @@ mod tests {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
-        assert!(texts(&points, &["V₀ = 1e-4 m/s", "other slips", "τ = nT", "4", "12"]));
+        assert!(texts(&points, &["V₀ = 1e-4 m/s", "slips of sets without a phase", "τ = nT", "4", "12"]));
         let first = points[0];
         points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..first }));
-        assert!(texts(&points, &["V₀ (m/s)", "slips of locked sets", "other slips"]));
+        assert!(texts(&points, &["V₀ (m/s)", "slips of sets with a phase", "slips of sets without a phase"]));
     }
 
     #[test]

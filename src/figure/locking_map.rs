@@ -1,5 +1,5 @@
-//! The locking map: how many periods an interval takes and its locking index, over period and amplitude of the
-//! modulation.
+//! The locking map: how many periods an interval takes, its locking index, and the excess of the resultant length over the
+//! drive alone, over period and amplitude of the modulation.
 
 use super::axis::Axis;
 use super::colour_bar::ColourBar;
@@ -9,7 +9,7 @@ use super::map::Map;
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Fill, Ink, Picture, Stroke};
 use super::sets::{MICROMETRES, Modulations, Periods};
-use super::style::{BLACK, Look, WHITE, shade};
+use super::style::{BLACK, Look, WHITE, diverging, shade};
 use crate::reduce::SetRow;
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
@@ -25,8 +25,14 @@ const FIRST_SHADE: f64 = 0.22;
 const LINE: Stroke = Stroke::solid(BLACK, 1.8);
 /// Under the line, so that it is seen on dark cells.
 const CASING: Stroke = Stroke::solid(WHITE, 4.4);
-/// Sets that are not locked.
+/// Sets without a phase.
 const FREE: Ink = "#f2f2f0";
+
+const EXCESS: &str = "resultant length of φ less that by the drive alone";
+/// Least end of its scale, so that chance is pale.
+const MIN_EXCESS: f64 = 0.2;
+/// Steps of its colour bar.
+const SHADES: u32 = 64;
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.
@@ -46,23 +52,31 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     };
     let numbers = Numbers::of(&modulated);
     let colour =
-        |set: &SetRow| Some(if set.is_locked { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) });
-    let words = map.words(|set| whole_periods(set).filter(|_| set.is_locked), |n| (n.to_string(), numbers.share(n)));
+        |set: &SetRow| Some(if set.has_phase { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) });
+    let words = map.words(|set| whole_periods(set).filter(|_| set.has_phase), |n| (n.to_string(), numbers.share(n)));
     let indices = ColourBar::of_axis("locking index", &Axis::linear("", 0.0, 1.0));
-    let panels = [
+    let mut panels = vec![
         (map.coloured(colour), words, numbers.bar()),
         (map.coloured(|set| set.locking_index.map(shade)), Vec::new(), indices),
     ];
-    let panels = panels.map(|(cells, words, bar)| {
+    let excess = |set: &SetRow| set.resultant_excess;
+    if modulated.iter().any(|set| excess(set).is_some()) {
+        let most = modulated.iter().filter_map(|set| excess(set)).map(f64::abs).fold(MIN_EXCESS, f64::max);
+        let scale = Axis::linear("", -most, most);
+        let cells = map.coloured(|set| excess(set).map(|excess| diverging(scale.place(excess))));
+        let colours = (0..=SHADES).map(|step| diverging(f64::from(step) / f64::from(SHADES))).collect();
+        panels.push((cells, Vec::new(), ColourBar { colours, ..ColourBar::of_axis(EXCESS, &scale) }));
+    }
+    let panels = panels.into_iter().map(|(cells, words, bar)| {
         let inside = Layer::Inside(std::iter::once(cells).chain(lines()).collect());
         let layers = std::iter::once(inside).chain(words).collect();
         Panel { bar: Some(bar), ..Panel::new(HEIGHT, x.clone(), y.clone(), layers) }
     });
     let legend = [
-        entry(Mark::Line(LINE), "η = 1; locking is expected above"),
-        entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "not locked"),
+        entry(Mark::Line(LINE), "η = 1; above, the drive turns back"),
+        entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "no phase"),
     ];
-    Some(panel::draw("locking-map", look, Layout::column(WIDTH), &legend, panels.into()))
+    Some(panel::draw("locking-map", look, Layout::column(WIDTH), &legend, panels.collect()))
 }
 
 /// n of τ = nT.
@@ -78,8 +92,8 @@ struct Numbers {
 
 impl Numbers {
     fn of(sets: &[&SetRow]) -> Self {
-        let locked = sets.iter().filter(|set| set.is_locked);
-        let present = || locked.clone().filter_map(|set| whole_periods(set)).map(|n| n.min(MAX_PERIODS + 1));
+        let phased = sets.iter().filter(|set| set.has_phase);
+        let present = || phased.clone().filter_map(|set| whole_periods(set)).map(|n| n.min(MAX_PERIODS + 1));
         let first = present().min().unwrap_or(0);
         Self { first, last: present().max().unwrap_or(first) }
     }
@@ -144,12 +158,27 @@ mod tests {
     }
 
     #[test]
-    fn sets_that_are_not_locked_are_as_pale_as_the_ground() {
+    fn what_the_slider_adds_is_a_panel_where_there_are_controls_and_nothing_is_pale() {
+        let mut sets = grid(8, 8);
+        let drawn = |sets: &[SetRow]| locking_map(sets, &Look::default()).unwrap().svg();
+        assert!(!drawn(&sets).contains(EXCESS));
+        for (set, excess) in sets.iter_mut().zip([-0.5, 0.0, 0.5].into_iter().cycle()) {
+            set.resultant_excess = Some(excess);
+        }
+        let svg = drawn(&sets);
+        assert!(svg.contains(EXCESS));
+        for share in [0.0, 0.5, 1.0] {
+            assert!(svg.matches(&diverging(share).to_svg_string()).count() > 20, "{share}");
+        }
+    }
+
+    #[test]
+    fn sets_without_a_phase_are_as_pale_as_the_ground() {
         let mut sets = grid(8, 8);
         let free = |sets: &[SetRow]| locking_map(sets, &Look::default()).unwrap().svg().matches(FREE).count();
         let none = free(&sets);
         for set in &mut sets {
-            set.is_locked = false;
+            set.has_phase = false;
         }
         assert_eq!(free(&sets) - none, 64);
     }

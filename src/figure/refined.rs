@@ -15,7 +15,7 @@ use crate::reduce::{CellRow, SetRow};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, HashMap};
 
-/// Cells in which all sets are locked, or above the threshold.
+/// Cells in which all sets fulfil the condition.
 const YES: Ink = "#7fa8cf";
 /// Cells in which none is.
 const NO: Ink = "#f2f2f0";
@@ -53,7 +53,6 @@ fn words(by: &str) -> [String; 2] {
     match by.split_once(" = ") {
         Some(("periods", n)) => [format!("n = {n}"), "other n".to_owned()],
         Some((_, word)) => [word.to_owned(), format!("not {word}")],
-        None if by == "locked" => ["locked".to_owned(), "not locked".to_owned()],
         None => [by.to_owned(), "not so".to_owned()],
     }
 }
@@ -114,8 +113,7 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
     let (x_ends, y_ends) =
         (bounds(points.iter().map(|point| point.0))?, bounds(points.iter().flat_map(|point| [point.1, point.2]))?);
     let [yes, _] = words(&cells[0].by);
-    let edge = if yes == "locked" { "locking" } else { &yes };
-    let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {edge}, and the band in which it lies"))];
+    let legend = [entry(Mark::Bar(dot(INKS[0])), format!("edge of {yes}, and the band in which it lies"))];
     let scale = |label: &str, ends: Ends, narrow: fn(&str, Ends) -> Axis| {
         let wide = || Axis::logarithmic(label, MARGINS.0 * ends.0, MARGINS.1 * ends.1);
         if is_wide(ends) { wide() } else { narrow(label, ends) }
@@ -151,7 +149,7 @@ mod tests {
             y_high: y.map(|y| y.1),
             differs,
             share: Some(f64::from(u8::from(x.0 > 1e-6))),
-            by: "locked".to_owned(),
+            by: "resultant_length > 0.5".to_owned(),
             ..CellRow::default()
         }
     }

@@ -240,7 +240,7 @@ pub(super) mod tests {
             tau_50: Some(tau),
             tau_75: Some(1.02 * tau),
             periods: (0..100_u32).find(|&n| (f64::from(n) - periods).abs() <= 0.5).map(u64::from),
-            is_locked: amplitude > 0.0,
+            has_phase: amplitude > 0.0,
             locking_index,
             locking_interval: locking_index.and_then(interval),
             resultant_length,

@@ -1,5 +1,5 @@
-//! The staircase: the interval in periods over the period of the modulation, on whole numbers where it is locked, and
-//! the locking index under it.
+//! The staircase: the interval in periods over the period of the modulation, on whole numbers where slips keep to it, and the
+//! locking index under it, with its part by the drive alone.
 
 use super::axis::Axis;
 use super::frame::Layout;
@@ -7,7 +7,7 @@ use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
 use super::sets::{Grid, Modulations, Periods, amplitude, ascending};
-use super::style::{GREY, GRID, INKS, Look, REFERENCE};
+use super::style::{BLACK, GREY, GRID, INKS, Look, REFERENCE, drive_alone};
 use crate::reduce::SetRow;
 
 /// Least values of the period that make a staircase.
@@ -39,6 +39,8 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     entries.extend(free.map(|_| entry(Mark::Line(REFERENCE), "τ₀ / T, Δ = 0")));
+    let has_drive = sets.modulated.iter().any(|set| set.locking_index_drive.is_some());
+    entries.extend(has_drive.then(|| entry(Mark::Line(drive_alone(BLACK)), "by the drive alone")));
     let whole = (1..).map(f64::from).skip_while(|&n| n < y.low).take_while(|&n| n <= y.high.min(MAX_LINES));
     let mut background: Vec<Layer<'_>> = whole.map(|n| Layer::Level(n, GRID)).collect();
     background.extend(free.map(|free| {
@@ -47,19 +49,21 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let (mut ratios, mut indices) = (vec![Layer::Inside(background)], Vec::new());
     for (&height, ink) in sets.amplitudes.iter().zip(INKS) {
         let of_height = sets.modulated.iter().filter(|set| set.parameters.modulation_amplitude == height);
-        let places: Vec<(f64, &SetRow)> =
+        let mut places: Vec<(f64, &SetRow)> =
             of_height.filter_map(|set| Some((periods.place(set.parameters.modulation_period?), *set))).collect();
+        places.sort_by(|left, right| left.0.total_cmp(&right.0));
         let quartiles = || places.iter().filter_map(|(place, set)| Some((*place, quartiles(set)?)));
         let boxes = quartiles().map(|(place, [low, _, high])| (grid.cell_of(place), (low, high)));
         ratios.push(Layer::Inside(vec![Layer::Boxes(boxes.collect(), Fill { ink, opacity: BOX })]));
         ratios.push(Layer::Dots(quartiles().map(|(place, [_, median, _])| (place, median)).collect(), dot(ink)));
-        let mut of_index: Vec<Place> =
-            places.iter().filter_map(|(place, set)| Some((*place, set.locking_index?))).collect();
-        of_index.sort_by(|left, right| left.0.total_cmp(&right.0));
-        indices.push(Layer::Dots(of_index.clone(), dot(ink)));
-        indices.push(Layer::Curve(of_index, Stroke::solid(ink, 1.2)));
+        let values = |value: fn(&SetRow) -> Option<f64>| -> Vec<Place> {
+            places.iter().filter_map(|(place, set)| Some((*place, value(set)?))).collect()
+        };
+        indices.push(Layer::Dots(values(|set| set.locking_index), dot(ink)));
+        indices.push(Layer::Curve(values(|set| set.locking_index), Stroke::solid(ink, 1.2)));
+        indices.push(Layer::Curve(values(|set| set.locking_index_drive), drive_alone(ink)));
     }
-    let lower = Panel::new(160.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
+    let lower = Panel::new(200.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
     Some(panel::draw("staircase", look, Layout::column(558.0), &entries, vec![Panel::new(310.0, x, y, ratios), lower]))
 }
 
@@ -85,6 +89,12 @@ mod tests {
         let mut sets = steps(1e-6, 24);
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains(">Modulation period T (s)<") && svg.contains(">Δ = 1 µm<"));
+        assert!(!svg.contains("by the drive alone"));
+        sets.iter_mut().for_each(|set| set.locking_index_drive = Some(0.4));
+        let with = staircase(&sets, &Look::default()).unwrap().svg();
+        assert!(with.contains(">by the drive alone<"));
+        // A mark of few dashes, and a curve of many.
+        assert!(with.matches("<path").count() - svg.matches("<path").count() > 40);
         sets.push(set(0.0, 0.11, 1.0));
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains(">Modulation period T / τ₀<") && svg.contains(">τ₀ / T, Δ = 0<"));

@@ -171,6 +171,11 @@ pub(super) const fn curve(ink: Ink) -> Stroke {
     Stroke::solid(ink, 1.6)
 }
 
+/// The part of the drive alone of data in this ink.
+pub(super) const fn drive_alone(ink: Ink) -> Stroke {
+    Stroke::dashed(ink, 1.6, (3.0, 3.0))
+}
+
 pub(super) const fn dot(ink: Ink) -> Dot {
     Dot::solid(ink, RADIUS)
 }
@@ -187,9 +192,28 @@ const SHADES: [[f64; 3]; 8] = [
     [27.0, 58.0, 104.0],
 ];
 
+/// From blue, below, by nearly white to red, above: also for the colour-blind (RdBu of ColorBrewer).
+const DIVERGING: [[f64; 3]; 7] = [
+    [33.0, 102.0, 172.0],
+    [103.0, 169.0, 207.0],
+    [209.0, 229.0, 240.0],
+    [247.0, 247.0, 247.0],
+    [253.0, 219.0, 199.0],
+    [239.0, 138.0, 98.0],
+    [178.0, 24.0, 43.0],
+];
+
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
 pub(super) fn shade(share: f64) -> Color {
-    let [red, green, blue] = mixed(share);
+    colour(mixed(&SHADES, share))
+}
+
+/// A share from 0 to 1 as a colour, pale at 1/2.
+pub(super) fn diverging(share: f64) -> Color {
+    colour(mixed(&DIVERGING, share))
+}
+
+fn colour([red, green, blue]: [f64; 3]) -> Color {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
     let part = |part: f64| part.round() as u8;
     Color::Rgb(part(red), part(green), part(blue))
@@ -197,15 +221,15 @@ pub(super) fn shade(share: f64) -> Color {
 
 /// Black or white, whichever is read on this shade.
 pub(super) fn ink_on(share: f64) -> Color {
-    Color::from(if lightness(mixed(share)) < 0.55 { WHITE } else { BLACK })
+    Color::from(if lightness(mixed(&SHADES, share)) < 0.55 { WHITE } else { BLACK })
 }
 
-fn mixed(share: f64) -> [f64; 3] {
-    let place = share.clamp(0.0, 1.0) * (SHADES.len() - 1) as f64;
+fn mixed(colours: &[[f64; 3]], share: f64) -> [f64; 3] {
+    let place = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
-    let index = (place as usize).min(SHADES.len() - 2);
+    let index = (place as usize).min(colours.len() - 2);
     let part = place - index as f64;
-    std::array::from_fn(|channel| (1.0 - part) * SHADES[index][channel] + part * SHADES[index + 1][channel])
+    std::array::from_fn(|channel| (1.0 - part) * colours[index][channel] + part * colours[index + 1][channel])
 }
 
 /// Lightness from 0 to 1, of the parts of a colour as they are stored.
@@ -220,11 +244,14 @@ mod tests {
     #[test]
     fn shades_darken_in_even_steps() {
         let steps: Vec<f64> = (0..70)
-            .map(|step| lightness(mixed(f64::from(step) / 70.0)) - lightness(mixed(f64::from(step + 1) / 70.0)))
+            .map(|step| {
+                lightness(mixed(&SHADES, f64::from(step) / 70.0))
+                    - lightness(mixed(&SHADES, f64::from(step + 1) / 70.0))
+            })
             .collect();
         let mean = steps.iter().sum::<f64>() / 70.0;
         assert!(steps.iter().all(|step| (0.6 * mean..1.4 * mean).contains(step)), "{steps:?}");
-        assert!(lightness(mixed(0.0)) > 0.95);
+        assert!(lightness(mixed(&SHADES, 0.0)) > 0.95);
     }
 
     #[test]

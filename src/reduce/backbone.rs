@@ -20,7 +20,7 @@ columns! {
         eta_high: f64 = "", "upper edge, excluded";
         eta_centre: f64 = "", "geometric centre";
         sets: u64 = "", "parameter sets, of two slips or more";
-        locked_sets: u64 = "", "locked parameter sets";
+        phased_sets: u64 = "", "of these, sets that have a phase (`has_phase`)";
         slips: u64 = "", "slips of all sets";
         effective_slips: Option<f64> = "", "independent phases that tell as much as the correlated ones";
         phase_mean: Option<f64> = "rad", "circular mean of the phase of all slips";
@@ -33,10 +33,9 @@ columns! {
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test of all slips, with effective_slips";
         load_rayleigh_p: Option<f64> = "",
             "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1";
-        share_below: Option<f64> = "", "share of slips under phi_min(eta of their set) - 0.15 rad; null for eta < 1";
-        locked_phase_mean: Option<f64> = "rad", "circular mean over locked sets of their mean phase";
-        locked_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets";
-        locked_phase_mean_high: Option<f64> = "rad", "upper end";
+        set_phase_mean: Option<f64> = "rad", "circular mean over the sets that have a phase of their mean phase";
+        set_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets";
+        set_phase_mean_high: Option<f64> = "rad", "upper end";
         phase_minimum as "phi_min": Option<f64> = "rad", "least phase of Eq. 2 at the centre; null for eta < 1";
         asymptote: f64 = "rad", "-2 sqrt(pi / eta) at the centre";
     }
@@ -55,11 +54,10 @@ struct Bin {
     sets: u64,
     phases: Together,
     loads: Together,
-    below: u64,
     /// Sum over the slips of the mean unit vector that slips at random loads have.
     expected: [f64; 2],
-    /// Mean phases of locked sets, as unit vectors.
-    locked: Together,
+    /// Mean phases of the sets that have one, as unit vectors.
+    means: Together,
 }
 
 /// A sum of unit vectors over sets that have seeds in common.
@@ -144,18 +142,17 @@ impl Backbone {
         for (pool, of_set) in [(&mut bin.phases, &set.phases), (&mut bin.loads, &set.loads)] {
             pool.push((of_set.1.count(), of_set.1.total()), &set.seeds, of_set, |deviation| deviation);
         }
-        bin.below += set.below;
         let count = set.phases.1.count() as f64;
         let expected = random_load_mean(set.row.eta);
         bin.expected = [bin.expected[0] + count * expected[0], bin.expected[1] + count * expected[1]];
-        if set.row.is_locked {
+        if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
             let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total());
             let error = |[dx, dy]: [f64; 2]| {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]
             };
-            bin.locked.push((1, unit(phase)), &set.seeds, &set.phases, error);
+            bin.means.push((1, unit(phase)), &set.seeds, &set.phases, error);
         }
     }
 
@@ -164,15 +161,14 @@ impl Backbone {
             let (eta_low, eta_high) = (edge(index), edge(index + 1));
             let eta_centre = (eta_low * eta_high).sqrt();
             let limits = PhaseLimits::at(eta_centre);
-            let [phases, loads, locked] = [bin.phases, bin.loads, bin.locked].map(Together::estimate);
-            let (interval, locked_interval) =
-                (phases.direction_interval(limits.top), locked.direction_interval(limits.top));
+            let [phases, loads, means] = [bin.phases, bin.loads, bin.means].map(Together::estimate);
+            let [interval, means_interval] = [&phases, &means].map(|of| of.direction_interval(limits.top));
             BackboneBin {
                 eta_low,
                 eta_high,
                 eta_centre,
                 sets: bin.sets,
-                locked_sets: locked.count(),
+                phased_sets: means.count(),
                 slips: phases.count(),
                 effective_slips: phases.effective(),
                 phase_mean: phases.direction(limits.top),
@@ -182,10 +178,9 @@ impl Backbone {
                 expected_resultant: Some(bin.expected[0].hypot(bin.expected[1]) / phases.count() as f64),
                 rayleigh_p: phases.rayleigh(),
                 load_rayleigh_p: loads.rayleigh(),
-                share_below: limits.minimum.map(|_| bin.below as f64 / phases.count() as f64),
-                locked_phase_mean: locked.direction(limits.top),
-                locked_phase_mean_low: locked_interval.map(|interval| interval.low),
-                locked_phase_mean_high: locked_interval.map(|interval| interval.high),
+                set_phase_mean: means.direction(limits.top),
+                set_phase_mean_low: means_interval.map(|interval| interval.low),
+                set_phase_mean_high: means_interval.map(|interval| interval.high),
                 phase_minimum: minimum_phase(eta_centre),
                 asymptote: minimum_phase_asymptote(eta_centre),
             }
@@ -212,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn blue_dots_average_locked_sets_and_each_set_counts_once() {
+    fn blue_dots_average_sets_that_have_a_phase_and_each_set_counts_once() {
         let mut backbone = Backbone::default();
         let mut push = |period: f64, phases: &[f64]| {
             let jobs = jobs(1e-6, period);
@@ -228,10 +223,9 @@ mod tests {
         push(0.0095, &[-4.0, -2.0, 0.0, 2.0]);
         let bins = backbone.finish();
         assert_eq!(bins.len(), 1);
-        assert_eq!((bins[0].sets, bins[0].locked_sets, bins[0].slips), (3, 2, 84));
-        assert!((bins[0].locked_phase_mean.unwrap() + 0.8).abs() < 1e-12);
+        assert_eq!((bins[0].sets, bins[0].phased_sets, bins[0].slips), (3, 2, 84));
+        assert!((bins[0].set_phase_mean.unwrap() + 0.8).abs() < 1e-12);
         assert!(bins[0].phase_mean.unwrap() > -0.8);
-        assert_eq!(bins[0].share_below, Some(2.0 / 84.0));
         assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
     }
 
@@ -293,9 +287,9 @@ mod tests {
         let six = bin(&[(0, phases.as_slice()); 6]);
         assert!((width(&six) / width(&one) - 1.0).abs() < 1e-9, "{}", width(&six) / width(&one));
         assert!((six.effective_slips.unwrap() / one.effective_slips.unwrap() - 1.0).abs() < 1e-9);
-        // So do means of locked sets.
-        let locked = |bin: &BackboneBin| bin.locked_phase_mean_high.unwrap() - bin.locked_phase_mean_low.unwrap();
-        assert!((locked(&six) / locked(&one) - 1.0).abs() < 1e-9 && (locked(&one) / width(&one) - 1.0).abs() < 1e-9);
+        // So do means of sets.
+        let of_sets = |bin: &BackboneBin| bin.set_phase_mean_high.unwrap() - bin.set_phase_mean_low.unwrap();
+        assert!((of_sets(&six) / of_sets(&one) - 1.0).abs() < 1e-9 && (of_sets(&one) / width(&one) - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -319,10 +313,7 @@ mod tests {
             }
             let bin = backbone.finish()[0];
             let holds = |low: Option<f64>, high: Option<f64>| low.unwrap() <= -0.9 && -0.9 <= high.unwrap();
-            [
-                holds(bin.phase_mean_low, bin.phase_mean_high),
-                holds(bin.locked_phase_mean_low, bin.locked_phase_mean_high),
-            ]
+            [holds(bin.phase_mean_low, bin.phase_mean_high), holds(bin.set_phase_mean_low, bin.set_phase_mean_high)]
         };
         let all: Vec<[bool; 2]> = (0..REPETITIONS).map(holds).collect();
         for of in [0, 1] {

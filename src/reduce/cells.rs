@@ -31,9 +31,9 @@ columns! {
         y: Option<String> = "", "the second, if there is one";
         y_low: Option<f64> = "", "its lower end";
         y_high: Option<f64> = "", "its upper end";
-        by: String = "", "the statistic that tells sets apart, such as `locked`, `periods = 4` or `mean_friction > 300`";
+        by: String = "", "the statistic that tells sets apart, such as `has_phase`, `periods = 4` or `mean_friction > 300`";
         differs: bool = "", "whether the sets that touch the cell differ: the edge lies in it";
-        share: Option<f64> = "", "share of these sets that are locked, have the value or lie above the threshold; null otherwise";
+        share: Option<f64> = "", "share of these sets that are so, have the value or lie above the threshold; null otherwise";
     }
 }
 

@@ -160,10 +160,10 @@ mod tests {
     }
 
     #[test]
-    fn onsets_of_common_seeds_whole_periods_apart_have_locked_passages_whatever_the_others() {
+    fn onsets_of_common_seeds_whole_periods_apart_have_passages_at_one_phase_whatever_the_others() {
         let apart = |step: f64| (1..40).map(|number| 0.01 + step * f64::from(number)).collect::<Vec<f64>>();
-        let (locked, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
-        let of = |seeds: &[u64]| explained(1e-6, &[locked.clone(), free.clone()], seeds, SetRow::default());
+        let (whole, free) = (apart(3.0 / FREQUENCY), apart(0.1234));
+        let of = |seeds: &[u64]| explained(1e-6, &[whole.clone(), free.clone()], seeds, SetRow::default());
         let row = of(&[0, 5]);
         for length in [row.resultant_drive, row.locking_index_drive] {
             assert!((length.unwrap() - 1.0).abs() < 1e-9, "{length:?}");

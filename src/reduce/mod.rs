@@ -46,10 +46,6 @@ pub use values::{FREQUENCY, Values, set_columns, sets_where};
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
 
-/// How far under φ_min a phase must lie to count as under the back-bone, in rad. Inertia and the finite duration of the
-/// rupture shift onsets by some hundredths of a radian; this is well past them and well inside the empty region.
-const BELOW_MARGIN: f64 = 0.15;
-
 /// Where phases can lie at some η.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PhaseLimits {
@@ -72,10 +68,6 @@ impl PhaseLimits {
     /// next, in rad. Slips that come at random loads are uniform in it; in φ their density is 1 - η sin φ.
     fn load_phase(&self, phase: f64) -> Option<f64> {
         self.minimum.is_none().then(|| phase + self.eta * libm::cos(phase))
-    }
-
-    fn is_below(&self, phase: f64) -> bool {
-        self.minimum.is_some_and(|minimum| phase < minimum - BELOW_MARGIN)
     }
 }
 

@@ -37,8 +37,8 @@ pub struct ReductionSummary {
     pub failed_jobs: u64,
     /// Controls left out, as in all that follows.
     pub sets: u64,
-    /// Sets with modulation whose phases are locked.
-    pub locked_sets: u64,
+    /// Sets that have a phase.
+    pub phased_sets: u64,
     pub slips: u64,
     /// Points kept for scatter figures.
     pub points: u64,
@@ -79,7 +79,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
         sets: 0,
-        locked_sets: 0,
+        phased_sets: 0,
         slips: 0,
         points: 0,
         backbone: Vec::new(),
@@ -108,8 +108,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
         histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);
         summary.slips += row.slips;
-        summary.locked_sets += u64::from(row.is_locked);
-        kept.extend(points.into_iter().map(|(place, point)| (place, Point { is_locked: row.is_locked, ..point })));
+        summary.phased_sets += u64::from(row.has_phase);
+        kept.extend(points.into_iter().map(|(place, point)| (place, Point { has_phase: row.has_phase, ..point })));
         Ok(())
     })?;
     kept.sort_by_key(|(place, _)| *place);
@@ -251,7 +251,7 @@ mod tests {
         let (_root, results) = directory(20);
         let summary = reduce(&results).unwrap();
         assert_eq!((summary.jobs, summary.failed_jobs, summary.sets), (6, 2, 3));
-        assert_eq!((summary.slips, summary.points, summary.locked_sets), (120, 120, 2));
+        assert_eq!((summary.slips, summary.points, summary.phased_sets), (120, 120, 2));
         assert_eq!(summary.backbone.iter().map(|bin| bin.slips).sum::<u64>(), 80);
         let sets: Vec<SetRow> = read_reduced(results.layout()).unwrap();
         let counts = |set: &SetRow| (set.parameters.modulation_amplitude, set.intervals, set.failed_jobs);

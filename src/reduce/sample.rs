@@ -45,12 +45,12 @@ columns! {
         interval: Option<f64> = "s", "time since the previous onset";
         periods: Option<u64> = "", "interval in periods T, rounded";
         phase: Option<f64> = "rad", "phase of the onset against the modulation";
-        is_locked as "locked": bool = "", "whether the set of the slip is locked";
+        has_phase: bool = "", "whether the set of the slip has a phase";
     }
 }
 
 impl Point {
-    /// A slip of a job with these parameters; whether its set is locked is not known yet.
+    /// A slip of a job with these parameters; whether its set has a phase is not known yet.
     pub(super) fn of(parameters: &Parameters, slip: &Slip) -> Self {
         let is_ramped = parameters.ramp_time > 0.0;
         Self {
@@ -63,7 +63,7 @@ impl Point {
             interval: slip.interval,
             periods: slip.periods,
             phase: slip.phase,
-            is_locked: false,
+            has_phase: false,
         }
     }
 }

@@ -7,8 +7,8 @@
 //! 1.5), and corrected for the bias of a mean estimated from the same values. Counting pairs makes it exact for short
 //! jobs, too: a job of one slip has none.
 //!
-//! Anticorrelated values, such as the intervals of locked slips, have a more precise mean than independent ones. In a
-//! few jobs anticorrelation is mostly noise, and it counts for nothing.
+//! Anticorrelated values, such as the intervals of slips at one phase, have a more precise mean than independent ones.
+//! In a few jobs anticorrelation is mostly noise, and it counts for nothing.
 //!
 //! From [`MANY_JOBS`] on, the variance is that of the sums of the jobs, which are independent, whatever the correlation
 //! within them: n values in m jobs with the sums S_j of the deviations from the mean have m/(m-1) Σ_j S_j²/n² with m - 1
@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn intervals_of_anticorrelated_values_cover_where_jobs_are_many_and_cover_more_where_they_are_few() {
-        // Phases of locked slips vary about one value: the intervals between them are their differences.
+        // Phases of such slips vary about one value: the intervals between them are their differences.
         let covered = |jobs: usize, length: usize| {
             const REPETITIONS: u64 = 2000;
             let holds = |repetition| {

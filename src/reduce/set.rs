@@ -15,13 +15,10 @@ use crate::results::tables::JobOutcome;
 use crate::sweep::Interval;
 pub use crate::sweep::SetRow;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-/// Largest Rayleigh p-value of a locked set: among the 1,000 or so sets of a sweep, about one that is not locked passes.
-const LOCKED_PROBABILITY: f64 = 1e-3;
-/// Least resultant length of a locked set. With many slips the faintest preference becomes significant; at 1/2 the phases
-/// keep within about a sixth of a turn (s.d. 1.2 rad).
-const LOCKED_LENGTH: f64 = 0.5;
+/// Width from which an interval of a mean phase counts as the whole turn, in rad: others are half a turn wide at most.
+const WHOLE_TURN: f64 = 1.5 * PI;
 
 /// Quantities of slips that only have a mean.
 const SUMS: usize = 9;
@@ -89,7 +86,6 @@ impl SetJobs {
 pub(super) struct SetSlips {
     /// By their seeds.
     jobs: BTreeMap<u64, JobSlips>,
-    below: u64,
 }
 
 /// The slips of a job, and counts and sums of what only has a mean.
@@ -117,7 +113,6 @@ impl SetSlips {
             *count += u64::from(value.is_some());
             *sum += value.unwrap_or_default();
         }
-        self.below += u64::from(slip.phase.is_some_and(|phase| limits.is_below(phase)));
     }
 
     fn means(&self) -> [Option<f64>; SUMS] {
@@ -149,8 +144,7 @@ impl SetSlips {
         let (of_phases, of_loads) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
         let (phases, loads) = (of_phases.1, of_loads.1);
 
-        let has_limit = limits.minimum.is_some() && phases.count() > 0;
-        let (rayleigh_p, resultant_length) = (phases.rayleigh(), phases.resultant_length());
+        let phase_interval = phases.direction_interval(limits.top);
         let expected = (phases.count() > 0).then(|| {
             let [real, imaginary] = random_load_mean(eta);
             finite_resultant(real.hypot(imaginary), phases.count())
@@ -200,15 +194,13 @@ impl SetSlips {
             locking_index: locking.resultant_length(),
             locking_interval: locking.length_interval(),
             phase_mean: phases.direction(limits.top),
-            phase_interval: phases.direction_interval(limits.top),
-            resultant_length,
+            phase_interval,
+            has_phase: phase_interval.is_some_and(|Interval { low, high }| high - low < WHOLE_TURN),
+            resultant_length: phases.resultant_length(),
             length_interval: phases.length_interval(),
             expected_resultant: expected,
-            rayleigh_p,
+            rayleigh_p: phases.rayleigh(),
             load_rayleigh_p: loads.rayleigh(),
-            share_below: has_limit.then(|| self.below as f64 / phases.count() as f64),
-            is_locked: rayleigh_p.is_some_and(|p| p < LOCKED_PROBABILITY)
-                && resultant_length.is_some_and(|length| length > LOCKED_LENGTH),
             drop_mean: drops.mean().map(mean),
             drop_interval: drops.interval(),
             drop_deviation,
@@ -229,7 +221,7 @@ impl SetSlips {
         };
         let intervals = tau.sorted;
         let seeds = self.jobs.into_keys().collect();
-        FinishedSet { row, intervals, seeds, phases: of_phases, loads: of_loads, below: self.below }
+        FinishedSet { row, intervals, seeds, phases: of_phases, loads: of_loads }
     }
 }
 
@@ -315,7 +307,6 @@ pub(super) struct FinishedSet {
     pub(super) phases: OfSet,
     /// Its load phases, for η < 1.
     pub(super) loads: OfSet,
-    pub(super) below: u64,
 }
 
 #[cfg(test)]
@@ -390,31 +381,23 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_set_is_locked_only_if_phases_are_both_close_and_many() {
+    fn a_set_has_a_phase_if_its_slips_exclude_a_direction() {
         let at = |phases: &[f64]| reduced(jobs(1e-6, 0.01), phases.iter().map(|&phase| slip(None, Some(phase))));
-        assert!(at(&[-0.9; 12]).is_locked);
-        assert!(!at(&[-0.7, -0.9, -1.1]).is_locked, "three slips prove nothing");
-        // A faint preference, highly significant.
-        let faint: Vec<f64> =
-            (0..3000).map(|slip| f64::from(slip % 3) * TAU / 3.0 * f64::from(u8::from(slip % 5 > 0))).collect();
-        let faint = at(&faint);
-        assert!(faint.rayleigh_p.unwrap() < LOCKED_PROBABILITY);
-        assert!(!faint.is_locked);
-    }
-
-    #[test]
-    fn slips_under_the_back_bone_are_counted_with_the_margin_of_eq_2() {
-        // η = 6.28: φ_min = -1.336 rad.
-        let modulated = jobs(1e-6, 0.01);
-        let phases = [-1.3, -1.4, -1.47, -1.5, -2.0];
-        let row = reduced(modulated.clone(), phases.map(|phase| slip(None, Some(phase))));
-        assert_eq!(row.share_below, Some(2.0 / 5.0));
-        let slow = jobs(1e-6, 1.0);
-        assert_eq!(reduced(slow, phases.map(|phase| slip(None, Some(phase)))).share_below, None);
+        assert!(at(&[-0.9; 12]).has_phase && at(&[-0.7, -0.9, -1.1]).has_phase);
+        assert!(!at(&[-0.9]).has_phase, "one slip has no interval");
+        assert!(!at(&[-0.7, 1.1]).has_phase, "two slips far apart");
+        // Evenly over the turn; and with a faint preference that 3,000 slips show.
+        let turn = |count: u32, at_zero: u32| -> Vec<f64> {
+            (0..count).map(|slip| if slip % at_zero == 0 { 0.0 } else { f64::from(slip % 3) * TAU / 3.0 }).collect()
+        };
+        let (even, faint) = (at(&turn(3000, 3)), at(&turn(3000, 5)));
+        assert!(!even.has_phase && even.phase_interval.is_some(), "{:?}", even.phase_interval);
+        assert!(faint.has_phase && faint.resultant_length < Some(0.4), "{:?}", faint.resultant_length);
+        assert!(!at(&turn(15, 5)).has_phase, "the same of 15");
         let still = reduced(jobs(0.0, 1.0), [slip(Some(0.1), None), slip(Some(0.2), None)]);
-        assert_eq!((still.share_below, still.phase_mean, still.locking_index, still.periods), (None, None, None, None));
+        assert_eq!((still.phase_mean, still.locking_index, still.periods), (None, None, None));
         assert!((still.tau_mean.unwrap() - 0.15).abs() < 1e-15);
-        assert!(!still.is_locked);
+        assert!(!still.has_phase);
     }
 
     fn facts(outcome: JobOutcome, time: f64, friction: f64, running_interval: Option<f64>) -> JobFacts {

@@ -65,6 +65,7 @@ class Report {
     const isSwept = ({ key }) => new Set(this.values(key)).size > 1;
     this.swept = this.parameters.filter(isSwept);
     this.fixed = this.parameters.filter((parameter) => !isSwept(parameter));
+    this.hasControls = this.values("resultant_drive").some((value) => value !== null);
     this.isModulated = this.slip.get("phase").values.some((phase) => !Number.isNaN(phase));
   }
 

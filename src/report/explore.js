@@ -1,5 +1,8 @@
 // Charts of all sets, and what is said of their points.
 
+/** Columns of what the drive alone explains of others. */
+const DRIVE_ALONE = { resultant_length: "resultant_drive", locking_index: "locking_index_drive" };
+
 class Explorer {
   constructor(report, select) {
     this.report = report;
@@ -26,7 +29,7 @@ class Explorer {
       .flatMap(([keys]) => keys.split(", "))
       .filter((key) => report.swept.some((swept) => swept.key === key));
     const [first, second] = keys.filter((key) => isNumeric(report.columns.get(key)));
-    const colour = report.isModulated ? "locked" : regimes.size > 1 ? "regime" : (second ?? "");
+    const colour = report.isModulated ? "has_phase" : regimes.size > 1 ? "regime" : (second ?? "");
     this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
   }
 
@@ -224,22 +227,22 @@ class Explorer {
       colour: red,
     });
     const bins = byName(report.backbone);
-    const [from, to, locked, low, high] = [
+    const [from, to, means, low, high] = [
       "eta_low",
       "eta_high",
-      "locked_phase_mean",
-      "locked_phase_mean_low",
-      "locked_phase_mean_high",
+      "set_phase_mean",
+      "set_phase_mean_low",
+      "set_phase_mean_high",
     ].map((name) => bins.get(name).values);
     // At the mean of their sets, as in the figure.
     const centre = from.map((least, bin) => {
-      const isIn = (eta, set) => report.values("locked")[set] && eta >= least && eta < to[bin];
+      const isIn = (eta, set) => report.values("has_phase")[set] && eta >= least && eta < to[bin];
       const logs = report.values("eta").filter(isIn).map(Math.log);
       return Math.exp(logs.reduce((sum, log) => sum + log, 0) / logs.length);
     });
     const binTip = (k) => [
-      make("strong", {}, `${counted(bins.get("locked_sets").values[k], "locked set")} at η = ${number(centre[k])}`),
-      `mean φ = ${number(locked[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
+      make("strong", {}, `${counted(bins.get("phased_sets").values[k], "set")} with a phase at η = ${number(centre[k])}`),
+      `mean φ = ${number(means[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
     ];
     this.phase.show({
       x: { label: "η = 2πΔ / (T V0)", log: true },
@@ -249,10 +252,10 @@ class Explorer {
         { ...curve(1), dash: [5, 4] },
         curve(2),
         { type: "intervals", x: centre, low, high, colour: mean, mayLeave: true },
-        { type: "points", x: centre, y: locked, colours: [mean], size: 4, tip: binTip },
+        { type: "points", x: centre, y: means, colours: [mean], size: 4, tip: binTip },
       ],
       key: [
-        [mean, "mean of locked sets, 95 %"],
+        [mean, "mean of sets with a phase, 95 %"],
         [red, "−2√(π/η); dashed: φ_min, Eq. 2", "stroke"],
       ],
       empty: "no slip under modulation",
@@ -312,6 +315,20 @@ class Explorer {
       tip,
       pick,
     };
+    const drive = report.hasControls && report.columns.get(DRIVE_ALONE[y.name]);
+    const alone = drive
+      ? [
+          {
+            ...points,
+            y: drive.values,
+            group: this.setGroup.map((group) => (group === HIDDEN ? group : 0)),
+            colours: [cssColour("muted")],
+            size: 2.5,
+            tip: (set) => this.setTip(set, [x.name, drive.name]),
+          },
+        ]
+      : [];
+    if (drive) key.push([cssColour("muted"), "by the drive alone"]);
     const ends = ["low", "high"].map((end) => report.columns.get(`${y.name}_${end}`)?.values);
     const bars = ends[0]
       ? [
@@ -339,7 +356,7 @@ class Explorer {
             },
           ];
     if (bars.length) key.push(["transparent", "vertical bars: 95 % confidence interval"]);
-    this.free.show({ ...axes, layers: [...bars, points, ...own], key });
+    this.free.show({ ...axes, layers: [...bars, ...alone, points, ...own], key });
   }
 }
 

@@ -56,7 +56,7 @@ async function start() {
     const { shown, problems } = filtered(report, state.filter);
     const left = shown.reduce((sum, isShown) => sum + isShown, 0);
     const hint =
-      "Examples: V0>1e-5, regime=sliding, locked=true, or the first characters of a set. All conditions must hold.";
+      "Examples: V0>1e-5, regime=sliding, has_phase=true, or the first characters of a set. All conditions must hold.";
     element("filter-note").textContent =
       problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
     element("filter-note").classList.toggle("bad", problems.length > 0);

@@ -54,7 +54,7 @@ function writeSweep(report) {
 
 /** How many sets are in which regime; a click filters them. */
 function writeRegimes(report, filterBy) {
-  const { regimes, sets, locked } = report.census;
+  const { regimes, sets, phased } = report.census;
   const given = Object.entries(regimes).filter(([, count]) => count > 0);
   const order = [...REGIMES, ""];
   given.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
@@ -84,10 +84,10 @@ function writeRegimes(report, filterBy) {
       make(
         "li",
         {},
-        `locked to the modulation: ${counted(locked, "set")} of ${many(sets)} `,
+        `with a phase: ${counted(phased, "set")} of ${many(sets)} `,
         make(
           "button",
-          { type: "button", onclick: () => filterBy("locked=true"), "aria-label": "Filter: locked" },
+          { type: "button", onclick: () => filterBy("has_phase=true"), "aria-label": "Filter: with a phase" },
           "Filter",
         ),
       ),

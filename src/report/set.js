@@ -112,10 +112,17 @@ class SetView {
     const modulated = report.isModulated
       ? [
           ["eta", value("eta")],
-          ["locked", value("locked")],
           ["locking index", interval("locking_index")],
-          ["mean phase", interval("phase_mean")],
+          ["mean phase", value("has_phase") === "yes" ? interval("phase_mean") : "none"],
           ["resultant length", interval("resultant_length")],
+        ]
+      : [];
+    const controlled = report.hasControls
+      ? [
+          ["locking index by the drive alone", value("locking_index_drive")],
+          ["its excess", interval("locking_index_excess")],
+          ["resultant length by the drive alone", value("resultant_drive")],
+          ["its excess", interval("resultant_excess")],
         ]
       : [];
     const rows = [
@@ -146,7 +153,7 @@ class SetView {
         " ",
         make("button", { type: "button", onclick: () => this.explorer.select(-1) }, "Deselect"),
       ),
-      make("div", { class: "facts" }, list([...swept, ...rows.slice(0, 3)]), list([...rows.slice(3), ...modulated])),
+      make("div", { class: "facts" }, list([...swept, ...rows.slice(0, 3)]), list([...rows.slice(3), ...modulated, ...controlled])),
       make("label", {}, "One of its jobs alone, with seed ", input),
       make("datalist", { id: "seeds" }, ...seeds.map((seed) => make("option", { value: seed }))),
       code,

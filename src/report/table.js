@@ -60,7 +60,8 @@ class SetTable {
       "jobs",
       ...(report.status.jobs_failed ? ["failed_jobs"] : []),
       ...["regime", "slips", "tau_mean", "tau_sd"],
-      ...(report.isModulated ? ["locked", "locking_index", "phase_mean", "resultant_length"] : []),
+      ...(report.isModulated ? ["locking_index", "phase_mean", "has_phase", "resultant_length"] : []),
+      ...(report.hasControls ? ["resultant_drive", "resultant_excess", "locking_index_excess"] : []),
       ...["drop_mean", "mean_friction"],
     ];
     this.usual = names.filter((name) => usual.includes(name) && name !== "set_id");

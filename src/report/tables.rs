@@ -60,7 +60,8 @@ fn rounded(real: f64) -> f64 {
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Census {
     pub sets: u64,
-    locked: u64,
+    /// Sets that have a phase.
+    phased: u64,
     /// By regime; those without a finished job under an empty name.
     regimes: BTreeMap<&'static str, u64>,
     pub slips: u64,
@@ -70,7 +71,7 @@ columns! {
     struct Counted {
         regime: Option<Regime>;
         slips: u64;
-        is_locked as "locked": bool;
+        has_phase: bool;
         is_control as "control": bool;
     }
 }
@@ -83,7 +84,7 @@ impl Census {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
-                census.locked += u64::from(set.is_locked);
+                census.phased += u64::from(set.has_phase);
                 *census.regimes.entry(set.regime.map_or("", Regime::word)).or_default() += 1;
             }
         }

@@ -195,7 +195,7 @@ fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statist
     SIZES.into_iter().map(fixed).chain(BY_RULE.into_iter().map(by_rule)).collect()
 }
 
-/// The coverage of the mean phase of all slips of a bin, and of the mean of its locked sets: sets close to each other, with two
+/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each other, with two
 /// seeds in common.
 fn of_backbone(pool: &Pool) -> [f64; 2] {
     let seeds = pool.sets[0].1.len();
@@ -205,7 +205,7 @@ fn of_backbone(pool: &Pool) -> [f64; 2] {
         let bin = pool.bin(2 * repetition..2 * repetition + 2);
         let holds = |[low, high, truth]: [Option<f64>; 3]| low <= truth && truth <= high;
         held[0] += u32::from(holds([bin.phase_mean_low, bin.phase_mean_high, truth.phase_mean]));
-        held[1] += u32::from(holds([bin.locked_phase_mean_low, bin.locked_phase_mean_high, truth.locked_phase_mean]));
+        held[1] += u32::from(holds([bin.set_phase_mean_low, bin.set_phase_mean_high, truth.set_phase_mean]));
     }
     held.map(|held| 100.0 * f64::from(held) / repetitions as f64)
 }
@@ -245,11 +245,11 @@ fn coverage_is_measured() {
     let worst = |level: f64, lines: f64| {
         level - 100.0 * lines * (0.01 * level * (1.0 - 0.01 * level) / REPETITIONS as f64).sqrt()
     };
-    let [slips, locked] = of_backbone(&read_pool(folder, "dense"));
+    let [slips, sets] = of_backbone(&read_pool(folder, "dense"));
     let backbone = format!(
         "The back-bone: twelve sets with η from 2 to 2.2 and Δ = 0.6 µm in one bin, with two seeds in common of 15 slips; 400\n\
          repetitions. The interval of the mean phase of all slips holds the true value in {slips:.1} %, that of the mean of\n\
-         locked sets in {locked:.1} %.\n"
+         the sets that have a phase in {sets:.1} %.\n"
     );
     // Bonferroni: one of 200 cells lies 3.5 standard errors below by chance in 5 % of cases.
     let text = format!(

@@ -8,13 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 fn sweep(axes: &str, refine: &str) -> Sweep {
-    let text = format!("name = \"a\"\n[model]\nT = 0.03\n[axes]\n{axes}\n[refine]\nby = \"locked\"\n{refine}");
+    let text = format!("name = \"a\"\n[model]\nT = 0.03\n[axes]\n{axes}\n[refine]\nby = \"has_phase\"\n{refine}");
     Sweep::parse(&text, Path::new("test.toml")).unwrap()
 }
 
-/// Runs the rounds to their end, where a set is locked as this says of its parameters.
-fn rounds(sweep: &Sweep, is_locked: impl Fn(f64, f64) -> bool) -> (Vec<Round>, BTreeMap<u64, SetRow>) {
-    rounds_of(sweep, |amplitude, velocity| SetRow { is_locked: is_locked(amplitude, velocity), ..SetRow::default() })
+/// Runs the rounds to their end, where a set has a phase as this says of its parameters.
+fn rounds(sweep: &Sweep, has_phase: impl Fn(f64, f64) -> bool) -> (Vec<Round>, BTreeMap<u64, SetRow>) {
+    rounds_of(sweep, |amplitude, velocity| SetRow { has_phase: has_phase(amplitude, velocity), ..SetRow::default() })
 }
 
 /// Runs the rounds to their end, where sets of these parameters have such rows.
@@ -52,8 +52,8 @@ fn along_one_axis_an_edge_is_bisected() {
     let seeds = |round: &Round| round.points.iter().map(|range| range.end() - range.start() + 1).sum::<u64>();
     assert!(rounds.iter().all(|round| seeds(round) == 3 * round.standing.sets_open));
     let amplitude = |set: &u64| sweep.jobs().find(|job| job.point == *set).unwrap().parameters.modulation_amplitude;
-    let below = sets.iter().filter(|(_, row)| !row.is_locked).map(|(set, _)| amplitude(set)).fold(0.0, f64::max);
-    let above = sets.iter().filter(|(_, row)| row.is_locked).map(|(set, _)| amplitude(set)).fold(1.0, f64::min);
+    let below = sets.iter().filter(|(_, row)| !row.has_phase).map(|(set, _)| amplitude(set)).fold(0.0, f64::max);
+    let above = sets.iter().filter(|(_, row)| row.has_phase).map(|(set, _)| amplitude(set)).fold(1.0, f64::min);
     assert!(below <= edge && edge < above && above - below < 1e-9, "{below} {above}");
 }
 
@@ -94,7 +94,7 @@ fn without_a_difference_or_room_the_rounds_are_over_and_the_cap_is_reported() {
 fn conditions_and_points_without_modulation_are_passed_over() {
     let text = "name = \"a\"\nwhere = \"Delta < 2e-6 or V0 < 5e-5\"\n[model]\nfrequency = 29\n[axes]\n\
                 Delta = { linear = [0, 4e-6], points = 3 }\nV0 = { linear = [1e-5, 1e-4], points = 3 }\n\
-                [refine]\nby = \"locked\"\naxes = [\"Delta\", \"V0\"]\nto = { Delta = 5e-7, V0 = 1e-5 }\nsets = 1000";
+                [refine]\nby = \"has_phase\"\naxes = [\"Delta\", \"V0\"]\nto = { Delta = 5e-7, V0 = 1e-5 }\nsets = 1000";
     let sweep = Sweep::parse(text, Path::new("test.toml")).unwrap();
     let (_, sets) = rounds(&sweep, |amplitude, velocity| amplitude > 0.02 * velocity);
     let jobs: BTreeSet<u64> = sweep.jobs().map(|job| job.point).collect();
@@ -109,8 +109,8 @@ proptest! {
             "Delta = { linear = [0.5e-6, 4.5e-6], points = 5 }\nV0 = { linear = [1e-5, 9e-5], points = 5 }\nseed = { count = 2 }",
             "axes = [\"Delta\", \"V0\"]\nto = { Delta = 1.3e-7, V0 = 2.6e-6 }\nsets = 3000",
         );
-        let is_locked = |amplitude: f64, velocity: f64| amplitude > slope * (velocity - 1e-5) + offset;
-        let (_, sets) = rounds(&sweep, is_locked);
+        let has_phase = |amplitude: f64, velocity: f64| amplitude > slope * (velocity - 1e-5) + offset;
+        let (_, sets) = rounds(&sweep, has_phase);
         let found = leaves(&sweep, &sets);
         // They cover the grid once: 4 by 4 cells, each of 8 by 8 of the finest.
         let area: u64 = found.iter().map(|cell| 1 << (2 * (3 - cell.level))).sum();
@@ -119,13 +119,13 @@ proptest! {
             let length = 8 >> cell.level;
             let corner = |right: u64, up: u64| {
                 let at = |row: u64, low: f64, step: f64| low + step * (row as f64);
-                is_locked(
+                has_phase(
                     at(cell.origin[0] + right * length, 0.5e-6, 1.25e-7),
                     at(cell.origin[1] + up * length, 1e-5, 2.5e-6),
                 )
             };
             let corners = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
-            let differ = corners.iter().any(|locked| *locked != corners[0]);
+            let differ = corners.iter().any(|corner| *corner != corners[0]);
             prop_assert!(!differ || cell.level == 3, "{:?}", cell);
         }
         // A line crosses some 64 of the 1024 finest cells; their neighbours are half as fine.

@@ -7,7 +7,7 @@
 //! seeds    = { from = 24, to = 256 } seeds of a set: at first, and at most
 //! [refine]
 //! axes = ["frequency", "Delta"]     ranges of [axes]
-//! by   = "locked"                   a flag; a word or a count, or one value of it; a number with threshold or step
+//! by   = "has_phase"                a flag; a word or a count, or one value of it; a number with threshold or step
 //! to   = { frequency = 0.1, Delta = 0.02 }
 //! sets = 2000                       at most
 //! ```
@@ -121,7 +121,7 @@ pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, R
     section.only(REFINE).ok();
     let axes = read_refined_axes(section);
     let by = section
-        .required("by", "what tells sets apart, such as by = \"locked\"")
+        .required("by", "what tells sets apart, such as by = \"regime\"")
         .and_then(|entry| read_by(section, &entry));
     let sets = section.required("sets", "the most sets of the sweep, such as sets = 2000");
     let max_sets = sets.and_then(|entry| Ok((entry.count(1, MAX_SETS)?, entry)));
@@ -167,7 +167,7 @@ fn read_refined_axes<'a>(section: &Section<'a>) -> Result<Vec<WantedAxis<'a>>, R
 
 fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Statistic, Contrast), Refused> {
     let known: Vec<&str> = STATISTICS.iter().map(|known| known.key).collect();
-    let word = entry.word().ok_or_else(|| entry.must_be("a statistic in quotes, such as \"locked\""))?;
+    let word = entry.word().ok_or_else(|| entry.must_be("a statistic in quotes, such as \"regime\""))?;
     let statistic = Statistic::from_key(word)
         .ok_or_else(|| entry.refuse(format!("is no statistic of a set; {}", hint(word, &known))))?;
     let is_class = statistic.kind == StatisticKind::Class;

@@ -92,6 +92,7 @@ columns! {
         phase_mean: Option<f64> = "rad", "circular mean of the phase";
         phase_interval as "phase_mean": Option<Interval> = "rad",
             "lower end of its 95 % confidence interval; the whole turn if no direction is excluded";
+        has_phase: bool = "", "whether directions are excluded: the interval of phase_mean is known, and narrower than 3/2 pi";
         resultant_length: Option<f64> = "", "|<exp(i phi)>|: 1 if every slip has the same phase";
         length_interval as "resultant_length": Option<Interval> = "", "lower end of its 95 % confidence interval";
         resultant_drive: Option<f64> = "",
@@ -103,8 +104,6 @@ columns! {
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test against uniform phases, with effective_slips";
         load_rayleigh_p: Option<f64> = "",
             "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1: slips at random loads are uniform in it";
-        share_below: Option<f64> = "", "share of slips with a phase under phi_min(eta) - 0.15 rad; null for eta < 1";
-        is_locked as "locked": bool = "", "rayleigh_p < 0.001 and resultant_length > 0.5";
         drop_mean: Option<f64> = "N", "mean stress drop";
         drop_interval as "drop_mean": Option<Interval> = "N", "lower end of its 95 % confidence interval";
         drop_deviation as "drop_sd": Option<f64> = "N", "standard deviation of the stress drop";
@@ -193,7 +192,7 @@ mod tests {
         assert_eq!(of("tau_mean"), Some(("s", StatisticKind::Estimate)));
         assert_eq!(of("phase_mean"), Some(("rad", StatisticKind::Angle)));
         assert_eq!(of("slip_share"), Some(("", StatisticKind::Number)));
-        for class in ["locked", "regime", "periods"] {
+        for class in ["has_phase", "regime", "periods"] {
             assert_eq!(of(class), Some(("", StatisticKind::Class)), "{class}");
         }
         for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {

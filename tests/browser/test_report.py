@@ -76,6 +76,24 @@ def test_pointing_at_a_slip_names_its_job_and_the_command_that_runs_it(browser, 
     browser.wait("element('tip').hidden")
 
 
+def test_what_the_drive_alone_explains_stands_beside_what_is_seen(browser, report):
+    layers = "return charts.find(({ name }) => name === 'free').places.map(({ layer }) => layer.y)"
+    browser.open(report(MODULATED), "#y=resultant_length")
+    assert len(browser.run(layers)) == 1 and "drive alone" not in browser.text("#free")
+    browser.open(report(MODULATED + "control = true\n"), "#y=resultant_length")
+    # Controls are no sets.
+    assert len(rows(browser)) == SETS and "18 parameter sets" in browser.text("#summary")
+    alone, seen = browser.run(layers)
+    assert len(alone) == SETS and all(alone) and alone != seen
+    assert "by the drive alone" in browser.text("#free")
+    assert [float(cell) for cell in column(browser, "resultant_drive")] == pytest.approx(alone, rel=1e-4)
+    browser.find("#sets-table tbody button").click()
+    browser.wait("state.set !== ''")
+    assert "resultant length by the drive alone" in browser.text("#set-facts")
+    browser.type("#filter", "has_phase=true")
+    assert 0 < len(rows(browser)) <= SETS
+
+
 def test_selecting_a_point_shows_the_set_its_intervals_and_its_phases(browser, report):
     browser.open(report(MODULATED))
     before = ink(browser, "sequence")

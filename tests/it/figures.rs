@@ -167,7 +167,7 @@ fn the_list_of_columns_is_that_of_the_table_and_all_of_its_numbers_can_be_drawn(
     let names: BTreeSet<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert!(names.contains("tau_mean_low") && names.len() > 60);
     // A number of the table, a flag and a word.
-    for name in ["eta", "jobs", "locked", "regime", "phase_mean", "mean_friction"] {
+    for name in ["eta", "jobs", "has_phase", "regime", "phase_mean", "mean_friction"] {
         folder.ends(0, &format!("plot r --x V0 --y {name} -o {name}.svg"));
     }
 }

@@ -329,7 +329,7 @@ def test_keys_are_described_where_people_look():
 def test_figures_show_the_data(results, opened):
     points = pd.read_parquet(results / "reduced" / "points.parquet")
     axes = opened.plot.phase_eta()
-    slips = [line for line in axes.get_lines() if line.get_label() in ("other slips", "slips of locked sets")]
+    slips = [line for line in axes.get_lines() if line.get_label() in ("other slips", "slips of sets with a phase")]
     assert sum(len(line.get_xdata()) for line in slips) == points["phase"].notna().sum() > 0
     assert "rad" in axes.get_ylabel()
     axes = opened.plot.intervals()

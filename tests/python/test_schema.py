@@ -45,7 +45,7 @@ BAD = [
     'name = "a"\n[precision]\nof = "tau_25"\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nrelative = 0.1\nabsolute = 1\nseeds = { from = 4, to = 64 }\n',
-    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxes = "V0"\nby = "locked"\nto = { V0 = 0.1 }\n',
+    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxes = "V0"\nby = "has_phase"\nto = { V0 = 0.1 }\n',
 ]
 
 

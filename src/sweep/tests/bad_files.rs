@@ -272,7 +272,7 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
                           Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
     let precision = |text: &str| format!("name = \"a\"\n[precision]\n{text}");
     let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
-    let good = "axes = [\"frequency\"]\nby = \"locked\"\nto = { frequency = 0.1 }\nsets = 50\n";
+    let good = "axes = [\"frequency\"]\nby = \"has_phase\"\nto = { frequency = 0.1 }\nsets = 50\n";
     Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
     let instead = |from: &str, to: &str| refine(&good.replace(from, to));
     let seeds = "seeds = { from = 4, to = 8 }";
@@ -335,20 +335,20 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
             6,
             &["axes = \"K\"", "zip or a sample"],
         ),
-        (instead("\"locked\"", "\"loked\""), 8, &["by = \"loked\"", "did you mean locked?"]),
-        (instead("\"locked\"", "\"locked\"\nthreshold = 1"), 9, &["threshold = 1", "locked is no number"]),
-        (instead("\"locked\"", "\"tau_mean\""), 8, &["by = \"tau_mean\"", "threshold", "step"]),
-        (instead("\"locked\"", "\"locked\"\nvalue = 1"), 9, &["value = 1", "true or false"]),
+        (instead("\"has_phase\"", "\"has_phas\""), 8, &["by = \"has_phas\"", "did you mean has_phase?"]),
+        (instead("\"has_phase\"", "\"has_phase\"\nthreshold = 1"), 9, &["threshold = 1", "has_phase is no number"]),
+        (instead("\"has_phase\"", "\"tau_mean\""), 8, &["by = \"tau_mean\"", "threshold", "step"]),
+        (instead("\"has_phase\"", "\"has_phase\"\nvalue = 1"), 9, &["value = 1", "true or false"]),
         (
-            instead("\"locked\"", "\"regime\"\nvalue = \"slides\""),
+            instead("\"has_phase\"", "\"regime\"\nvalue = \"slides\""),
             9,
             &["value = \"slides\"", "stick-slip, mixed, sliding"],
         ),
-        (instead("\"locked\"", "\"periods\"\nvalue = 3.5"), 9, &["value = 3.5", "whole"]),
-        (instead("\"locked\"", "\"periods\"\nthreshold = 3"), 9, &["threshold = 3", "periods is no number"]),
-        (instead("\"locked\"", "\"tau_mean\"\nvalue = 1"), 9, &["value = 1", "threshold or step"]),
-        (instead("\"locked\"", "\"tau_mean\"\nstep = 0"), 9, &["step = 0", "> 0"]),
-        (instead("\"locked\"", "\"tau_mean\"\nthreshold = 1\nstep = 1"), 10, &["step = 1", "keep one"]),
+        (instead("\"has_phase\"", "\"periods\"\nvalue = 3.5"), 9, &["value = 3.5", "whole"]),
+        (instead("\"has_phase\"", "\"periods\"\nthreshold = 3"), 9, &["threshold = 3", "periods is no number"]),
+        (instead("\"has_phase\"", "\"tau_mean\"\nvalue = 1"), 9, &["value = 1", "threshold or step"]),
+        (instead("\"has_phase\"", "\"tau_mean\"\nstep = 0"), 9, &["step = 0", "> 0"]),
+        (instead("\"has_phase\"", "\"tau_mean\"\nthreshold = 1\nstep = 1"), 10, &["step = 1", "keep one"]),
         (instead("frequency = 0.1", "frequency = 10"), 9, &["frequency = 10", "finer than 10"]),
         (instead("frequency = 0.1", "frequency = 0"), 9, &["frequency = 0", "> 0"]),
         (instead("frequency = 0.1", "frequency = 1e-9"), 9, &["frequency = 1e-9", "1000000 values"]),
