@@ -57,17 +57,11 @@ def test_slips_at_random_loads_have_a_uniform_load_phase(eta):
     assert numpy.diff(load) == pytest.approx(numpy.diff(load).mean(), rel=1e-3)
 
 
-def test_slips_at_random_loads_count_as_locked_near_eta_1_but_not_in_load():
-    generator = numpy.random.default_rng(5)
-    phases = kinematics.random_load_phases(0.83, generator.random((200, 30)))
-    slips = pandas.DataFrame({"phase": phases.ravel(), "eta": 0.83, "set_id": numpy.arange(200).repeat(30)})
-    load_p = kinematics.load_phase(slips).groupby(slips["set_id"]).apply(statistics.rayleigh_p)
-    sets = pandas.DataFrame({"set_id": load_p.index, "load_rayleigh_p": load_p.to_numpy()})
-    by_phase = [statistics.rayleigh_p(row) < 1e-3 and statistics.resultant_length(row) > 0.5 for row in phases]
-    expected, _ = kinematics.locked_by_chance(0.83, 30, 5000)
-    assert expected > 0.2
-    assert numpy.mean(by_phase) == pytest.approx(expected, abs=0.1)
-    assert kinematics.locked_in_load(sets, slips).mean() < 0.02
+def test_sets_lie_beyond_the_drive_s_part_if_the_whole_interval_does():
+    sets = pandas.DataFrame({"resultant_excess_low": [0.1, -0.1, -0.3], "resultant_excess_high": [0.2, 0.1, -0.1]})
+    above, below = kinematics.beyond_drive(sets, "resultant")
+    assert (above.tolist(), below.tolist()) == ([True, False, False], [False, False, True])
+    assert kinematics.beyond_text(sets, "resultant") == "1 above, 1 below, of 3"
 
 
 def test_phases_under_phi_min_are_those_on_falling_load_of_any_period():
