@@ -48,8 +48,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
     let averages = averages(bins, sets);
     let mut entries: Vec<Entry> = Vec::new();
     if density.is_none() {
-        entries
-            .extend([entry(Mark::Dot(PHASED), "slips of sets with a phase"), entry(Mark::Dot(OTHER), "other slips")]);
+        entries.extend([entry(Mark::Dot(PHASED), "slips of sets with a phase"), entry(Mark::Dot(OTHER), "others")]);
     }
     entries.extend([
         entry(Mark::Bar(AVERAGE), "mean of sets with a phase, 95 %"),
@@ -87,7 +86,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
-    let bar = density.as_ref().map(|density| ColourBar::of_axis("density (1/rad)", &density.shades));
+    let bar = density.as_ref().map(|density| ColourBar::of_axis("density (1/rad)", &density.shades, shade));
     let panel = Panel { bar, ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers) };
     Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
 }

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::frame::{Frame, OVERLAP, fitting};
 use super::picture::{Anchor, Sheet};
-use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT, shade};
+use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT};
 use kuva::render::color::Color;
 
 /// Space right of a frame for the bar and its numbers.
@@ -22,10 +22,10 @@ pub(super) struct ColourBar<'a> {
 }
 
 impl<'a> ColourBar<'a> {
-    /// A bar of all shades, pale at the lower end, with the numbers of an axis.
-    pub(super) fn of_axis(label: &'a str, axis: &Axis) -> Self {
+    /// A bar of all colours of a scale, with the numbers of an axis.
+    pub(super) fn of_axis(label: &'a str, axis: &Axis, colour: fn(f64) -> Color) -> Self {
         const STEPS: u32 = 64;
-        let colours = (0..STEPS).map(|step| shade(f64::from(step) / f64::from(STEPS - 1))).collect();
+        let colours = (0..STEPS).map(|step| colour(f64::from(step) / f64::from(STEPS - 1))).collect();
         let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
         Self { label, colours, ticks }
     }

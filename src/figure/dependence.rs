@@ -26,7 +26,7 @@ const MILLISECONDS: f64 = 1e3;
 pub(super) type Getter = fn(&SetRow) -> Option<Statistic>;
 
 /// A quantity of a panel: its label, its value, and of a share, between 0 and 1, its part by the drive alone.
-type Quantity = (&'static str, Getter, Option<Getter>);
+type Quantity = (&'static str, Getter, Option<fn(&SetRow) -> Option<f64>>);
 
 const QUANTITIES: [Quantity; 4] = [
     ("Mean interval τ (ms)", |set| Some(Statistic::of(set.tau_mean, set.tau_interval)?.times(MILLISECONDS)), None),
@@ -41,12 +41,12 @@ const QUANTITIES: [Quantity; 4] = [
     (
         "Locking index",
         |set| Statistic::of(set.locking_index, set.locking_interval),
-        Some(|set| Statistic::of(set.locking_index_drive, None)),
+        Some(|set| set.locking_index_drive),
     ),
     (
         "Resultant length of φ",
         |set| Statistic::of(set.resultant_length, set.length_interval),
-        Some(|set| Statistic::of(set.resultant_drive, None)),
+        Some(|set| set.resultant_drive),
     ),
 ];
 
@@ -65,7 +65,10 @@ pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
     };
     let panel = |quantity: Quantity| {
         let mut layers = lines.layers(quantity.1, |_| false);
-        layers.extend(quantity.2.into_iter().flat_map(|drive| lines.of_drive(drive)));
+        for (line, ink) in lines.lines.iter().zip(INKS) {
+            let alone = |set: &&SetRow| Some((number(&set.parameters, symbol)?, quantity.2?(set)?));
+            layers.push(Layer::Curve(line.iter().filter_map(alone).collect(), drive_alone(ink)));
+        }
         Some(Panel::new(HEIGHT, x.clone(), y_axis(quantity, sets)?, layers))
     };
     let panels: Vec<Panel<'_>> = QUANTITIES.into_iter().filter_map(panel).collect();
@@ -74,9 +77,8 @@ pub(super) fn dependence(sets: &[SetRow], look: &Look) -> Option<Picture> {
     }
     let layout = Layout { columns: panels.len().min(2), column_gap: COLUMN_GAP, ..Layout::column(WIDTH) };
     let mut legend = lines.legend();
-    if sets.iter().any(|set| set.resultant_drive.is_some()) {
-        legend.push(entry(Mark::Line(drive_alone(BLACK)), "by the drive alone"));
-    }
+    let has_drive = sets.iter().any(|set| set.resultant_drive.is_some());
+    legend.extend(has_drive.then(|| entry(Mark::Line(drive_alone(BLACK)), "by the drive alone")));
     Some(panel::draw("dependence", look, layout, &legend, panels))
 }
 
@@ -86,7 +88,7 @@ fn y_axis((label, value, drive): Quantity, sets: &[SetRow]) -> Option<Axis> {
     let Some(drive) = drive else {
         return Axis::of_data(label, ends.map(|end| end.max(0.0)), WIDE, 0.0);
     };
-    let (low, _) = bounds(ends.chain(sets.iter().filter_map(drive).map(|statistic| statistic.value)))?;
+    let (low, _) = bounds(ends.chain(sets.iter().filter_map(drive)))?;
     Some(Axis::linear(label, if low > HIGH_SHARE { HIGH_SHARE } else { 0.0 }, 1.0))
 }
 
@@ -118,14 +120,6 @@ impl<'a> Lines<'a> {
     pub(super) fn legend(&self) -> Vec<Entry> {
         let names = self.lines.iter().map(|line| modulation(&line[0].parameters));
         names.zip(INKS).map(|(name, ink)| entry(Mark::Dot(dot(ink)), name)).collect()
-    }
-
-    /// The part of the drive alone of a statistic.
-    fn of_drive<'l>(&self, value: Getter) -> Vec<Layer<'l>> {
-        let place = |set: &&SetRow| Some((number(&set.parameters, self.symbol)?, value(set)?.value));
-        let curve =
-            |(line, ink): (&Vec<&SetRow>, _)| Layer::Curve(line.iter().filter_map(place).collect(), drive_alone(ink));
-        self.lines.iter().zip(INKS).map(curve).collect()
     }
 
     /// A statistic of all sets, some of them as open circles.

@@ -5,7 +5,7 @@ use super::colour_bar::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
 use super::sets::ascending;
-use super::style::{INKS, SCALE};
+use super::style::{INKS, SCALE, shade};
 use kuva::render::color::Color;
 
 /// How the values of a quantity become colours.
@@ -49,7 +49,7 @@ impl Hues {
     /// The colour bar, if there is a scale.
     pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
         let Self::Scale(axis) = self else { return None };
-        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis) })
+        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis, shade) })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The locking map: how many periods an interval takes, its locking index, and the excess of the resultant length over the
 //! drive alone, over period and amplitude of the modulation.
 
-use super::axis::Axis;
+use super::axis::{Axis, bounds};
 use super::colour_bar::ColourBar;
 use super::frame::Layout;
 use super::legend::{Mark, entry};
@@ -31,8 +31,6 @@ const FREE: Ink = "#f2f2f0";
 const EXCESS: &str = "resultant length of φ less that by the drive alone";
 /// Least end of its scale, so that chance is pale.
 const MIN_EXCESS: f64 = 0.2;
-/// Steps of its colour bar.
-const SHADES: u32 = 64;
 
 /// Draws the map of sets that differ in the modulation alone and fill at least half of a grid of 8 amplitudes and
 /// periods or more; `None` for others. Sets without modulation do not count.
@@ -51,21 +49,18 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
         [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke))
     };
     let numbers = Numbers::of(&modulated);
-    let colour =
-        |set: &SetRow| Some(if set.has_phase { shade(numbers.share(whole_periods(set)?)) } else { Color::from(FREE) });
-    let words = map.words(|set| whole_periods(set).filter(|_| set.has_phase), |n| (n.to_string(), numbers.share(n)));
-    let indices = ColourBar::of_axis("locking index", &Axis::linear("", 0.0, 1.0));
+    let colour = |set: &SetRow| Some(whole_periods(set).map_or(Color::from(FREE), |n| shade(numbers.share(n))));
+    let words = map.words(whole_periods, |n| (n.to_string(), numbers.share(n)));
+    let indices = ColourBar::of_axis("locking index", &Axis::linear("", 0.0, 1.0), shade);
     let mut panels = vec![
         (map.coloured(colour), words, numbers.bar()),
         (map.coloured(|set| set.locking_index.map(shade)), Vec::new(), indices),
     ];
-    let excess = |set: &SetRow| set.resultant_excess;
-    if modulated.iter().any(|set| excess(set).is_some()) {
-        let most = modulated.iter().filter_map(|set| excess(set)).map(f64::abs).fold(MIN_EXCESS, f64::max);
+    if let Some((low, high)) = bounds(modulated.iter().filter_map(|set| set.resultant_excess)) {
+        let most = MIN_EXCESS.max(-low).max(high);
         let scale = Axis::linear("", -most, most);
-        let cells = map.coloured(|set| excess(set).map(|excess| diverging(scale.place(excess))));
-        let colours = (0..=SHADES).map(|step| diverging(f64::from(step) / f64::from(SHADES))).collect();
-        panels.push((cells, Vec::new(), ColourBar { colours, ..ColourBar::of_axis(EXCESS, &scale) }));
+        let cells = map.coloured(|set| Some(diverging(scale.place(set.resultant_excess?))));
+        panels.push((cells, Vec::new(), ColourBar::of_axis(EXCESS, &scale, diverging)));
     }
     let panels = panels.into_iter().map(|(cells, words, bar)| {
         let inside = Layer::Inside(std::iter::once(cells).chain(lines()).collect());
@@ -79,9 +74,9 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     Some(panel::draw("locking-map", look, Layout::column(WIDTH), &legend, panels.collect()))
 }
 
-/// n of τ = nT.
+/// n of τ = nT, of a set that has a phase.
 fn whole_periods(set: &SetRow) -> Option<usize> {
-    usize::try_from(set.periods?).ok()
+    usize::try_from(set.periods?).ok().filter(|_| set.has_phase)
 }
 
 /// The numbers of periods that occur, as shades.
@@ -92,8 +87,7 @@ struct Numbers {
 
 impl Numbers {
     fn of(sets: &[&SetRow]) -> Self {
-        let phased = sets.iter().filter(|set| set.has_phase);
-        let present = || phased.clone().filter_map(|set| whole_periods(set)).map(|n| n.min(MAX_PERIODS + 1));
+        let present = || sets.iter().filter_map(|set| whole_periods(set)).map(|n| n.min(MAX_PERIODS + 1));
         let first = present().min().unwrap_or(0);
         Self { first, last: present().max().unwrap_or(first) }
     }

@@ -88,7 +88,7 @@ pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
             layers.extend(map.words(regime, word));
         }
         let (x, y) = map.axes(&label(horizontal), &label(vertical));
-        Some(Panel { bar: Some(ColourBar::of_axis(name, &shades)), ..Panel::new(220.0, x, y, layers) })
+        Some(Panel { bar: Some(ColourBar::of_axis(name, &shades, shade)), ..Panel::new(220.0, x, y, layers) })
     };
     let panels: Option<Vec<Panel<'_>>> = QUANTITIES.into_iter().map(panel).collect();
     let legend = [entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white")];

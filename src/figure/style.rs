@@ -192,16 +192,8 @@ const SHADES: [[f64; 3]; 8] = [
     [27.0, 58.0, 104.0],
 ];
 
-/// From blue, below, by nearly white to red, above: also for the colour-blind (RdBu of ColorBrewer).
-const DIVERGING: [[f64; 3]; 7] = [
-    [33.0, 102.0, 172.0],
-    [103.0, 169.0, 207.0],
-    [209.0, 229.0, 240.0],
-    [247.0, 247.0, 247.0],
-    [253.0, 219.0, 199.0],
-    [239.0, 138.0, 98.0],
-    [178.0, 24.0, 43.0],
-];
+/// From blue, below, by nearly white to red, above: also for the colour-blind (ends of RdBu, ColorBrewer).
+const DIVERGING: [[f64; 3]; 3] = [[33.0, 102.0, 172.0], [247.0, 247.0, 247.0], [178.0, 24.0, 43.0]];
 
 /// A share from 0 to 1 as a colour on a light ground, pale at 0.
 pub(super) fn shade(share: f64) -> Color {

@@ -50,8 +50,6 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PhaseLimits {
     eta: f64,
-    /// φ_min, in rad; `None` for η < 1.
-    minimum: Option<f64>,
     /// Upper end of the turn in which a mean phase is given, in rad. For η >= 1 the seam is in the middle of the gap between
     /// Φ_max - 2π and φ_min, where no slip begins.
     top: f64,
@@ -59,15 +57,14 @@ struct PhaseLimits {
 
 impl PhaseLimits {
     fn at(eta: f64) -> Self {
-        let minimum = minimum_phase(eta);
-        let seam = minimum.zip(load_maximum_phase(eta)).map(|(low, high)| 0.5 * (low + high - TAU));
-        Self { eta, minimum, top: seam.map_or(PI, |seam| seam + TAU) }
+        let seam = minimum_phase(eta).zip(load_maximum_phase(eta)).map(|(low, high)| 0.5 * (low + high - TAU));
+        Self { eta, top: seam.map_or(PI, |seam| seam + TAU) }
     }
 
     /// φ + η cos φ for η < 1, where the load only grows: how far the load is between one maximum of the modulation and the
     /// next, in rad. Slips that come at random loads are uniform in it; in φ their density is 1 - η sin φ.
     fn load_phase(&self, phase: f64) -> Option<f64> {
-        self.minimum.is_none().then(|| phase + self.eta * libm::cos(phase))
+        (self.eta < 1.0).then(|| phase + self.eta * libm::cos(phase))
     }
 }
 

@@ -37,7 +37,6 @@ pub struct ReductionSummary {
     pub failed_jobs: u64,
     /// Controls left out, as in all that follows.
     pub sets: u64,
-    /// Sets that have a phase.
     pub phased_sets: u64,
     pub slips: u64,
     /// Points kept for scatter figures.

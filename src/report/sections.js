@@ -54,7 +54,7 @@ function writeSweep(report) {
 
 /** How many sets are in which regime; a click filters them. */
 function writeRegimes(report, filterBy) {
-  const { regimes, sets, phased } = report.census;
+  const { regimes } = report.census;
   const given = Object.entries(regimes).filter(([, count]) => count > 0);
   const order = [...REGIMES, ""];
   given.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
@@ -80,11 +80,12 @@ function writeRegimes(report, filterBy) {
     );
   });
   if (report.isModulated) {
+    const phased = report.values("has_phase").filter(Boolean);
     words.push(
       make(
         "li",
         {},
-        `with a phase: ${counted(phased, "set")} of ${many(sets)} `,
+        `with a phase: ${counted(phased.length, "set")} of ${many(report.setCount)} `,
         make(
           "button",
           { type: "button", onclick: () => filterBy("has_phase=true"), "aria-label": "Filter: with a phase" },

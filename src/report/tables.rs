@@ -60,8 +60,6 @@ fn rounded(real: f64) -> f64 {
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Census {
     pub sets: u64,
-    /// Sets that have a phase.
-    phased: u64,
     /// By regime; those without a finished job under an empty name.
     regimes: BTreeMap<&'static str, u64>,
     pub slips: u64,
@@ -71,7 +69,6 @@ columns! {
     struct Counted {
         regime: Option<Regime>;
         slips: u64;
-        has_phase: bool;
         is_control as "control": bool;
     }
 }
@@ -84,7 +81,6 @@ impl Census {
             for set in batch?.into_iter().filter(|set| !set.is_control) {
                 census.sets += 1;
                 census.slips += set.slips;
-                census.phased += u64::from(set.has_phase);
                 *census.regimes.entry(set.regime.map_or("", Regime::word)).or_default() += 1;
             }
         }
