@@ -1,7 +1,7 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
 use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, refined, regimes, staircase};
+use super::{backbone, drag, histograms, intervals, locking_map, refined, regimes, staircase};
 use super::{own, sets};
 use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, exclusive_lock};
@@ -30,16 +30,12 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        for figure in [
-            locking_map::locking_map,
-            staircase::staircase,
-            dependence::dependence,
-            friction::friction,
-            regimes::regimes,
-            regimes::regime_map,
-        ] {
-            pictures.extend(figure(&sets, look));
+        let maps = [locking_map::locking_map, staircase::staircase, regimes::regime_map].map(|map| map(&sets, look));
+        // Where a map shows all, it would be a net of lines.
+        if maps.iter().all(Option::is_none) {
+            pictures.extend(own::overview(&sets, look));
         }
+        pictures.extend(maps.into_iter().flatten());
     }
     if layout.storage.exists(&layout.reduced_file(CellRow::NAME))? {
         pictures.extend(refined::refined(&read(layout)?, &sets, look));

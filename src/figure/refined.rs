@@ -2,16 +2,15 @@
 //! against another parameter, each with the band in which it lies.
 
 use super::axis::{Axis, bounds, is_wide};
-use super::dependence::{label, number};
 use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
-use super::sets::{MICROMETRES, ascending};
+use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, LIGHT_GREY, Look, RADIUS, WHITE, dot};
 use crate::model::Symbol;
 use crate::reduce::FREQUENCY as FREQUENCY_COLUMN;
-use crate::reduce::{CellRow, SetRow};
+use crate::reduce::{CellRow, SetRow, ascending};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, HashMap};
 
@@ -29,21 +28,10 @@ pub(super) fn refined(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option
     if cells.iter().all(|cell| cell.y.is_some()) { map(cells, look) } else { edges(cells, sets, look) }
 }
 
-/// Label of an axis, and the factor to its unit.
-fn axis_of(key: &str) -> (String, f64) {
-    match (key, Symbol::from_key(key)) {
-        (FREQUENCY_COLUMN, _) => ("Frequency 1/T (Hz)".to_owned(), 1.0),
-        ("eta", _) => ("η".to_owned(), 1.0),
-        (_, Some(Symbol::Delta)) => ("Amplitude Δ (µm)".to_owned(), MICROMETRES),
-        (_, Some(symbol)) => (label(symbol), 1.0),
-        (key, None) => (key.to_owned(), 1.0),
-    }
-}
-
 /// A parameter of a set, or the frequency.
 fn value(key: &str, set: &SetRow) -> Option<f64> {
     match Symbol::from_key(key) {
-        Some(symbol) => number(&set.parameters, symbol),
+        Some(symbol) => set.parameters.get(symbol).number(),
         None => set.parameters.modulation_period.map(|period| 1.0 / period),
     }
 }
@@ -59,7 +47,10 @@ fn words(by: &str) -> [String; 2] {
 
 fn map(cells: &[CellRow], look: &Look) -> Option<Picture> {
     let first = cells.first()?;
-    let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(&first.x), axis_of(first.y.as_deref()?));
+    let ((x_label, x_factor), (y_label, y_factor)) = (
+        axis_of(&first.x, cells.iter().map(|cell| cell.x_high)),
+        axis_of(first.y.as_deref()?, cells.iter().filter_map(|cell| cell.y_high)),
+    );
     let mut boxes: BTreeMap<[u64; 2], u32> = BTreeMap::new();
     let mut placed: Vec<(Cell, &CellRow)> = Vec::new();
     for cell in cells {
@@ -105,7 +96,10 @@ fn edges(cells: &[CellRow], sets: &[SetRow], look: &Look) -> Option<Picture> {
     let parameters = Symbol::ALL.into_iter().filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
     let keys = parameters.map(Symbol::key).chain([FREQUENCY_COLUMN]);
     let [key] = keys.filter(|key| !is_refined(key) && differs(key)).collect::<Vec<_>>()[..] else { return None };
-    let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(key), axis_of(refined));
+    let ((x_label, x_factor), (y_label, y_factor)) = (
+        axis_of(key, bands.iter().filter_map(|(_, set)| value(key, set))),
+        axis_of(refined, bands.iter().map(|(cell, _)| cell.x_high)),
+    );
     let points: Vec<(f64, f64, f64)> = bands
         .iter()
         .filter_map(|(cell, set)| Some((x_factor * value(key, set)?, y_factor * cell.x_low, y_factor * cell.x_high)))
