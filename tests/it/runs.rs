@@ -228,7 +228,8 @@ fn reduced_data_and_figures_can_be_made_again() {
     let drawn = folder.ends(0, "plot r").stdout;
     assert_eq!(
         drawn.lines().collect::<Vec<_>>(),
-        ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png"].map(|name| format!("r/figures/{name}"))
+        ["phi-eta.svg", "phi-eta.png", "tau-T.svg", "tau-T.png", "overview.svg", "overview.png"]
+            .map(|name| format!("r/figures/{name}"))
     );
     assert!(folder.contents("r") == before);
 }
