@@ -141,8 +141,8 @@ impl SetSlips {
         let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
         let of_angle =
             |angle: fn(&SlipStats) -> f64| sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred();
-        let (of_phases, of_loads) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
-        let (phases, loads) = (of_phases.1, of_loads.1);
+        let (of_phases, (_, loads)) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
+        let phases = of_phases.1;
 
         let phase_interval = phases.direction_interval(limits.top);
         let expected = (phases.count() > 0).then(|| {
@@ -221,7 +221,7 @@ impl SetSlips {
         };
         let intervals = tau.sorted;
         let seeds = self.jobs.into_keys().collect();
-        FinishedSet { row, intervals, seeds, phases: of_phases, loads: of_loads }
+        FinishedSet { row, intervals, seeds, phases: of_phases }
     }
 }
 
@@ -305,8 +305,6 @@ pub(super) struct FinishedSet {
     /// Seeds of the jobs of these phases.
     pub(super) seeds: Vec<u64>,
     pub(super) phases: OfSet,
-    /// Its load phases, for η < 1.
-    pub(super) loads: OfSet,
 }
 
 #[cfg(test)]
