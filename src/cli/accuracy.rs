@@ -2,7 +2,7 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::{self, PresetFlag, settings_as_sweep};
+use super::sweep::{self, PresetFlag, changes};
 use super::threads::ThreadsFlag;
 use crate::accuracy::{
     self, DistanceRow, Distances, Findings, MethodRow, QUANTITIES, Report, Stability, Study, hard_cases, set_in_words,
@@ -42,12 +42,12 @@ Examples:
   stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
 pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
-    #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "hard_cases"])]
+    #[arg(value_name = "SWEEP.toml", conflicts_with = "hard_cases")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
-    /// Set a parameter of the model, and study this one set; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["preset", "hard_cases"])]
+    /// Set a key of the sweep file, or a parameter of the model if there is none; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "hard_cases")]
     settings: Vec<String>,
     /// Folder for tables, JSON and figures
     #[arg(short, long, value_name = "DIR", default_value = "results/accuracy")]
@@ -87,10 +87,11 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         return Err(UsageError(problem).into());
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
+    let changes = changes(&arguments.settings, &[])?;
     let sweep = match (arguments.sweep.as_deref(), arguments.preset.preset) {
-        (None, None) if arguments.settings.is_empty() => None,
-        (None, None) => Some(settings_as_sweep(&arguments.settings)?),
-        (file, preset) => Some(sweep::read(file, preset)?),
+        (None, None) if changes.is_empty() => None,
+        (None, None) => Some(sweep::point(&changes)?),
+        (file, preset) => Some(sweep::read(file, preset, &changes)?),
     };
     if let Some(sweep) = sweep {
         output::warn(&sweep.warnings());
