@@ -17,6 +17,7 @@ mod sample;
 mod sequence;
 mod set;
 mod slip_stats;
+mod source;
 mod statistic;
 
 pub use crate::sweep::{Interval, SetRow};
@@ -38,6 +39,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
+pub use source::renew;
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};
 use std::f64::consts::{PI, TAU};
