@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   stickslip init mine.toml                       every key with its unit, meaning and default
-  stickslip init mine.toml --question friction   a question, with a figure as its answer, in a minute or less
+  stickslip init mine.toml --question friction   a question, with a figure as its answer, in half a minute
   stickslip init mine.toml --preset locking-map  from a sweep of the paper, or beyond it
   stickslip init mine.toml --set N=140 --axis V0=log:1e-5:1e-3:9 --axis seed=count:8
   stickslip plan mine.toml                       next: what would run")]
@@ -50,7 +50,7 @@ impl Question {
     /// The sweep that answers it: a preset, and axes in place of its own, which are cheaper.
     fn sweep(self) -> (&'static str, &'static [&'static str]) {
         match self {
-            Self::Friction => ("friction", &["seed=count:4"]),
+            Self::Friction => ("friction", &[]),
             Self::Interval => ("velocity", &[]),
             Self::Locking => ("locking-map", &["frequency=linear:10:70:31", "Delta=log:2e-7:4e-6:9"]),
             Self::Sliding => ("regimes", &["V0=log:1e-5:1e-2:10", "tau_r=log:1e-4:1e-1:10"]),
@@ -72,11 +72,17 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
     let sweep = Sweep::parse(&text, file);
     let sweep = sweep.with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
     let axes: Vec<String> = axes.iter().map(|&axis| axis.to_owned()).collect();
-    let own = arguments.variation.changes()?;
-    let text = vary(vary(sweep, &changes(&[], &axes)?)?, &own)?.text().to_owned();
+    let own = changes(&arguments.variation)?;
+    let of_question = changes(&Variation { settings: Vec::new(), axes })?;
+    let text = vary(vary(sweep, &of_question)?, &own)?.text().to_owned();
     // What is set stands no longer as a comment with its default.
     let is_set = |line: &str| own.iter().any(|change| line.starts_with(&format!("# {} = ", change.key)));
     let text: String = text.split_inclusive('\n').filter(|line| !is_set(line)).collect();
+    let question = arguments.question.and_then(|question| question.to_possible_value());
+    let text = match question.as_ref().and_then(|question| question.get_help()) {
+        Some(question) => format!("# {question}\n{}", &text[text.find("name = ").unwrap_or(0)..]),
+        None => text,
+    };
     write_new(file, &text)?;
     let quoted = output::quoted_path(file);
     output::report(&format!("wrote {}. See what it would run: stickslip plan {quoted}", shown(file)));

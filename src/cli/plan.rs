@@ -112,7 +112,7 @@ impl Directory {
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
-    let changes = arguments.variation.changes()?;
+    let changes = sweep::changes(&arguments.variation)?;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     output::warn(&sweep.warnings());
     let default = changes.is_empty().then(|| Layout::default_root(&sweep));

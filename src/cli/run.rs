@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 
 impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
-        let changes = self.variation.changes()?;
+        let changes = sweep::changes(&self.variation)?;
         let (sweep, root) = if let Some(directory) = self.sweep.as_deref().filter(|path| path.is_dir()) {
             let own = Results::read(&Layout::new(&Disk, directory))?.sweep().clone();
             (sweep::vary(own, &changes)?, directory.to_owned())

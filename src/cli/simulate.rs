@@ -8,7 +8,7 @@ mod outputs;
 use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::{self, PresetFlag, changes, number, real};
+use super::sweep::{self, PresetFlag, Variation, changes, number, real};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
@@ -179,10 +179,7 @@ struct Report {
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
-    let sweep = match (&arguments.sweep, arguments.preset.preset) {
-        (None, None) => sweep::point(&changes)?,
-        (file, preset) => sweep::read(file.as_deref(), preset, &changes)?,
-    };
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
     check_outputs(arguments, &sweep, parameters)?;
@@ -212,15 +209,6 @@ impl JobFlags {
     /// What the flags set, each as a key of a sweep file.
     fn changes(&self) -> Result<Vec<Change>, UsageError> {
         let is_fixed = self.solver.as_deref() == Some("fixed-step");
-        for (flag, is_misplaced, place) in [
-            ("--dt", self.dt.is_some() && !is_fixed, "fixed-step"),
-            ("--tolerance", self.tolerance.is_some() && is_fixed, "event-driven; use --dt"),
-            ("--resolve", self.resolve.is_some() && is_fixed, "event-driven"),
-        ] {
-            if is_misplaced {
-                return Err(UsageError(format!("{flag}: goes with --solver {place}")));
-            }
-        }
         let flags = [
             ("slips", &self.slips),
             ("max_time", &self.time),
@@ -230,7 +218,7 @@ impl JobFlags {
             ("dt", &self.dt.clone().or_else(|| is_fixed.then(|| "1e-6".to_owned()))),
         ];
         let flags = flags.into_iter().filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
-        changes(&self.settings.iter().cloned().chain(flags).collect::<Vec<_>>(), &[])
+        changes(&Variation { settings: self.settings.iter().cloned().chain(flags).collect(), axes: Vec::new() })
     }
 }
 

@@ -71,14 +71,8 @@ pub struct Variation {
     pub axes: Vec<String>,
 }
 
-impl Variation {
-    pub fn changes(&self) -> Result<Vec<Change>, UsageError> {
-        changes(&self.settings, &self.axes)
-    }
-}
-
 /// What `--set` and `--axis` change.
-pub fn changes(settings: &[String], axes: &[String]) -> Result<Vec<Change>, UsageError> {
+pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
     let mut changes: Vec<Change> = Vec::new();
     let settings = settings.iter().map(|text| ("--set", "VALUE", "1e-5", text));
     for (flag, form, example, text) in settings.chain(axes.iter().map(|text| ("--axis", "VALUES", "1e-5,1e-4", text))) {
@@ -99,12 +93,15 @@ pub fn changes(settings: &[String], axes: &[String]) -> Result<Vec<Change>, Usag
     Ok(changes)
 }
 
-/// Reads a sweep file, or takes a preset, as varied; the command line asks for one of them.
+/// Reads a sweep file, or takes a preset, as varied; without either, a sweep with one point, of what is set.
 pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, preset) {
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
-        (None, None) => unreachable!("the command line asks for one of them"),
+        (None, None) => {
+            let [model, record, solver] = ["model", "record", "solver"].map(|section| written(changes, section));
+            return of_flags(&single::sweep_text(&model, &record, &solver));
+        }
     };
     vary(sweep?, changes)
 }
@@ -123,23 +120,12 @@ pub fn number(text: &str) -> Result<String, &'static str> {
     real(text).map(|_| text.to_owned())
 }
 
-/// A sweep with one point, of what `--set` and flags like it say.
-pub fn point(changes: &[Change]) -> Result<Sweep> {
-    let [model, record, solver] = ["model", "record", "solver"].map(|section| written(changes, section));
-    of_flags(&single::sweep_text(&model, &record, &solver))
-}
-
-/// Reads a text that flags were made into.
+/// Reads a text that flags were made into; mistakes are those of the flags.
 fn of_flags(text: &str) -> Result<Sweep> {
-    Sweep::parse(text, Path::new("flags")).map_err(as_flags)
-}
-
-/// A message about such a text, as one about the flags.
-fn as_flags(error: SweepError) -> anyhow::Error {
-    match error {
+    Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
         SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
-    }
+    })
 }
 
 #[cfg(test)]

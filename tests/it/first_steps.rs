@@ -67,8 +67,10 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
 #[test]
 fn each_question_is_a_sweep_that_plans() {
     let folder = Folder::new();
-    for (question, jobs) in [("friction", 148), ("interval", 65), ("locking", 558), ("sliding", 200)] {
+    for (question, jobs) in [("friction", 296), ("interval", 65), ("locking", 558), ("sliding", 200)] {
         folder.ends(0, &format!("init {question}.toml --question {question}"));
+        let text = fs::read_to_string(folder.path(&format!("{question}.toml"))).unwrap();
+        assert!(text.lines().next().unwrap().ends_with('?'), "{text}");
         let planned = folder.ends(0, &format!("plan {question}.toml")).stdout;
         assert!(planned.contains(&format!("{jobs} after conditions")), "{planned}");
     }
