@@ -6,6 +6,7 @@
 //! study.rs      every solver at every set of parameters, timed on one thread
 //! hard_cases.*  parameters that break a naive code, each audited
 //! cost.rs       what a computation costs
+//! verdict.rs    what that says of a sweep's solver
 //! report.rs     tables as Parquet and JSON, figures
 //! ```
 
@@ -15,12 +16,14 @@ pub mod distance;
 mod hard_cases;
 mod report;
 mod study;
+mod verdict;
 
 pub use cost::Cost;
 pub use distance::Distances;
 pub use hard_cases::{HardCase, Stability, hard_cases};
 pub use report::{Report, stability_report, study_report};
 pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
+pub use verdict::verdict;
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::solver::{Resolve, Solver};

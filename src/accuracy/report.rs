@@ -2,7 +2,7 @@
 
 use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
-use super::{Stability, cost, other_settings};
+use super::{Stability, cost, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::commit::Commit;
@@ -25,6 +25,7 @@ pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
+        "verdict": verdict(study, findings),
     });
     let mut report =
         Report::new("accuracy", settings).table("methods", &findings.methods).table("distances", &findings.distances);
@@ -157,7 +158,10 @@ fn points(
         let drive = match row.parameters.modulation_period {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
-            Some(period) => format!("Δ = {:e} m, {:.4} Hz", row.parameters.modulation_amplitude, 1.0 / period),
+            Some(period) => {
+                let frequency = (1e4 / period).round() / 1e4;
+                format!("Δ = {:e} m, {frequency} Hz", row.parameters.modulation_amplitude)
+            }
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());

@@ -3,7 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{FREQUENCY, SetRow, Values, compare, read_reduced, sets_where};
+use crate::reduce::{FREQUENCY, SetRow, Values, compare, read_reduced, renew, sets_where};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{Sweep, three_digits};
@@ -129,11 +129,8 @@ pub fn summary(results: &Results<'_>) -> Result<String> {
 
 /// The reduced sets, controls left out.
 fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
-    let layout = results.layout();
-    if !layout.storage.exists(&layout.reduced_file("sets"))? {
-        crate::reduce::reduce(results)?;
-    }
-    Ok(read_reduced::<SetRow>(layout)?.into_iter().filter(|row| !row.is_control).collect())
+    renew(results)?;
+    Ok(read_reduced::<SetRow>(results.layout())?.into_iter().filter(|row| !row.is_control).collect())
 }
 
 /// The parameters in which sets differ, and what was found of them.

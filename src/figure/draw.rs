@@ -7,8 +7,7 @@ use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
-use crate::table::shown::shown;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
@@ -20,7 +19,6 @@ const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 /// Returns the files, in the order in which they were written.
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
-    check_reduced(layout)?;
     let points = read(layout)?;
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
     let look = &look.with_note(&sets::common(sets.iter().map(|set| &*set.parameters)));
@@ -52,7 +50,6 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 
 /// Draws a figure of one's own from the sets of a results directory; writes nothing.
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
-    check_reduced(layout)?;
     let rows: Vec<SetRow> = read(layout)?;
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
     let picture = own::own(&rows, figure, look)?;
@@ -68,14 +65,6 @@ pub fn write_own(layout: &Layout<'_>, picture: Picture, look: &Look, formats: &[
 
 fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
     read_reduced(layout).map_err(advise(ADVICE))
-}
-
-fn check_reduced(layout: &Layout<'_>) -> Result<()> {
-    if layout.storage.exists(&layout.reduced())? {
-        return Ok(());
-    }
-    let root = shown(layout.root());
-    Err(anyhow!("{root}: has no reduced data to draw; run `stickslip reduce {root}` first"))
 }
 
 /// A picture is larger than it is asked to be if its frames would be too small to read.

@@ -38,7 +38,7 @@ pub(super) fn regimes(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let is_sliding = |set: &SetRow| set.regime == Some(Regime::Sliding);
     let mut entries = lines.legend();
     if sets.iter().any(is_sliding) {
-        entries.push(entry(Mark::Ring(BLACK, RADIUS), "sliding"));
+        entries.push(entry(Mark::Ring(BLACK, RADIUS, RADIUS - 1.6), "sliding"));
     }
     let [mixed, sliding] = Regime::MIN_SHARES;
     entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));

@@ -20,6 +20,7 @@ mod sample;
 mod sequence;
 mod set;
 mod slip_stats;
+mod source;
 mod statistic;
 mod values;
 
@@ -41,6 +42,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
+pub use source::renew;
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

@@ -8,6 +8,7 @@ use super::histogram::{HistogramBin, histogram};
 use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
+use super::source::{SOURCE, source};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::tables::JOBS;
@@ -68,6 +69,8 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
 /// Reads the tables, and stages what they are reduced to.
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
+    // In this order: what is committed in between makes these data old.
+    let footer = &results.footer_of_all().with(SOURCE, &source(results)?);
     let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
@@ -87,7 +90,6 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     layout.ensure_folder(&layout.reduced())?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let footer = &results.footer_of_all();
     let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
     let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
     let mut refined_sets = BTreeMap::new();
