@@ -4,10 +4,7 @@ use super::exit::{Exit, UsageError};
 use super::output;
 use super::sweep::{self, PresetFlag, Variation, changes};
 use super::threads::ThreadsFlag;
-use crate::accuracy::{
-    self, Findings, MethodRow, QUANTITIES, Report, Stability, Study, hard_cases, set_in_words, stability_report,
-    study_report, verdict,
-};
+use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
@@ -15,7 +12,7 @@ use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::Args;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// More sets would take long, and their tables would be too many to read.
 const MAX_SETS: usize = 12;
@@ -44,12 +41,11 @@ Examples:
   stickslip accuracy --quick                 a first look, in about a minute
   stickslip accuracy --all                   the full study of the paper's parameters, with a table for each set
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
-  stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver
-  stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
+  stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver")]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
-    #[arg(value_name = "SWEEP.toml", conflicts_with = "hard_cases")]
+    #[arg(value_name = "SWEEP.toml")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
@@ -59,7 +55,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the tables of each set: timings, how long trajectories stay together, ledgers, biases of all quantities
-    #[arg(long, conflicts_with = "hard_cases")]
+    #[arg(long)]
     all: bool,
     /// Take fewer slips
     #[arg(long)]
@@ -73,18 +69,12 @@ pub struct Arguments {
     slips: Option<u64>,
     #[command(flatten)]
     threads: ThreadsFlag,
-    /// Run the hard cases instead
-    #[arg(long, conflicts_with_all = ["preset", "settings", "axes", "quick", "seeds", "slips", "threads"])]
-    hard_cases: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
-    if arguments.hard_cases {
-        return run_hard_cases(arguments);
-    }
     if let Some(setting) =
         arguments.variation.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
     {
@@ -121,20 +111,15 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    let text = study_text(&study, &findings, arguments.all);
-    write_and_print(&out, arguments.json, &study_report(&study, &findings)?, &text)?;
-    Ok(Exit::Done)
-}
-
-fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
-    let mut rows = Vec::new();
-    let out = writable(arguments.out.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_OUT)))?;
-    for case in hard_cases() {
-        output::report(&format!("{}: {}", case.threat, case.name()));
-        rows.extend(case.run());
+    let report = study_report(&study, &findings)?;
+    let files = report.write(&out)?;
+    if arguments.json {
+        output::plain_json(&report.json)?;
+    } else {
+        output::print(&study_text(&study, &findings, arguments.all))?;
+        files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
     }
-    write_and_print(&out, arguments.json, &stability_report(&rows), &stability_text(&rows))?;
-    Ok(if rows.iter().all(|row| row.passed) { Exit::Done } else { Exit::Failed })
+    Ok(Exit::Done)
 }
 
 /// A folder that can be written to.
@@ -143,16 +128,6 @@ fn writable(out: PathBuf) -> Result<PathBuf, UsageError> {
         return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))));
     }
     Ok(out)
-}
-
-/// Writes the report, and prints it as JSON or text.
-fn write_and_print(out: &Path, json: bool, report: &Report<'_>, text: &str) -> Result<()> {
-    let files = report.write(out)?;
-    if json {
-        return output::plain_json(&report.json);
-    }
-    output::print(text)?;
-    files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))
 }
 
 /// The sets of a sweep, with seed 0, and the number of jobs of each.
@@ -244,65 +219,4 @@ fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Vec
         lines.push(line);
     }
     lines
-}
-
-fn stability_text(rows: &[Stability]) -> String {
-    let mut lines = Vec::new();
-    let mut threat = "";
-    for row in rows {
-        if row.threat != threat {
-            threat = &row.threat;
-            lines.push(format!("\n{threat}"));
-        }
-        let mark = if row.passed { "ok    " } else { "FAILED" };
-        let time = row.simulated_seconds.map_or_else(String::new, |time| {
-            let (steps, cpu) = (row.steps, row.cpu_seconds);
-            let (breaks, grid) = (row.breaks, if row.grid_steps > 0 { " on the grid" } else { "" });
-            let ledger = row.ledger_residual.map_or_else(String::new, |residual| format!(", ledger {residual:.1e}"));
-            format!("; {time:.3} s in {steps} steps{grid}, {breaks} breaks{ledger}, {cpu:.2} s")
-        });
-        lines.push(format!("  {mark} {} ({}): {}{time}", row.case, row.solver, row.outcome));
-    }
-    let failed = rows.iter().filter(|row| !row.passed).count();
-    lines.push(format!("\n{} of {} runs passed\n", rows.len() - failed, rows.len()));
-    lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::accuracy::Cost;
-    use crate::accuracy::breaks::BreakErrors;
-    use crate::model::selected::Selected;
-
-    /// The tables of a study with one solver, of which this number of slips was timed.
-    fn tables(timed_slips: u64, together_throughout: bool, all: bool) -> String {
-        let study = Study { sets: vec![Parameters::default()], ..Study::quick() };
-        let row = MethodRow {
-            parameters: Selected::new(Parameters::default()),
-            case: String::new(),
-            solver: study.own.into(),
-            cost: Cost { per_slip: 1e-3, timed_slips, ..Cost::default() },
-            timings: 1,
-            median_per_slip: 1e-3,
-            largest_per_slip: 1e-3,
-            break_times: BreakErrors {
-                together: Some(9),
-                together_seconds: Some(0.1),
-                together_throughout,
-                ..BreakErrors::default()
-            },
-            ledger_residual: None,
-        };
-        study_text(&study, &Findings { methods: vec![row], distances: Vec::new() }, all)
-    }
-
-    #[test]
-    fn the_solver_of_the_sweep_has_a_mark_and_what_developers_look_at_is_on_request() {
-        let text = tables(0, true, true);
-        assert!(text.contains("\n-> grid, tolerance 1e-3") && text.contains("1.000*"), "{text}");
-        assert!(text.contains(">9 breaks, 0.100 s") && text.contains("dearest"), "{text}");
-        let text = tables(6, false, false);
-        assert!(!text.contains("9 breaks") && !text.contains("dearest") && text.contains("1.000 "), "{text}");
-    }
 }
