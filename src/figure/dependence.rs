@@ -221,14 +221,18 @@ mod tests {
         let drawn = |sets: &[SetRow]| dependence(sets, &Look::default()).unwrap().svg();
         let lines = |svg: &str| svg.matches("<path").count();
         let without = drawn(&sets);
-        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.6));
+        for set in &mut sets {
+            set.resultant_drive = Some(0.6);
+        }
         let with = drawn(&sets);
         assert!(with.contains(">by the drive alone<") && !without.contains("by the drive alone"));
         // A mark of few dashes, and a curve of many.
         assert!(lines(&with) - lines(&without) > 30);
         let low = |sets: &[SetRow]| y_axis(QUANTITIES[3], sets).unwrap().low;
         assert_eq!(low(&sets), HIGH_SHARE);
-        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.1));
+        for set in &mut sets {
+            set.resultant_drive = Some(0.1);
+        }
         assert_eq!(low(&sets), 0.0);
     }
 
