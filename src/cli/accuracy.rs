@@ -42,7 +42,6 @@ Examples:
   stickslip accuracy --all                   the full study of the paper's parameters, with a table for each set
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
   stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver")]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
     #[arg(value_name = "SWEEP.toml")]
