@@ -315,6 +315,7 @@ pub(super) mod tests {
             };
             let tau = 10.0 / f64::from(1 << step);
             SetRow {
+                frequency: parameters.modulation_period.map(|period| 1.0 / period),
                 parameters: Selected::new(parameters.validated().unwrap()),
                 tau_mean: Some(tau),
                 tau_interval: Some(Interval { low: 0.9 * tau, high: 1.1 * tau }),
@@ -421,6 +422,7 @@ pub(super) mod tests {
         let mut periods = vec![rows[0].clone(); 3];
         for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
             row.parameters.parameters.modulation_period = Some(period);
+            row.frequency = Some(1.0 / period);
         }
         let x = Values::of(&periods, "frequency").unwrap();
         assert_eq!(lines(&periods, "frequency", &[0, 1, 2], &x), [vec![2, 0, 1]]);

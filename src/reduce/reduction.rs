@@ -163,8 +163,8 @@ mod tests {
         // Names not in the order of the parameters.
         let names = Names { job_id: format!("{set:016x}{seed:016x}"), set_id: format!("{:032x}", 100 - set) };
         let parameters = parameters.validated().unwrap();
-        let eta = parameters.eta();
-        (names, Selected::new(parameters), Loading { eta })
+        let loading = Loading::of(&parameters);
+        (names, Selected::new(parameters), loading)
     }
 
     fn job_result((_, parameters, _): &Label<DriveAndSeed>, slips: u32) -> Measurements {

@@ -79,7 +79,7 @@ pub fn label(column: &str) -> Label {
         (_, Some(meaning)) => capitalised(meaning),
         _ => capitalised(&plain),
     };
-    let unit = described.map_or(if column == "frequency" { "Hz" } else { "" }, |column| column.unit);
+    let unit = described.map_or("", |column| column.unit);
     Label { symbol, what, unit }
 }
 
@@ -105,7 +105,7 @@ pub fn symbol_of(symbol: Symbol) -> String {
         Some((letter, "s")) => format!("{letter}ₛ"),
         Some((letter, "r")) => format!("{letter}ᵣ"),
         // There is no letter for other subscripts.
-        Some(_) => description.key.to_owned(),
+        Some(_) => description.key.replace('_', " "),
         None => name.replace("V0", "V₀"),
     }
 }
@@ -133,8 +133,7 @@ mod tests {
     fn what_is_labelled_is_a_column_and_every_number_has_words() {
         let columns = SetRow::columns();
         for (key, ..) in LABELS {
-            let is_derived = ["frequency", "friction_coefficient"].contains(&key);
-            assert!(is_derived || columns.iter().any(|column| column.name == key), "{key}");
+            assert!(key == "friction_coefficient" || columns.iter().any(|column| column.name == key), "{key}");
         }
         for column in columns {
             let Label { symbol, what, unit } = label(&column.name);

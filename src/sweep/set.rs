@@ -57,6 +57,7 @@ columns! {
     pub struct SetRow {
         set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<AllButSeed>;
+        frequency: Option<f64> = "Hz", "1/T; null without modulation";
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
         finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
         failed_jobs: u64 = "", "jobs that failed";
@@ -155,7 +156,8 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
         // parameters, and what is expected whatever happens, tell nothing of a set.
         let Cow::Borrowed(key) = column.name else { return None };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given = Symbol::from_key(key).is_some() || key.starts_with("expected_") || key == "control";
+        let is_given =
+            Symbol::from_key(key).is_some() || key.starts_with("expected_") || ["control", "frequency"].contains(&key);
         let kind = match column.kind {
             Kind::Flag | Kind::Text | Kind::Count => StatisticKind::Class,
             Kind::Real if !has_interval(key) => StatisticKind::Number,
