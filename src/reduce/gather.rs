@@ -8,7 +8,7 @@
 //! the next sets.
 
 use super::PhaseLimits;
-use super::drive_alone::Controls;
+use super::drive_alone::{Controls, Explained};
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
@@ -100,11 +100,23 @@ impl<'a> Gathering<'a> {
         spacing: u64,
         mut finished: impl FnMut(FinishedSet, Vec<(u64, Point)>) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
+        self.each_gathered(max_slips, spacing, |set, explained| {
+            let (set, points) = set.finish_with(&explained);
+            finished(set, points)
+        })
+    }
+
+    /// The same before anything is computed, with what the drive alone explains.
+    pub(super) fn each_gathered(
+        self,
+        max_slips: u64,
+        spacing: u64,
+        mut gathered: impl FnMut(Gathered, Explained) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
         for chunk in chunks(self.sets, max_slips) {
             for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
-                let (mut set, points) = set.finish();
-                self.controls.explain(self.sweep, &mut set.row, &set.seeds);
-                finished(set, points)?;
+                let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
+                gathered(set, explained)?;
             }
         }
         Ok(())
@@ -153,10 +165,11 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 }
 
 /// A set and its slips so far.
-struct Gathered {
-    jobs: SetJobs,
+#[derive(Clone)]
+pub(super) struct Gathered {
+    pub(super) jobs: SetJobs,
     limits: PhaseLimits,
-    slips: SetSlips,
+    pub(super) slips: SetSlips,
     /// Points among them, with their place in table order.
     points: Vec<(u64, Point)>,
 }
@@ -176,8 +189,19 @@ impl Gathered {
         }
     }
 
-    fn finish(self) -> (FinishedSet, Vec<(u64, Point)>) {
-        (self.slips.finish(self.jobs), self.points)
+    /// What the jobs with some of the seeds say.
+    pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
+        let mut part = self.clone();
+        part.jobs.averages.retain(|&seed, _| keeps(seed));
+        part.jobs.running.retain(|&(seed, _)| keeps(seed));
+        part.slips.retain(keeps);
+        part
+    }
+
+    pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {
+        let mut set = self.slips.finish(self.jobs);
+        explained.add_to(&mut set.row, &set.seeds);
+        (set, self.points)
     }
 }
 
@@ -257,7 +281,7 @@ pub(super) fn set_of<'a>(parameters: &Parameters, jobs: impl IntoIterator<Item =
             set.push(*seed, slip);
         }
     }
-    set.finish().0
+    set.finish_with(&Explained::default()).0
 }
 
 /// The row of a set of these jobs.

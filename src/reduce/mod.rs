@@ -2,10 +2,10 @@
 //! of τ, and a sample of slips for scatter figures.
 
 mod backbone;
-mod cells;
 mod circular;
 mod confidence;
 mod drive_alone;
+mod edges;
 mod gather;
 mod histogram;
 mod product_limit;
@@ -24,10 +24,10 @@ pub use backbone::BackboneBin;
 #[cfg(test)]
 pub(crate) use backbone::bin_of_sets;
 #[cfg(test)]
-pub(crate) use cells::{CellOfGrid, Cells};
-pub use cells::{CellRow, divide};
-#[cfg(test)]
 pub(crate) use confidence::mean_of;
+#[cfg(test)]
+pub(crate) use edges::{Edge, GROUPS, Sample};
+pub use edges::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
 pub use gather::reduce_jobs;
 #[cfg(test)]
 pub(crate) use gather::{PooledJob, pool_of, row_of};
@@ -87,7 +87,7 @@ mod tests {
         let tables = [
             markdown::<SetRow>(),
             markdown::<RoundOfSet>(),
-            markdown::<CellRow>(),
+            markdown::<EdgeRow>(),
             markdown::<HistogramBin>(),
             markdown::<BackboneBin>(),
             markdown::<Point>(),

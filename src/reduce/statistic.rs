@@ -18,7 +18,7 @@ impl SetRow {
     }
 
     #[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
-    fn number(&self, column: &str) -> Option<f64> {
+    pub(super) fn number(&self, column: &str) -> Option<f64> {
         self.column(column, |value| value.number()).flatten()
     }
 

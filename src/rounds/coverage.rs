@@ -1,11 +1,11 @@
 //! How often intervals hold the true value: what stopping by looking does to that, and the intervals of all statistics with
 //! the model.
 
-use super::precision::{MIN_SEEDS, need, seeds_for};
+use super::precision::{need, seeds_for};
 use crate::model::Parameters;
 use crate::reduce::{PooledJob, SetRow, bin_of_sets, mean_of, pool_of, row_of};
 use crate::results::layout::Layout;
-use crate::sweep::{Precision, STATISTICS, Statistic, StatisticKind, Target};
+use crate::sweep::{MIN_SEEDS, Precision, STATISTICS, Statistic, StatisticKind, Target};
 use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -53,7 +53,7 @@ fn ended(repetitions: u64, least: u64, precision: &Precision, truth: f64, row: i
 
 fn precision(key: &str, target: Target) -> Precision {
     let statistics = Statistic::from_key(key).into_iter().collect();
-    Precision { statistics, target, seeds: FROM..=MOST }
+    Precision { statistics, target }
 }
 
 /// Values of mean 0 and variance 1, one a seed.
@@ -194,14 +194,13 @@ fn cells(pools: &[Pool; 2], set: usize, statistic: Statistic) -> Vec<f64> {
         let (pool, truth) = (&pools[0], pools[0].truth(set));
         let [low, high] = ends(&truth, statistic).unwrap();
         let half = 0.5 * (high - low) * (pool.jobs[set].1.len() as f64 / enough).sqrt();
-        let precision =
-            Precision { statistics: vec![statistic], target: Target::Absolute(half), seeds: MIN_SEEDS..=MAX_JOBS };
+        let precision = Precision { statistics: vec![statistic], target: Target::Absolute(half) };
         share(|repetition| {
             let jobs = pool.of_repetition(set, repetition, usize::try_from(MAX_JOBS).unwrap());
             let mut seeds = MIN_SEEDS;
             loop {
                 let row = pool.row(set, &jobs[..usize::try_from(seeds).unwrap()]);
-                match need(&precision, seeds, &row) {
+                match need(&precision, seeds, MAX_JOBS, &row) {
                     Some(more) if more > seeds => seeds = more,
                     _ => return holds(&row, &truth, statistic),
                 }

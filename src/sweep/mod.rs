@@ -39,8 +39,8 @@ pub use cost::predicted_cost;
 pub use grid::Sweep;
 pub use job::{Id, Identity, Job};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
-pub use set::{Interval, STATISTICS, SetRow, Statistic, StatisticKind};
+pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
+pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic, StatisticKind};
 pub use source::{Mistake, SweepError, nearest};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,

@@ -14,7 +14,7 @@
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::checks::Places;
 use super::quantity::Quantity;
-use super::read_rounds::{Wanted, WantedAxis};
+use super::read_rounds::Wanted;
 use super::samples::{Range, Sample};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::Value;
@@ -26,7 +26,7 @@ const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in
 
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
-/// Reads all axes, those that are to be refined as fine as that.
+/// Reads all axes, the one that is to be refined as fine as that.
 pub(super) fn read(
     section: &Section<'_>,
     places: &mut Places<'_>,
@@ -68,7 +68,7 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>, wanted: Option<&Wante
     if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, first, count });
     }
-    let values = read_values(entry, quantity, wanted.and_then(|wanted| wanted.axis(quantity)))?;
+    let values = read_values(entry, quantity, wanted.filter(|wanted| wanted.quantity == quantity))?;
     let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
     Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
@@ -86,7 +86,7 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>, wanted: Option<&Wante
 fn read_values(
     entry: &Entry<'_>,
     quantity: Quantity,
-    finer: Option<&WantedAxis<'_>>,
+    finer: Option<&Wanted<'_>>,
 ) -> Result<Vec<(Value, usize)>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
@@ -116,7 +116,7 @@ fn read_values(
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
     let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
-    let points = finer.map_or(Ok(points), |axis| axis.points(&range, points))?;
+    let points = finer.map_or(Ok(points), |wanted| wanted.points(&range, points))?;
     Ok(range.spaced(points).map(|value| (ranged(quantity, value), entry.at)).collect())
 }
 
