@@ -1,14 +1,14 @@
 //! Edges: where a statistic of the population crosses a threshold along an axis, each with its 95 % interval.
 //!
-//! Sets lie clearly on one side of the threshold, if their interval does, or are unclear. Between two clear neighbours of
-//! opposite sides, unclear ones left out, lies an edge; up and down are edges of their own. Of the sets in between, the two
-//! count between which the estimate crosses most steeply. If both are clear, the edge lies between them, and nothing is
-//! said of the response in between. If one is unclear, the edge is near it: it is where the line through the two crosses,
-//! with Fieller's interval (E. C. Fieller, J. R. Stat. Soc. B 16, 175 (1954)). A response that is steeper than this line
-//! only makes it too wide.
+//! A set lies clearly on one side of the threshold if its interval does. Between two clear neighbours of opposite sides,
+//! those left out that are not clear, lies an edge; up and down are edges of their own. Of the sets in between, two
+//! neighbours count between which the estimate crosses. If both are clear, the edge lies between them, and nothing is said
+//! of the response in between. If not, it is near: where a line through the sets of a small window crosses, with Fieller's
+//! interval (E. C. Fieller, J. R. Stat. Soc. B 16, 175 (1954)).
 //!
-//! Covariances come from a jackknife over groups of seeds, left out of both sets together, since a seed is a realisation
+//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is a realisation
 //! of the disorder common to all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
+//! Places on the axis are rows of the grid and fractions of them.
 
 use super::confidence::student;
 use super::drive_alone::Explained;
@@ -24,8 +24,13 @@ use std::collections::BTreeMap;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.
 pub const GROUPS: usize = 30;
-/// Rows of the grid between two sets up to which the response is taken for a line: at most three times the wanted width.
+/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width.
 const WINDOW: u64 = 3;
+/// What the interval of a line is widened by. Windows whose line is steep by chance end sooner, and so do those that are
+/// looked at again and again: measured, as in docs/rounds.md.
+const LOOKS: f64 = 1.2;
+/// How often the window is moved to where its line crosses.
+const MOVES: usize = 3;
 
 words! {
     /// Why an edge is as precise as it is.
@@ -50,7 +55,7 @@ columns! {
         edge: Option<f64> = "", "where it is crossed; null if it is not";
         edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval; null if there is no end on one side";
         rises: Option<bool> = "", "whether the statistic is above the threshold above the edge";
-        jobs: u64 = "", "jobs of the two sets that the edge lies between; of the whole row if it has no edge";
+        jobs: u64 = "", "jobs of the sets that say where the edge is; of all of the row if it has none";
         bracket_low: f64 = "", "the nearest value clearly on one side; the least of the row if it has no edge";
         bracket_high: f64 = "", "the nearest clearly on the other; the largest of the row if it has no edge";
         ended: Ended = "",
@@ -111,91 +116,120 @@ pub struct SetOfEdges {
     pub samples: Vec<Option<Sample>>,
 }
 
-/// A set on the refined axis: its row, and its place there, on a logarithmic axis the logarithm.
+/// A set on the refined axis, and on which side of the threshold it lies.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     pub row: u64,
-    place: f64,
     side: f64,
-    sample: Option<&'a Sample>,
+    sample: &'a Sample,
     pub set: &'a SetOfEdges,
 }
 
 /// Sets that differ in the refined axis alone, and the edges of one statistic.
 #[derive(Clone, Debug)]
 pub struct Line<'a> {
-    /// Rows of all axes, that of the refined one being any.
+    /// Rows of all axes, that of the refined one being 0.
     pub rows: Vec<u64>,
     statistic: usize,
-    sets: Vec<Placed<'a>>,
+    sets: Vec<(u64, &'a SetOfEdges)>,
     pub edges: Vec<Edge<'a>>,
 }
 
 #[derive(Clone, Debug)]
 pub struct Edge<'a> {
-    /// The two sets that it lies between by their estimates.
-    pub pair: [Placed<'a>; 2],
+    /// The sets that say where it is: two neighbours that are clear, or those of the window.
+    pub sets: Vec<Placed<'a>>,
     bracket: [Placed<'a>; 2],
-    /// Whether both sets of the pair are clear.
-    pub is_bracketed: bool,
-    /// Where it is, and the ends of its interval, as places on the axis.
+    /// Where it is, and the ends of its interval, which may have none.
     pub(crate) place: f64,
     pub(crate) interval: Option<[f64; 2]>,
     /// Width of the interval over that wanted.
     pub error: f64,
+    /// The row between two neighbours that is wanted next, if these are too far from each other.
+    pub wanted_row: Option<u64>,
+    is_bracketed: bool,
 }
 
 impl<'a> Edge<'a> {
-    /// Between the first and the last of these sets, which are clear, the others not.
-    fn between(sets: &[Placed<'a>], width: f64) -> Option<Self> {
-        let bracket = [*sets.first()?, *sets.last()?];
-        let excess = |set: &Placed<'_>| set.sample.map_or(0.0, |sample| bracket[1].side * sample.excess);
+    /// Between two of the sets of a line, all in order; they are clear, and those in between are not. `width` is wanted.
+    fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64) -> Option<Self> {
+        let bracket = [all[first], all[last]];
+        let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
-        let crossings = sets.windows(2).filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
-        let steepest = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
-        let pair = [steepest[0], steepest[1]];
-        let (at, ends) = crossing(pair[0].sample?, pair[1].sample?);
-        let place = |share: f64| pair[0].place + share * (pair[1].place - pair[0].place);
-        let is_bracketed = pair.iter().all(|set| set.side != 0.0);
-        let interval = if is_bracketed { Some([0.0, 1.0]) } else { ends }.map(|ends| ends.map(place));
-        let error = interval.map_or(f64::INFINITY, |[low, high]| (high - low) / width);
-        Some(Self { pair, bracket, is_bracketed, place: place(at), interval, error })
-    }
-
-    fn gap(&self) -> u64 {
-        self.pair[1].row - self.pair[0].row
-    }
-
-    /// The row of the set that is wanted next between the two, if these are too far from each other.
-    pub fn wanted_row(&self) -> Option<u64> {
-        let [low, high] = self.pair;
-        if self.is_bracketed {
-            return (self.gap() > 1).then(|| low.row + self.gap() / 2);
+        let crossings = all[first..=last].windows(2).filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
+        let pair = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
+        let ends = [pair[0].row, pair[1].row].map(|row| row as f64);
+        if pair.iter().all(|set| set.side != 0.0) {
+            let gap = pair[1].row - pair[0].row;
+            let wanted_row = (gap > 1).then(|| pair[0].row + gap / 2);
+            let place = ends[0] - gap as f64 * excess(&pair[0]) / rise(&pair);
+            let (interval, error) = (Some(ends), gap as f64 / width);
+            return Some(Self { sets: pair.to_vec(), bracket, place, interval, error, wanted_row, is_bracketed: true });
         }
-        let share = (self.place - low.place) / (high.place - low.place);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number of rows")]
-        let row = low.row + (share * self.gap() as f64).round() as u64;
-        (self.gap() > WINDOW).then(|| row.clamp(low.row + WINDOW - 1, high.row - (WINDOW - 1)))
+        let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= WINDOW as f64;
+        let mut place = fit(pair, ends[0])?.crossing;
+        for _ in 0..MOVES {
+            let window: Vec<Placed<'_>> = all.iter().filter(|set| near(set, place)).copied().collect();
+            let Some(line) = fit(&window, place).filter(|line| line.slope * bracket[1].side > 0.0) else { break };
+            place = line.crossing.clamp(bracket[0].row as f64, bracket[1].row as f64);
+        }
+        let above = all.partition_point(|set| set.row as f64 <= place).clamp(1, all.len() - 1);
+        let (low, high) = (all[above - 1].row, all[above].row);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two rows")]
+        let nearest = place.round() as u64;
+        let wanted_row = (high - low > WINDOW).then(|| nearest.clamp(low + WINDOW - 1, high - (WINDOW - 1)));
+        let sets: Vec<Placed<'_>> =
+            all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
+        let Fit { crossing, interval, .. } = fit(&sets, place)?;
+        let error = interval.map_or(f64::INFINITY, |[low, high]| (high - low) / width);
+        Some(Self { sets, bracket, place: crossing, interval, error, wanted_row, is_bracketed: false })
+    }
+
+    /// Fewest and most seeds of its sets.
+    pub fn seeds(&self) -> [u64; 2] {
+        let seeds = self.sets.iter().map(|set| set.set.seeds);
+        seeds.fold([u64::MAX, 0], |[fewest, most], seeds| [fewest.min(seeds), most.max(seeds)])
     }
 
     /// Whether its interval is as narrow as is wanted.
     pub fn is_done(&self) -> bool {
-        self.wanted_row().is_none() && (self.is_bracketed || self.error <= 1.0)
+        let [fewest, most] = self.seeds();
+        self.wanted_row.is_none() && (self.is_bracketed || (self.error <= 1.0 && fewest == most))
     }
 }
 
-/// Where the line through two samples crosses zero, as a share of the way between them, and the ends of its interval: none
-/// if the slope may be zero.
-fn crossing(low: &Sample, high: &Sample) -> (f64, Option<[f64; 2]>) {
-    let (begin, slope) = (low.excess, high.excess - low.excess);
-    let slopes = std::array::from_fn(|group| high.influences[group] - low.influences[group]);
-    let factor = quantile(low.concentration.max(high.concentration));
-    // All shares x at which the line is no more than t standard deviations away: a + 2 b x + c x² <= 0.
-    let a = begin * begin - factor * product(&low.influences, &low.influences);
-    let b = begin * slope - factor * product(&low.influences, &slopes);
-    let c = slope * slope - factor * product(&slopes, &slopes);
+/// A line through the samples of sets.
+struct Fit {
+    slope: f64,
+    /// Where it crosses zero, and the ends of the interval of that: none if the slope may be zero.
+    crossing: f64,
+    interval: Option<[f64; 2]>,
+}
+
+/// By least squares, sets weighted by their seeds; `None` for less than two rows.
+fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
+    let points = || sets.iter().map(|set| (set.row as f64 - origin, set.set.seeds as f64, set.sample));
+    let total: f64 = points().map(|(_, weight, _)| weight).sum();
+    let mean = points().map(|(x, weight, _)| weight * x).sum::<f64>() / total;
+    let moment: f64 = points().map(|(x, weight, _)| weight * (x - mean) * (x - mean)).sum();
+    let (mut begin, mut slope) = ((0.0, [0.0; GROUPS]), (0.0, [0.0; GROUPS]));
+    let mut concentration: f64 = 0.0;
+    for (x, weight, sample) in points() {
+        let of_slope = weight * (x - mean) / moment;
+        for (sum, factor) in [(&mut begin, weight / total - mean * of_slope), (&mut slope, of_slope)] {
+            sum.0 += factor * sample.excess;
+            sum.1.iter_mut().zip(sample.influences).for_each(|(sum, influence)| *sum += factor * influence);
+        }
+        concentration = concentration.max(sample.concentration);
+    }
+    let factor = LOOKS * LOOKS * quantile(concentration);
+    // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
+    let a = begin.0 * begin.0 - factor * product(&begin.1, &begin.1);
+    let b = begin.0 * slope.0 - factor * product(&begin.1, &slope.1);
+    let c = slope.0 * slope.0 - factor * product(&slope.1, &slope.1);
     let root = (b * b - a * c).max(0.0).sqrt();
-    (-begin / slope, (c > 0.0).then(|| [-(b + root) / c, (root - b) / c]))
+    let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
+    (moment > 0.0).then(|| Fit { slope: slope.0, crossing: origin - begin.0 / slope.0, interval })
 }
 
 /// The rows of sets, in the order of the grid, for each statistic.
@@ -206,60 +240,71 @@ pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64,
         let row = std::mem::take(&mut rows[refinement.axis]);
         rows_of.entry(rows).or_default().push((row, set));
     }
-    let width = if refinement.is_log { libm::log1p(refinement.to) } else { refinement.to };
-    let line = |rows: &Vec<u64>, of_row: &[(u64, &'a SetOfEdges)], statistic: usize| {
-        let placed = |&(row, set): &(u64, &'a SetOfEdges)| {
-            let (_, value) = sweep.value_at(refinement.axis, row)?;
-            let sample = set.samples.get(statistic).and_then(Option::as_ref);
-            let place = if refinement.is_log { libm::log(value) } else { value };
-            Some(Placed { row, place, side: sample.map_or(0.0, Sample::side), sample, set })
-        };
-        let sets: Vec<Placed<'_>> = of_row.iter().filter_map(placed).collect();
+    let to = if refinement.is_log { libm::log1p(refinement.to) } else { refinement.to };
+    let width = scale(sweep, refinement).map_or(f64::NAN, |(_, step)| to / step);
+    let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
         // Without a value, a set says nothing.
-        let known: Vec<Placed<'_>> = sets.iter().copied().filter(|set| set.sample.is_some()).collect();
+        let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
+            let sample = set.samples.get(statistic)?.as_ref()?;
+            Some(Placed { row, side: sample.side(), sample, set })
+        };
+        let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
         let clear: Vec<usize> = (0..known.len()).filter(|&index| known[index].side != 0.0).collect();
         let opposite = clear.windows(2).filter(|pair| known[pair[0]].side != known[pair[1]].side);
-        let edges = opposite.filter_map(|pair| Edge::between(&known[pair[0]..=pair[1]], width)).collect();
-        Line { rows: rows.clone(), statistic, sets, edges }
+        let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width)).collect();
+        Line { rows: rows.clone(), statistic, sets: sets.clone(), edges }
     };
     let statistics = 0..refinement.by.len();
-    rows_of.iter().flat_map(|(rows, sets)| statistics.clone().map(|number| line(rows, sets, number))).collect()
+    rows_of.iter().flat_map(|(rows, sets)| statistics.clone().map(move |number| line(rows, sets, number))).collect()
+}
+
+/// The value at the first row of the refined axis, and the step of rows; of their logarithms on a logarithmic axis.
+fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
+    let last = sweep.row_counts()[refinement.axis] - 1;
+    let [first, end] = [0, last].map(|row| {
+        let (_, value) = sweep.value_at(refinement.axis, row)?;
+        Some(if refinement.is_log { libm::log(value) } else { value })
+    });
+    Some((first?, (end? - first?) / last as f64))
 }
 
 /// The table of edges of a directory.
 pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, DatasetError> {
     let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
+    let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
+    let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
     let mut found = Vec::new();
     for Line { statistic, sets, edges, .. } in lines(sweep, refinement, &sets) {
-        let value = |place: f64| if refinement.is_log { libm::exp(place) } else { place };
-        let row = |bracket: [Placed<'_>; 2], edge: Option<&Edge<'_>>| {
-            let ends = bracket.map(|set| sweep.value_at(refinement.axis, set.row));
+        let row = |bracket: [(u64, &SetOfEdges); 2], edge: Option<&Edge<'_>>| {
+            let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
             let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
-            let is_capped = |edge: &Edge<'_>| edge.pair.iter().all(|set| set.set.seeds >= sweep.seed_count());
-            let jobs = |sets: &[Placed<'_>]| sets.iter().map(|set| set.set.seeds).sum();
+            let (_, at_low) = bracket[0];
+            let seeds = |set: &SetOfEdges| set.seeds;
+            let interval = edge.and_then(|edge| edge.interval);
             Some(EdgeRow {
-                set_id: bracket[0].set.set_id.clone(),
-                parameters: Selected::new(bracket[0].set.parameters.clone()),
+                set_id: at_low.set_id.clone(),
+                parameters: Selected::new(at_low.parameters.clone()),
                 axis: axis.to_owned(),
                 statistic: refinement.name_of(statistic),
                 threshold: refinement.threshold,
                 edge: edge.map(|edge| value(edge.place)),
-                edge_interval: edge
-                    .and_then(|edge| edge.interval)
-                    .map(|[low, high]| Interval { low: value(low), high: value(high) }),
+                edge_interval: interval.map(|[low, high]| Interval { low: value(low), high: value(high) }),
                 rises: edge.map(|edge| edge.bracket[1].side > 0.0),
-                jobs: edge.map_or_else(|| jobs(&sets), |edge| jobs(&edge.pair)),
+                jobs: match edge {
+                    Some(edge) => edge.sets.iter().map(|set| seeds(set.set)).sum(),
+                    None => sets.iter().map(|(_, set)| seeds(set)).sum(),
+                },
                 bracket_low,
                 bracket_high,
                 ended: match edge {
                     None => Ended::NoCrossing,
                     Some(edge) if edge.is_done() => Ended::Width,
-                    Some(edge) if edge.wanted_row().is_none() && is_capped(edge) => Ended::Seeds,
+                    Some(edge) if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() => Ended::Seeds,
                     Some(_) => Ended::Jobs,
                 },
             })
         };
-        found.extend(edges.iter().filter_map(|edge| row(edge.bracket, Some(edge))));
+        found.extend(edges.iter().filter_map(|edge| row(edge.bracket.map(|set| (set.row, set.set)), Some(edge))));
         if let (true, Some(&first), Some(&last)) = (edges.is_empty(), sets.first(), sets.last()) {
             found.extend(row([first, last], None));
         }

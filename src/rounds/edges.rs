@@ -1,5 +1,5 @@
-//! What an edge gets next: sets between those that it lies between, until these are close; then seeds of the two, until the
-//! interval is as narrow as is wanted, by the rule of [`precision`](super::precision). All edges of all rows share the jobs.
+//! What an edge gets next: a set between its neighbours, until these are close; then seeds of the sets near it, all as many,
+//! until its interval is as narrow as is wanted, by the rule of [`precision`](super::precision). All edges share the jobs.
 
 use super::precision::seeds_for;
 use crate::reduce::{Line, SetOfEdges, lines};
@@ -18,12 +18,13 @@ pub(super) fn decide(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64
             sweep.set_at(&rows)
         };
         for edge in edges.iter().filter(|edge| !edge.is_done()) {
-            let wanted: Vec<(u64, u64)> = if let Some(row) = edge.wanted_row() {
+            let wanted: Vec<(u64, u64)> = if let Some(row) = edge.wanted_row {
                 at(row).map(|set| (set, from)).into_iter().collect()
             } else {
-                let fewest = edge.pair.map(|set| set.set.seeds).into_iter().min().unwrap_or_default();
-                let next = seeds_for(fewest, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(fewest);
-                edge.pair.iter().filter_map(|set| Some((at(set.row)?, next))).collect()
+                let [fewest, most] = edge.seeds();
+                let next = || seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most);
+                let seeds = if fewest < most { most } else { next() };
+                edge.sets.iter().filter_map(|set| Some((at(set.row)?, seeds))).collect()
             };
             let missing = |&(set, number): &(u64, u64)| number.saturating_sub(seeds.get(&set).copied().unwrap_or(0));
             let jobs: u64 = wanted.iter().map(missing).sum();
