@@ -1,10 +1,10 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
-use super::axis::{Axis, bounds, is_wide};
+use super::axis::{Axis, DECADES};
 use super::dependence::{label, number};
 use super::frame::Layout;
 use super::legend::{Mark, entry};
-use super::panel::{self, Ends, Layer, Panel};
+use super::panel::{self, Layer, Panel};
 use super::picture::{Dot, Picture, Stroke};
 use super::sets::{FREQUENCY, MICROMETRES, ascending};
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
@@ -12,8 +12,6 @@ use super::values::FREQUENCY_COLUMN;
 use crate::model::Symbol;
 use crate::reduce::EdgeRow;
 use crate::table::value::Shortest;
-
-const MARGINS: Ends = (0.8, 1.25);
 
 /// Label of an axis, and the factor to its unit.
 fn axis_of(key: &str) -> (String, f64) {
@@ -48,18 +46,10 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
         let interval = edge.edge_interval?;
         Some((place(edge)?.0, (y_factor * interval.low, y_factor * interval.high)))
     };
+    let places = || edges.iter().filter_map(place);
     let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
-    let x_ends = bounds(edges.iter().filter_map(place).map(|place| place.0))?;
-    let y_ends = bounds(edges.iter().filter_map(place).map(|place| place.1).chain(ends))?;
-    let scale = |label: &str, ends: Ends, narrow: fn(&str, Ends) -> Axis| {
-        let wide = || Axis::logarithmic(label, MARGINS.0 * ends.0, MARGINS.1 * ends.1);
-        if is_wide(ends) { wide() } else { narrow(label, ends) }
-    };
-    let x = scale(&x_label, x_ends, |label, (low, high)| {
-        let margin = 0.05 * (high - low);
-        Axis::linear(label, low - margin, high + margin)
-    });
-    let y = scale(&y_label, y_ends, |label, (low, high)| Axis::rounded(label, low, high));
+    let x = Axis::of_data(&x_label, places().map(|place| place.0), DECADES, f64::INFINITY)?;
+    let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends), DECADES, f64::INFINITY)?;
     let mut statistics: Vec<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
     statistics.sort_unstable();
     statistics.dedup();

@@ -12,7 +12,7 @@
 
 use super::confidence::student;
 use super::drive_alone::Explained;
-use super::gather::{Gathered, Gathering, MAX_SLIPS};
+use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::results::Results;
@@ -68,7 +68,7 @@ tables! { EdgeRow = "edges", "One row per edge, and per row of sets without one,
 /// A statistic less its threshold, and what each group of seeds adds to it.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    excess: f64,
+    pub(crate) excess: f64,
     /// Of the mean of independent values: the sums of their deviations from it, over their number.
     influences: [f64; GROUPS],
     /// Sum of the squared shares of the groups in all jobs.
@@ -89,7 +89,7 @@ impl Sample {
     }
 
     /// Below the threshold, above it, or equal if that is not clear.
-    fn side(&self) -> f64 {
+    pub(crate) fn side(&self) -> f64 {
         let half = (quantile(self.concentration) * product(&self.influences, &self.influences)).sqrt();
         if self.excess.abs() > half { self.excess.signum() } else { 0.0 }
     }
@@ -275,25 +275,21 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
     let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
     let mut found = Vec::new();
     for Line { statistic, sets, edges, .. } in lines(sweep, refinement, &sets) {
-        let row = |bracket: [(u64, &SetOfEdges); 2], edge: Option<&Edge<'_>>| {
+        let row = |bracket: [(u64, &SetOfEdges); 2], used: Vec<&SetOfEdges>, edge: Option<&Edge<'_>>| {
             let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
             let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
-            let (_, at_low) = bracket[0];
-            let seeds = |set: &SetOfEdges| set.seeds;
+            let SetOfEdges { set_id, parameters, .. } = bracket[0].1.clone();
             let interval = edge.and_then(|edge| edge.interval);
             Some(EdgeRow {
-                set_id: at_low.set_id.clone(),
-                parameters: Selected::new(at_low.parameters.clone()),
+                set_id,
+                parameters: Selected::new(parameters),
                 axis: axis.to_owned(),
                 statistic: refinement.name_of(statistic),
                 threshold: refinement.threshold,
                 edge: edge.map(|edge| value(edge.place)),
                 edge_interval: interval.map(|[low, high]| Interval { low: value(low), high: value(high) }),
                 rises: edge.map(|edge| edge.bracket[1].side > 0.0),
-                jobs: match edge {
-                    Some(edge) => edge.sets.iter().map(|set| seeds(set.set)).sum(),
-                    None => sets.iter().map(|(_, set)| seeds(set)).sum(),
-                },
+                jobs: used.into_iter().map(|set| set.seeds).sum(),
                 bracket_low,
                 bracket_high,
                 ended: match edge {
@@ -304,27 +300,24 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
                 },
             })
         };
-        found.extend(edges.iter().filter_map(|edge| row(edge.bracket.map(|set| (set.row, set.set)), Some(edge))));
+        for edge in &edges {
+            let used = edge.sets.iter().map(|set| set.set).collect();
+            found.extend(row(edge.bracket.map(|set| (set.row, set.set)), used, Some(edge)));
+        }
         if let (true, Some(&first), Some(&last)) = (edges.is_empty(), sets.first(), sets.last()) {
-            found.extend(row([first, last], None));
+            found.extend(row([first, last], sets.iter().map(|(_, set)| *set).collect(), None));
         }
     }
     Ok(found)
 }
 
-/// The sets that the rounds of a directory have chosen, by their numbers, controls left out.
+/// The sets that the rounds of a directory have chosen, by their numbers.
 pub fn sets_of_edges(
     results: &Results<'_>,
     refinement: &Refinement,
 ) -> Result<BTreeMap<u64, SetOfEdges>, DatasetError> {
-    let (sweep, chosen) = (results.sweep(), results.chosen());
-    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
     let mut sets = BTreeMap::new();
-    Gathering::of_jobs(results, &is_chosen)?.each_gathered(MAX_SLIPS, u64::MAX, |set, explained| {
-        let number = sweep.set_with(&set.jobs.parameters).filter(|&number| number < sweep.point_count());
-        sets.extend(number.map(|number| (number, of_set(&set, &explained, refinement))));
-        Ok(())
-    })?;
+    each_chosen(results, |number, set, explained| drop(sets.insert(number, of_set(&set, explained, refinement))))?;
     Ok(sets)
 }
 

@@ -14,9 +14,9 @@ use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
+use crate::results::Results;
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
-use crate::results::{Results, ResultsError};
 use crate::sweep::Sweep;
 use crate::table::columns::columns;
 use crate::table::file::{Dataset, DatasetError};
@@ -51,18 +51,26 @@ columns! {
 /// Which jobs are wanted, by their parameters.
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
-/// The sets of the wanted jobs, in the order of their parameters.
-pub fn reduce_jobs(
-    results: &Results<'_>,
-    is_wanted: impl Fn(&Parameters) -> bool,
-) -> Result<Vec<SetRow>, ResultsError> {
-    let gathered = Gathering::of_jobs(results, &is_wanted)?;
-    let mut rows = Vec::new();
-    gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
-        rows.push(set.row);
-        Ok(())
-    })?;
+/// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
+pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, DatasetError> {
+    let mut rows = BTreeMap::new();
+    each_chosen(results, |number, set, explained| drop(rows.insert(number, set.finish_with(explained).0.row)))?;
     Ok(rows)
+}
+
+/// Hands on these sets before anything is computed, each with what the drive alone explains.
+pub(super) fn each_chosen(
+    results: &Results<'_>,
+    mut gathered: impl FnMut(u64, Gathered, &Explained),
+) -> Result<(), DatasetError> {
+    let (sweep, chosen) = (results.sweep(), results.chosen());
+    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
+    Gathering::of_jobs(results, &is_chosen)?.each_gathered(MAX_SLIPS, u64::MAX, |set, explained| {
+        if let Some(number) = sweep.set_with(&set.jobs.parameters).filter(|&number| number < sweep.point_count()) {
+            gathered(number, set, explained);
+        }
+        Ok(())
+    })
 }
 
 /// The jobs of a directory, whose slips are still to be gathered.
@@ -101,22 +109,21 @@ impl<'a> Gathering<'a> {
         mut finished: impl FnMut(FinishedSet, Vec<(u64, Point)>) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
         self.each_gathered(max_slips, spacing, |set, explained| {
-            let (set, points) = set.finish_with(&explained);
+            let (set, points) = set.finish_with(explained);
             finished(set, points)
         })
     }
 
-    /// The same before anything is computed, with what the drive alone explains.
-    pub(super) fn each_gathered(
+    fn each_gathered(
         self,
         max_slips: u64,
         spacing: u64,
-        mut gathered: impl FnMut(Gathered, Explained) -> Result<(), DatasetError>,
+        mut gathered: impl FnMut(Gathered, &Explained) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
         for chunk in chunks(self.sets, max_slips) {
             for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
                 let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
-                gathered(set, explained)?;
+                gathered(set, &explained)?;
             }
         }
         Ok(())

@@ -28,7 +28,7 @@ pub(crate) use confidence::mean_of;
 #[cfg(test)]
 pub(crate) use edges::{Edge, GROUPS, Sample};
 pub use edges::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
-pub use gather::reduce_jobs;
+pub use gather::reduce_chosen;
 #[cfg(test)]
 pub(crate) use gather::{PooledJob, pool_of, row_of};
 pub use histogram::HistogramBin;

@@ -14,10 +14,9 @@ mod precision;
 #[cfg(test)]
 mod tests;
 
-use crate::model::Parameters;
-use crate::reduce::{SetRow, reduce_jobs, sets_of_edges};
+use crate::reduce::{SetRow, reduce_chosen, sets_of_edges};
 use crate::results::{Results, ResultsError};
-use crate::sweep::{Precision, Round, Rounds, Standing, Sweep};
+use crate::sweep::{Precision, Round, Standing, Sweep};
 use std::collections::BTreeMap;
 
 /// The round after those that a directory has. All their jobs must be done.
@@ -26,12 +25,8 @@ pub fn next(results: &Results<'_>) -> Result<Round, ResultsError> {
     if let Some(refinement) = sweep.refinement() {
         return Ok(edges::decide(sweep, refinement, &sets_of_edges(results, refinement)?));
     }
-    let Some(Rounds { precision: Some(precision), .. }) = sweep.rounds() else { return Ok(Round::default()) };
-    let chosen = results.chosen();
-    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
-    let numbered =
-        |row: SetRow| Some((sweep.set_with(&row.parameters.parameters)?, row)).filter(|(_, row)| !row.is_control);
-    Ok(decide(sweep, precision, &reduce_jobs(results, is_chosen)?.into_iter().filter_map(numbered).collect()))
+    let precision = sweep.rounds().and_then(|rounds| rounds.precision.as_ref());
+    precision.map_or_else(|| Ok(Round::default()), |known| Ok(decide(sweep, known, &reduce_chosen(results)?)))
 }
 
 /// The round after these sets, by their numbers.
