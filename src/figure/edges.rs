@@ -12,12 +12,12 @@ use super::values::FREQUENCY_COLUMN;
 use crate::model::Symbol;
 use crate::reduce::EdgeRow;
 use crate::table::value::Shortest;
+use std::collections::BTreeSet;
 
 /// Label of an axis, and the factor to its unit.
 fn axis_of(key: &str) -> (String, f64) {
     match (key, Symbol::from_key(key)) {
         (FREQUENCY_COLUMN, _) => (FREQUENCY.to_owned(), 1.0),
-        ("eta", _) => ("η".to_owned(), 1.0),
         (_, Some(Symbol::Delta)) => ("Amplitude Δ (µm)".to_owned(), MICROMETRES),
         (_, Some(symbol)) => (label(symbol), 1.0),
         (key, None) => (key.to_owned(), 1.0),
@@ -50,9 +50,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
     let x = Axis::of_data(&x_label, places().map(|place| place.0), DECADES, f64::INFINITY)?;
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends), DECADES, f64::INFINITY)?;
-    let mut statistics: Vec<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
-    statistics.sort_unstable();
-    statistics.dedup();
+    let statistics: BTreeSet<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
     let (mut legend, mut layers) = (Vec::new(), Vec::new());
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);

@@ -16,7 +16,7 @@ use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::results::Results;
-use crate::sweep::{AllButSeed, Interval, Refinement, Sweep};
+use crate::sweep::{AllButSeed, Interval, Refinement, Statistic, Sweep};
 use crate::table::columns::{columns, tables};
 use crate::table::file::DatasetError;
 use crate::table::value::words;
@@ -26,8 +26,7 @@ use std::collections::BTreeMap;
 pub const GROUPS: usize = 30;
 /// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width.
 const WINDOW: u64 = 3;
-/// What the interval of a line is widened by. Windows whose line is steep by chance end sooner, and so do those that are
-/// looked at again and again: measured, as in docs/rounds.md.
+/// What the interval of a line is widened by, as windows whose line is steep by chance end first: measured, docs/rounds.md.
 const LOOKS: f64 = 1.2;
 /// How often the window is moved to where its line crosses.
 const MOVES: usize = 3;
@@ -130,7 +129,7 @@ pub struct Placed<'a> {
 pub struct Line<'a> {
     /// Rows of all axes, that of the refined one being 0.
     pub rows: Vec<u64>,
-    statistic: usize,
+    statistic: Statistic,
     sets: Vec<(u64, &'a SetOfEdges)>,
     pub edges: Vec<Edge<'a>>,
 }
@@ -181,8 +180,8 @@ impl<'a> Edge<'a> {
         let sets: Vec<Placed<'_>> =
             all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
         let Fit { crossing, interval, .. } = fit(&sets, place)?;
-        let error = interval.map_or(f64::INFINITY, |[low, high]| (high - low) / width);
-        Some(Self { sets, bracket, place: crossing, interval, error, wanted_row, is_bracketed: false })
+        let (place, error) = interval.map_or((place, f64::INFINITY), |[low, high]| (crossing, (high - low) / width));
+        Some(Self { sets, bracket, place, interval, error, wanted_row, is_bracketed: false })
     }
 
     /// Fewest and most seeds of its sets.
@@ -252,7 +251,7 @@ pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64,
         let clear: Vec<usize> = (0..known.len()).filter(|&index| known[index].side != 0.0).collect();
         let opposite = clear.windows(2).filter(|pair| known[pair[0]].side != known[pair[1]].side);
         let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width)).collect();
-        Line { rows: rows.clone(), statistic, sets: sets.clone(), edges }
+        Line { rows: rows.clone(), statistic: refinement.by[statistic], sets: sets.clone(), edges }
     };
     let statistics = 0..refinement.by.len();
     rows_of.iter().flat_map(|(rows, sets)| statistics.clone().map(move |number| line(rows, sets, number))).collect()
@@ -274,7 +273,7 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
     let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
     let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
     let mut found = Vec::new();
-    for Line { statistic, sets, edges, .. } in lines(sweep, refinement, &sets) {
+    for Line { statistic: Statistic { key, .. }, sets, edges, .. } in lines(sweep, refinement, &sets) {
         let row = |bracket: [(u64, &SetOfEdges); 2], used: Vec<&SetOfEdges>, edge: Option<&Edge<'_>>| {
             let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
             let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
@@ -284,7 +283,7 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
                 set_id,
                 parameters: Selected::new(parameters),
                 axis: axis.to_owned(),
-                statistic: refinement.name_of(statistic),
+                statistic: refinement.periods.map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
                 threshold: refinement.threshold,
                 edge: edge.map(|edge| value(edge.place)),
                 edge_interval: interval.map(|[low, high]| Interval { low: value(low), high: value(high) }),

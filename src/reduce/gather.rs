@@ -65,7 +65,7 @@ pub(super) fn each_chosen(
 ) -> Result<(), DatasetError> {
     let (sweep, chosen) = (results.sweep(), results.chosen());
     let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
-    Gathering::of_jobs(results, &is_chosen)?.each_gathered(MAX_SLIPS, u64::MAX, |set, explained| {
+    Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
         if let Some(number) = sweep.set_with(&set.jobs.parameters).filter(|&number| number < sweep.point_count()) {
             gathered(number, set, explained);
         }
@@ -101,20 +101,9 @@ impl<'a> Gathering<'a> {
         Ok(Self { sets, slips, is_wanted, sweep, controls })
     }
 
-    /// Hands on set after set, each with every `spacing`-th slip of the table as a point and its place in the table.
+    /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
+    /// place in the table, and with what the drive alone explains.
     pub(super) fn each_set(
-        self,
-        max_slips: u64,
-        spacing: u64,
-        mut finished: impl FnMut(FinishedSet, Vec<(u64, Point)>) -> Result<(), DatasetError>,
-    ) -> Result<(), DatasetError> {
-        self.each_gathered(max_slips, spacing, |set, explained| {
-            let (set, points) = set.finish_with(explained);
-            finished(set, points)
-        })
-    }
-
-    fn each_gathered(
         self,
         max_slips: u64,
         spacing: u64,

@@ -93,7 +93,8 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
-    gathering.each_set(max_slips, spacing(total), |set, points| {
+    gathering.each_set(max_slips, spacing(total), |set, explained| {
+        let (set, points) = set.finish_with(explained);
         let row = &set.row;
         set_writer.push(row)?;
         if row.is_control {

@@ -161,19 +161,14 @@ impl Pool {
     }
 }
 
-#[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
-fn number(row: &SetRow, column: &str) -> Option<f64> {
-    row.column(column, |value| value.number()).flatten()
-}
-
 fn ends(row: &SetRow, statistic: Statistic) -> Option<[f64; 2]> {
-    let [low, high] = ["low", "high"].map(|end| number(row, &format!("{}_{end}", statistic.key)));
+    let [low, high] = ["low", "high"].map(|end| row.number(&format!("{}_{end}", statistic.key)));
     Some([low?, high?])
 }
 
 /// Whether the interval of a statistic holds its true value; of an angle, any turn of it.
 fn holds(row: &SetRow, truth: &SetRow, statistic: Statistic) -> bool {
-    let (Some([low, high]), Some(truth)) = (ends(row, statistic), number(truth, statistic.key)) else { return false };
+    let (Some([low, high]), Some(truth)) = (ends(row, statistic), truth.number(statistic.key)) else { return false };
     let turns: &[f64] = if statistic.kind == StatisticKind::Angle { &[-TAU, 0.0, TAU] } else { &[0.0] };
     turns.iter().any(|turn| low <= truth + turn && truth + turn <= high)
 }
@@ -248,7 +243,7 @@ fn coverage_is_measured() {
     for statistic in STATISTICS.iter().copied().filter(is_there) {
         let mut all = Vec::new();
         for (set, locking) in ["weak", "middle", "strong"].into_iter().enumerate() {
-            let truth = number(&pools[0].truth(set), statistic.key).unwrap();
+            let truth = pools[0].truth(set).number(statistic.key).unwrap();
             let found = cells(&pools, set, statistic);
             lines.push(format!("| `{}` | {locking} | {truth:.4} | {} |", statistic.key, shown(&found)));
             all.push(found);

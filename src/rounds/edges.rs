@@ -9,42 +9,37 @@ use std::collections::BTreeMap;
 /// The round after these sets, by their numbers.
 pub(super) fn decide(sweep: &Sweep, refinement: &Refinement, sets: &BTreeMap<u64, SetOfEdges>) -> Round {
     let from = sweep.rounds().map_or(MIN_SEEDS, |rounds| *rounds.seeds.start());
+    let had = |set: u64| sets.get(&set).map_or(0, |set| set.seeds);
     let mut room = refinement.max_jobs.saturating_sub(sets.values().map(|set| set.seeds).sum());
-    let mut seeds: BTreeMap<u64, u64> = sets.iter().map(|(&number, set)| (number, set.seeds)).collect();
-    let mut standing = Standing::default();
+    let (mut wanted, mut standing) = (BTreeMap::new(), Standing::default());
     for Line { mut rows, edges, .. } in lines(sweep, refinement, sets) {
-        let mut at = |row: u64| {
-            rows[refinement.axis] = row;
-            sweep.set_at(&rows)
-        };
         for edge in edges.iter().filter(|edge| !edge.is_done()) {
-            let wanted: Vec<(u64, u64)> = if let Some(row) = edge.wanted_row {
-                at(row).map(|set| (set, from)).into_iter().collect()
-            } else {
-                let [fewest, most] = edge.seeds();
-                let next = || seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most);
-                let seeds = if fewest < most { most } else { next() };
-                edge.sets.iter().filter_map(|set| Some((at(set.row)?, seeds))).collect()
+            let [fewest, most] = edge.seeds();
+            let seeds = match edge.wanted_row {
+                Some(_) => from,
+                None if fewest < most => most,
+                None => seeds_for(most, edge.error, MIN_SEEDS, sweep.seed_count()).unwrap_or(most),
             };
-            let missing = |&(set, number): &(u64, u64)| number.saturating_sub(seeds.get(&set).copied().unwrap_or(0));
-            let jobs: u64 = wanted.iter().map(missing).sum();
-            // What another edge of this round has asked for comes anyway.
-            let is_asked = |(set, _): &(u64, u64)| seeds.get(set) > sets.get(set).map(|set| &set.seeds);
-            if jobs > room || (jobs == 0 && !wanted.iter().any(is_asked)) {
+            let at = edge.wanted_row.map_or_else(|| edge.sets.iter().map(|set| set.row).collect(), |row| vec![row]);
+            let set = |row: u64| {
+                rows[refinement.axis] = row;
+                sweep.set_at(&rows).filter(|&set| had(set) < seeds)
+            };
+            let new: Vec<u64> = at.into_iter().filter_map(set).collect();
+            let jobs: u64 = new.iter().map(|&set| seeds.saturating_sub(*wanted.get(&set).unwrap_or(&had(set)))).sum();
+            if new.is_empty() || jobs > room {
                 standing.edges_capped += 1;
                 continue;
             }
             room -= jobs;
-            for (set, number) in wanted {
-                let known = seeds.entry(set).or_default();
-                *known = number.max(*known);
+            for set in new {
+                let known = wanted.entry(set).or_default();
+                *known = seeds.max(*known);
             }
         }
     }
-    let had = |set: &u64| sets.get(set).map_or(0, |set| set.seeds);
-    let new: Vec<(u64, u64)> = seeds.into_iter().filter(|(set, number)| *number > had(set)).collect();
-    standing.sets_open = new.len() as u64;
-    standing.sets_done = sets.keys().filter(|set| !new.iter().any(|(number, _)| number == *set)).count() as u64;
-    let points = new.iter().flat_map(|(set, number)| sweep.points_of_set(*set, had(set)..*number)).collect();
+    standing.sets_open = wanted.len() as u64;
+    standing.sets_done = sets.keys().filter(|set| !wanted.contains_key(set)).count() as u64;
+    let points = wanted.iter().flat_map(|(&set, &seeds)| sweep.points_of_set(set, had(set)..seeds)).collect();
     Round { points: sweep.with_controls(points), standing }
 }

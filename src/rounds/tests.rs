@@ -1,7 +1,7 @@
 //! Rounds of sweeps that look for edges, from the first to the end, with responses whose edges are known.
 
 use super::edges::decide;
-use crate::reduce::{GROUPS, Line, Sample, SetOfEdges, lines};
+use crate::reduce::{Edge, GROUPS, Line, Sample, SetOfEdges, lines};
 use crate::sweep::{Round, Sweep};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -75,11 +75,13 @@ impl<F: Fn(f64, f64) -> Option<f64>> Noisy<F> {
     }
 }
 
-/// Where the edges of each row lie, with their intervals, and whether these are as narrow as is wanted.
+/// Where on a linear axis the edges of each row lie, with their intervals, and whether these are as narrow as is wanted.
 fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], bool)>> {
-    let of_edge = |edge: &crate::reduce::Edge<'_>| {
+    let axis = sweep.refinement().unwrap().axis;
+    let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).unwrap().1);
+    let of_edge = |edge: &Edge<'_>| {
         let [low, high] = edge.interval.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        ([low, edge.place, high], edge.is_done())
+        ([low, edge.place, high].map(|row| first + row * (second - first)), edge.is_done())
     };
     let lines = lines(sweep, sweep.refinement().unwrap(), sets);
     lines.iter().map(|Line { edges, .. }| edges.iter().map(of_edge).collect()).collect()
@@ -200,8 +202,7 @@ fn edges_up_and_down_are_found_and_sets_without_a_value_are_no_side() {
     };
     let (_, sets) = noisy(mean).rounds(&sweep);
     let [of_row] = &found(&sweep, &sets)[..] else { panic!() };
-    let step = 0.5e-6 / 64.0;
-    let places: Vec<f64> = of_row.iter().map(|([_, place, _], _)| 1e6 * (0.5e-6 + step * place)).collect();
+    let places: Vec<f64> = of_row.iter().map(|([_, place, _], _)| 1e6 * place).collect();
     assert!(places.iter().zip([1.23, 2.71, 3.3]).all(|(found, edge)| (found - edge).abs() < 0.02), "{places:?}");
     assert!(places.len() == 3 && of_row.iter().all(|(_, is_done)| *is_done));
     let (rounds, _) = noisy(|_, _| Some(1.0)).rounds(&sweep);
@@ -212,7 +213,7 @@ fn edges_up_and_down_are_found_and_sets_without_a_value_are_no_side() {
 
 #[test]
 fn what_ends_an_edge_too_early_is_counted_and_no_more_jobs_run_than_are_allowed() {
-    let mean = |amplitude: f64, _: f64| Some(1e5 * (amplitude - 2.345e-6));
+    let mean = |amplitude: f64, _: f64| Some(1e6 * (amplitude - 2.345e-6));
     let ended = |seeds: u64, jobs: u64| {
         let sweep = sweep(DELTA, &format!("to = 1e-8\nseeds = {{ from = 24, to = {seeds} }}\njobs = {jobs}"));
         let (rounds, sets) = noisy(mean).rounds(&sweep);
@@ -221,12 +222,12 @@ fn what_ends_an_edge_too_early_is_counted_and_no_more_jobs_run_than_are_allowed(
         let is_done = found(&sweep, &sets).into_iter().flatten().all(|(_, is_done)| is_done);
         (rounds.last().unwrap().standing.edges_capped, is_done)
     };
-    assert_eq!([ended(40_000, 900_000), ended(50, 900_000), ended(40_000, 400)], [(0, true), (1, false), (1, false)]);
+    assert_eq!([ended(2000, 90_000), ended(50, 90_000), ended(2000, 300)], [(0, true), (1, false), (1, false)]);
 }
 
 #[test]
 fn each_row_has_its_edges_and_points_that_are_no_jobs_are_passed_over() {
-    let text = "name = \"a\"\nwhere = \"Delta < 3e-6 or V0 < 5e-5\"\n[model]\nfrequency = 29\n[axes]\n\
+    let text = "name = \"a\"\nwhere = \"Delta < 3e-6 or V0 < 8e-5\"\n[model]\nfrequency = 29\n[axes]\n\
                 Delta = { linear = [0, 4e-6], points = 5 }\nV0 = { linear = [1e-5, 1e-4], points = 3 }\n\
                 [refine]\nby = \"mean_friction\"\nthreshold = 0\naxis = \"Delta\"\nto = 5e-8\n\
                 seeds = { first = 1000, from = 2, to = 90 }\njobs = 9000";
@@ -235,7 +236,7 @@ fn each_row_has_its_edges_and_points_that_are_no_jobs_are_passed_over() {
     let mean = |amplitude: f64, velocity: f64| Some(1e6 * (amplitude - 0.03 * velocity - 4e-7));
     let (_, sets) = noisy(mean).rounds(&sweep);
     let places: Vec<Vec<f64>> =
-        found(&sweep, &sets).into_iter().map(|row| row.into_iter().map(|(at, _)| at[1] / 32.0).collect()).collect();
+        found(&sweep, &sets).into_iter().map(|row| row.into_iter().map(|(at, _)| 1e6 * at[1]).collect()).collect();
     let expected: [&[f64]; 3] = [&[0.7], &[2.05], &[]];
     for (places, expected) in places.iter().zip(expected) {
         assert_eq!(places.len(), expected.len(), "{places:?}");

@@ -48,12 +48,11 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let mut places = Places::new(source);
     let model = read_section(&file, "model", "[model]", |model| read_model(model, &mut places));
     let wanted = read_section(&file, "refine", "[refine]", |refine| read_refinement(refine).map(Some));
-    let finer = wanted.as_ref().ok().and_then(Option::as_ref);
-    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places, finer));
+    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places));
     let precision = read_section(&file, "precision", "[precision]", |precision| read_precision(precision).map(Some));
-    let mut seeds_of =
-        |key, title| read_section(&file, key, title, |section| read_seeds(section, &mut places).map(Some));
-    let seeds = [seeds_of("precision", "[precision]"), seeds_of("refine", "[refine]")];
+    let (key, title) =
+        if file.entry("refine").is_some() { ("refine", "[refine]") } else { ("precision", "[precision]") };
+    let seeds = read_section(&file, key, title, |section| read_seeds(section, &mut places).map(Some));
     if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
         let problem =
             "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
@@ -64,20 +63,19 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let solver = read_section(&file, "solver", "[solver]", read_solver);
     source.passed()?;
     let ((base, period), recording, solver) = (model?, recording?, solver?);
-    let (wanted, precision, [of_precision, of_refinement]) = (wanted?, precision?, seeds);
-    let axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
-    let refinement = wanted.as_ref().map(|wanted| wanted.over(&axes)).transpose()?;
-    let (rounds, seeds) = of_precision?
-        .or(of_refinement?)
-        .map(|(seeds, asked, axis)| (Rounds { seeds, asked, precision, refinement }, axis))
-        .unzip();
+    let (wanted, precision) = (wanted?, precision?);
+    let mut axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
+    let swept = || file.entry("axes").and_then(|entry| entry.section("[axes]"));
+    let refinement = wanted.as_ref().map(|wanted| wanted.over(&mut axes, swept())).transpose()?;
+    let rounds = |(seeds, asked, axis)| (Rounds { seeds, asked, precision, refinement }, axis);
+    let (rounds, seeds) = seeds?.map(rounds).unzip();
     let axes = axes.into_iter().chain(seeds).collect();
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
     let mut sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds, controls: None };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places)?;
-    if let Some(Rounds { seeds, refinement, .. }) = &sweep.rounds {
+    if let Some(Rounds { seeds, .. }) = &sweep.rounds {
         let sets = sweep.first_sets().len() as u64;
         if sets > MAX_SETS {
             let problem =
@@ -85,9 +83,7 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
             return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
         }
         let least = sets * seeds.start();
-        if let (Some(refinement), Some(wanted)) = (refinement, &wanted)
-            && refinement.max_jobs < least
-        {
+        if let Some(wanted) = wanted.as_ref().filter(|wanted| wanted.refinement.max_jobs < least) {
             return Err(wanted.jobs.must_be(&format!("at least the {least} of the first round")));
         }
     }

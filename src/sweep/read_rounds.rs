@@ -14,18 +14,17 @@
 //! jobs      = 4000                   at most
 //! ```
 //!
-//! `[refine]` is read before the axes, of which one becomes as fine as it wants, and held against them afterwards.
+//! When all is read, the axis of `[refine]` becomes as fine as it wants.
 
 use super::axes::{Axis, MAX_ROWS};
 use super::checks::Places;
 use super::quantity::Quantity;
+use super::read_axes::{read_spaced, spaced};
 use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Target};
-use super::samples::Range;
 use super::set::{STATISTICS, Statistic, StatisticKind};
 use super::source::{Entry, Refused, Section, all, hint};
 use crate::model::Symbol;
 use crate::table::value::Shortest;
-use std::cell::Cell;
 use std::ops::RangeInclusive;
 
 /// Share of the intervals at which the edge of a tongue lies, if nothing is said.
@@ -105,19 +104,15 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
     }
 }
 
-/// `[refine]` as it is read before the axes, without its seeds.
+/// `[refine]` without its seeds, before its axis is found.
 pub(super) struct Wanted<'a> {
-    pub quantity: Quantity,
+    quantity: Quantity,
     axis: Entry<'a>,
     to: Entry<'a>,
     pub jobs: Entry<'a>,
-    /// But for the axis.
-    refinement: Refinement,
-    /// How often the steps of the axis can be halved, and whether it is logarithmic; once it is read.
-    levels: Cell<Option<(u32, bool)>>,
+    pub refinement: Refinement,
 }
 
-/// Reads `[refine]` as far as it goes without the axes.
 pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, Refused> {
     section.only(&["axis", "by", "value", "threshold", "to", "seeds", "jobs"]).ok();
     let axis = section.required("axis", "the axis along which edges are looked for, such as axis = \"Delta\"");
@@ -130,7 +125,7 @@ pub(super) fn read_refinement<'a>(section: &Section<'a>) -> Result<Wanted<'a>, R
     let max_jobs = jobs.and_then(|entry| entry.count(1, MAX_JOBS));
     let ((by, periods, threshold), to, max_jobs) = (by?, to?, max_jobs?);
     let refinement = Refinement { axis: 0, levels: 0, is_log: false, by, periods, threshold, to, max_jobs };
-    Ok(Wanted { quantity: quantity?, axis: axis?, to: to_entry?, jobs: jobs?, refinement, levels: Cell::new(None) })
+    Ok(Wanted { quantity: quantity?, axis: axis?, to: to_entry?, jobs: jobs?, refinement })
 }
 
 fn read_refinable(entry: &Entry<'_>) -> Result<Quantity, Refused> {
@@ -176,31 +171,34 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Vec<Statistic>, 
 }
 
 impl Wanted<'_> {
-    /// What it means for these axes.
-    pub fn over(&self, axes: &[Axis]) -> Result<Refinement, Refused> {
-        let swept = axes.iter().position(|axis| axis.quantities().contains(&self.quantity));
-        match (swept, self.levels.get()) {
-            (Some(axis), Some((levels, is_log))) => Ok(Refinement { axis, levels, is_log, ..self.refinement.clone() }),
-            (Some(axis), None) if axes[axis].quantities().len() > 1 => {
-                Err(self.axis.refuse("moves together with others in a zip or a sample; make it an axis of its own"))
-            }
-            (Some(_), None) => Err(self
+    /// Finds its axis among these, which the section has, and makes it as fine as is wanted.
+    pub fn over(&self, axes: &mut [Axis], section: Option<Section<'_>>) -> Result<Refinement, Refused> {
+        let Some(axis) = axes.iter().position(|axis| axis.quantities().contains(&self.quantity)) else {
+            let fixing = axes.iter().flat_map(Axis::quantities).find(|other| other.is_period());
+            return Err(self.axis.refuse(match fixing.map(Quantity::key).filter(|_| self.quantity.is_period()) {
+                Some(other) => format!("{} follows from the axis {other}; refine {other}", self.quantity.key()),
+                None => "is no axis of [axes]; add it there as a range".to_owned(),
+            }));
+        };
+        if axes[axis].quantities().len() > 1 {
+            return Err(self
                 .axis
-                .refuse("has no values in between; write the axis as { linear = [low, high], points = n }, or log")),
-            (None, _) => Err(self.axis.refuse(why_not_swept(self.quantity, axes))),
+                .refuse("moves together with others in a zip or a sample; make it an axis of its own"));
         }
-    }
-
-    /// The number of values of the axis once it is as fine as is wanted, from that in the file.
-    pub fn points(&self, range: &Range, points: u64) -> Result<u64, Refused> {
-        let cells = (points - 1) as f64;
+        let Some(entry) =
+            section.and_then(|axes| axes.entry(self.quantity.key())).filter(|entry| entry.list().is_none())
+        else {
+            let problem = "has no values in between; write the axis as { linear = [low, high], points = n }, or log";
+            return Err(self.axis.refuse(problem));
+        };
+        let (range, points) = read_spaced(&entry, self.quantity)?;
         // Of an axis with 2^level steps in place of each.
         let step = |level: u32| {
-            let cells = cells * f64::from(level).exp2();
+            let steps = (points - 1) as f64 * f64::from(level).exp2();
             if range.logarithmic {
-                libm::expm1(libm::log(range.high / range.low) / cells)
+                libm::expm1(libm::log(range.high / range.low) / steps)
             } else {
-                (range.high - range.low) / cells
+                (range.high - range.low) / steps
             }
         };
         let to = self.refinement.to;
@@ -209,25 +207,13 @@ impl Wanted<'_> {
             return Err(self.to.must_be(&format!("finer than {}, {what}", Shortest(step(0)))));
         }
         let levels = (1..u64::BITS).find(|&level| step(level) <= to * (1.0 + ROUNDING));
-        let fine = levels.and_then(|level| (points - 1).checked_mul(1 << level)).map(|cells| cells + 1);
-        match (levels, fine) {
-            (Some(levels), Some(fine)) if fine <= MAX_ROWS => {
-                self.levels.set(Some((levels, range.logarithmic)));
-                Ok(fine)
-            }
-            _ => Err(self.to.refuse(format!("makes more than {MAX_ROWS} values of the axis; take a coarser one"))),
-        }
-    }
-}
-
-fn why_not_swept(quantity: Quantity, axes: &[Axis]) -> String {
-    let fixing = axes.iter().flat_map(Axis::quantities).find(|other| other.is_period());
-    match fixing {
-        Some(other) if quantity.is_period() => {
-            let (key, other) = (quantity.key(), other.key());
-            format!("{key} follows from the axis {other}; refine {other}")
-        }
-        _ => "is no axis of [axes]; add it there as a range".to_owned(),
+        let fine = levels.and_then(|level| Some((level, (points - 1).checked_mul(1 << level)? + 1)));
+        let made = |(levels, points)| Some((levels, spaced(&range, points, self.quantity)?));
+        let Some((levels, fine)) = fine.filter(|(_, points)| *points <= MAX_ROWS).and_then(made) else {
+            return Err(self.to.refuse(format!("makes more than {MAX_ROWS} values of the axis; take a coarser one")));
+        };
+        axes[axis] = fine;
+        Ok(Refinement { axis, levels, is_log: range.logarithmic, ..self.refinement.clone() })
     }
 }
 

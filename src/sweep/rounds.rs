@@ -77,8 +77,7 @@ pub struct Standing {
     pub sets_open: u64,
     /// Sets that have the most seeds and miss the target.
     pub sets_capped: u64,
-    /// Edges that are less precise than wanted, but get no more jobs: their sets have the most seeds, or the sweep has the most
-    /// jobs.
+    /// Edges that are less precise than wanted, but get no more jobs: their sets or the sweep have the most.
     pub edges_capped: u64,
 }
 
@@ -89,14 +88,6 @@ pub struct Bounds {
     pub jobs: u64,
     /// Predicted CPU time at most, in s; of sets that are not known yet, that of the dearest of the first round.
     pub predicted_cost: f64,
-}
-
-impl Refinement {
-    /// A statistic as the table of edges names it.
-    pub fn name_of(&self, statistic: usize) -> String {
-        let key = self.by[statistic].key;
-        self.periods.map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}"))
-    }
 }
 
 impl Rounds {
