@@ -1,13 +1,13 @@
 //! Edges: where a statistic of the population crosses a threshold along an axis, each with its 95 % interval.
 //!
-//! A set lies clearly on one side of the threshold if its interval does. Between two clear neighbours of opposite sides,
-//! those left out that are not clear, lies an edge; up and down are edges of their own. Of the sets in between, two
-//! neighbours count between which the estimate crosses. If both are clear, the edge lies between them, and nothing is said
-//! of the response in between. If not, it is near: where a line through the sets of a small window crosses, with Fieller's
-//! interval (E. C. Fieller, J. R. Stat. Soc. B 16, 175 (1954)).
+//! A set is clear if its interval lies on one side of the threshold. Between two clear neighbours of opposite sides, unclear
+//! ones left out, lies an edge; up and down are edges of their own. Of the sets in between, two neighbours count between
+//! which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the response there.
+//! If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval (E. C. Fieller,
+//! J. R. Stat. Soc. B 16, 175 (1954)).
 //!
-//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is a realisation
-//! of the disorder common to all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
+//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one realisation
+//! of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
 //! Places on the axis are rows of the grid and fractions of them.
 
 use super::confidence::student;
@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 pub const GROUPS: usize = 30;
 /// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width.
 const WINDOW: u64 = 3;
-/// What the interval of a line is widened by, as windows whose line is steep by chance end first: measured, docs/rounds.md.
+/// What the interval of a line is widened by, as windows that are steep by chance end first: measured, docs/rounds.md.
 const LOOKS: f64 = 1.2;
 /// How often the window is moved to where its line crosses.
 const MOVES: usize = 3;
@@ -94,7 +94,7 @@ impl Sample {
     }
 }
 
-/// The square of Student's t, with the degrees of freedom of these groups; and of what makes a sum of squares a variance.
+/// The square of Student's t with the degrees of freedom of these groups, over what makes a variance a sum of squares.
 fn quantile(concentration: f64) -> f64 {
     let t = student(1.0 / concentration - 1.0);
     t * t / (1.0 - concentration)
@@ -150,7 +150,7 @@ pub struct Edge<'a> {
 }
 
 impl<'a> Edge<'a> {
-    /// Between two of the sets of a line, all in order; they are clear, and those in between are not. `width` is wanted.
+    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted.
     fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64) -> Option<Self> {
         let bracket = [all[first], all[last]];
         let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;

@@ -267,15 +267,8 @@ fn every_column_of_a_zip_or_a_sample_and_every_axis_is_read() {
 }
 
 #[test]
-fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
-    const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
-                          Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
+fn targets_that_cannot_be_are_refused_with_what_is_allowed() {
     let precision = |text: &str| format!("name = \"a\"\n[precision]\n{text}");
-    let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
-    let good = "axis = \"frequency\"\nby = \"resultant_length\"\nthreshold = 0.5\nto = 0.1\n\
-                seeds = { first = 7, from = 4, to = 48 }\njobs = 960\n";
-    Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
-    let instead = |from: &str, to: &str| refine(&good.replace(from, to));
     let seeds = "seeds = { from = 4, to = 8 }";
     let precise = |of: &str| precision(&format!("of = {of}\nrelative = 0.01\n{seeds}"));
     let table: Vec<(String, usize, &[&str])> = vec![
@@ -320,6 +313,22 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
             5,
             &["seed", "is set in [axes], too (line 7)"],
         ),
+    ];
+    for (text, line, words) in &table {
+        assert_refused(&[(text, *line, words)]);
+    }
+}
+
+#[test]
+fn refinements_that_cannot_be_are_refused_with_what_is_allowed() {
+    const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
+                          Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
+    let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
+    let good = "axis = \"frequency\"\nby = \"resultant_length\"\nthreshold = 0.5\nto = 0.1\n\
+                seeds = { first = 7, from = 4, to = 48 }\njobs = 960\n";
+    Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
+    let instead = |from: &str, to: &str| refine(&good.replace(from, to));
+    let table: Vec<(String, usize, &[&str])> = vec![
         (instead("frequency", "frequenzy"), 7, &["axis = \"frequenzy\"", "did you mean frequency?"]),
         (instead("\"frequency\"", "[\"frequency\"]"), 7, &["axis = [\"frequency\"]", "the name of one axis"]),
         (instead("frequency", "break_on"), 7, &["axis = \"break_on\"", "is a word"]),
