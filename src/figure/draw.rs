@@ -1,9 +1,9 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
 use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, dependence, drag, friction, histograms, intervals, locking_map, refined, regimes, staircase};
+use super::{backbone, dependence, drag, edges, friction, histograms, intervals, locking_map, regimes, staircase};
 use super::{own, sets};
-use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
+use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
@@ -39,8 +39,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
             pictures.extend(figure(&sets, look));
         }
     }
-    if layout.storage.exists(&layout.reduced_file(CellRow::NAME))? {
-        pictures.extend(refined::refined(&read(layout)?, &sets, look));
+    if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
+        pictures.extend(edges::edges(&read(layout)?, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));

@@ -115,6 +115,18 @@ impl SetSlips {
         }
     }
 
+    /// Leaves the slips of other seeds out.
+    pub(super) fn retain(&mut self, keeps: impl Fn(u64) -> bool) {
+        self.jobs.retain(|&seed, _| keeps(seed));
+    }
+
+    /// The share of the intervals that are nearest to this number of periods.
+    pub(super) fn share_of_periods(&self, periods: f64) -> Option<f64> {
+        let all = self.jobs.values().flat_map(|job| &job.slips).filter_map(|slip| non_nan(slip.periods));
+        let nearest: Vec<f64> = all.map(|found| f64::from(u8::from(found.round() == periods))).collect();
+        (!nearest.is_empty()).then(|| nearest.iter().sum::<f64>() / nearest.len() as f64)
+    }
+
     fn means(&self) -> [Option<f64>; SUMS] {
         std::array::from_fn(|index| {
             let all = self.jobs.values().map(|job| job.sums[index]);

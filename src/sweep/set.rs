@@ -174,6 +174,16 @@ impl Statistic {
         matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
     }
 
+    /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
+    /// values, bounds and p-values change with their number, and angles have no order.
+    pub fn can_cross(self) -> bool {
+        const OTHERS: &[&str] = &["share_below", "tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
+        let is_of_sample =
+            ["effective_", "tau_mean_", "rayleigh_", "load_"].iter().any(|begin| self.key.starts_with(begin));
+        let is_number = matches!(self.kind, StatisticKind::Estimate | StatisticKind::Number);
+        is_number && !is_of_sample && !OTHERS.contains(&self.key)
+    }
+
     /// Whether it says what the drive alone explains, or what it does not.
     pub fn needs_control(self) -> bool {
         self.key.ends_with("_drive") || self.key.ends_with("_excess")
