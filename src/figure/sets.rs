@@ -270,7 +270,7 @@ pub(super) mod tests {
         assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1e-6 m, T = 0.02 s"), "{found}");
         assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
         let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
-        assert_eq!(symbols, ["ramp_time", "seed", "τᵣ", "V₀"]);
+        assert_eq!(symbols, ["ramp time", "seed", "τᵣ", "V₀"]);
     }
 
     #[test]
