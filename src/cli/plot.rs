@@ -2,7 +2,6 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::run::no_standing_figure;
 use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
 use crate::reduce::{renew, set_columns};
 use crate::results::Results;
@@ -91,7 +90,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         }
     };
     if files.is_empty() {
-        output::report(&no_standing_figure(layout));
+        output::report("there is nothing to draw: a single set without intervals");
     }
     for path in files {
         output::print(&format!("{}\n", shown(&path)))?;

@@ -168,9 +168,6 @@ fn work(
     if let Some(Reduced { result, figures, .. }) = reduced?.filter(|_| !arguments.json) {
         output::print(&format!("\n{result}\n"))?;
         figures.iter().try_for_each(|path| output::print(&format!("figure  {}\n", shown(path))))?;
-        if figures.is_empty() {
-            output::report(&no_standing_figure(layout));
-        }
     }
     if is_complete && arguments.shard.is_some() {
         reduce::report_missing(&Results::read(layout)?)?;
@@ -227,15 +224,6 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let mut lines = reduce::summary_lines(&summary, layout);
     lines.extend(status::no_slips(&results));
     Ok(Some(Reduced { lines, result: show::summary(&results)?, figures }))
-}
-
-/// What to do where no standing figure has its data.
-pub fn no_standing_figure(layout: &Layout<'_>) -> String {
-    let root = output::quoted_path(layout.root());
-    format!(
-        "no standing figure has its data here; for one of your own: stickslip plot {root} --x V0 --y mean_friction \
-         (--list names all columns)"
-    )
 }
 
 /// What to do after a run that stopped early.

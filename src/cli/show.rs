@@ -3,7 +3,9 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, read_reduced, renew, sets_where};
+use crate::reduce::{
+    EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
+};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{Sweep, label, three_digits};
@@ -137,23 +139,10 @@ fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
     Ok(read_reduced::<SetRow>(results.layout())?.into_iter().filter(|row| !row.is_control).collect())
 }
 
-/// Parameters in which sets differ.
-fn differing(rows: &[SetRow]) -> Vec<Symbol> {
-    let differ = |symbol: &Symbol| {
-        let mut values = rows.iter().map(|row| row.parameters.get(*symbol));
-        let first = values.next();
-        *symbol != Symbol::Seed && values.any(|value| Some(value) != first)
-    };
-    Symbol::ALL.into_iter().filter(differ).collect()
-}
-
 /// The parameters in which sets differ, and what was found of them.
 fn usual_columns(rows: &[SetRow]) -> Vec<String> {
-    let mut columns: Vec<String> = Vec::new();
-    for symbol in differing(rows) {
-        let key = if symbol == Symbol::T { FREQUENCY } else { symbol.key() };
-        columns.push(key.to_owned());
-    }
+    let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() }.to_owned();
+    let mut columns: Vec<String> = differing(rows).into_iter().map(key).collect();
     if columns.iter().any(|column| column == FREQUENCY) {
         columns.push("eta".to_owned());
     }
@@ -273,9 +262,8 @@ fn edges(results: &Results<'_>) -> Result<String> {
 /// The head of a column and its first cells.
 fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     let label = values.label();
-    let largest = values.numbers.iter().flatten().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    let (factor, unit) = label.scale(largest);
-    let mut cells = vec![if unit.is_empty() { label.symbol } else { format!("{} ({unit})", label.symbol) }];
+    let (factor, unit) = values.scale();
+    let mut cells = vec![label.short(unit)];
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
         let bound = rows.get(set).and_then(|row| row.tau_bound).filter(|_| values.column.name == "tau_mean");
         cells.push(match (number, values.intervals[set]) {

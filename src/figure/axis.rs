@@ -1,5 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
+use crate::sweep::three_digits;
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +86,16 @@ impl Axis {
         const CLOSE: f64 = 5.0;
         let is_dense = self.scale == Scale::Linear && self.minor.len() as f64 * CLOSE > length;
         if is_dense { Self { minor: Vec::new(), ..self } } else { self }
+    }
+
+    /// The same axis with a number at each of these values and no other tick.
+    pub(super) fn with_ticks_at(self, label: &str, values: impl Iterator<Item = f64>) -> Self {
+        let number = |value: f64| match three_digits(value).split_once('e') {
+            Some((mantissa, power)) => power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0)),
+            None => three_digits(value).replace('-', "−"),
+        };
+        let ticks = values.map(|value| (value, number(value))).collect();
+        Self { label: label.to_owned(), power: None, ticks, minor: Vec::new(), ..self }
     }
 
     pub(super) fn with_short_label(self, short_label: Option<String>) -> Self {
@@ -258,10 +269,11 @@ pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f
     Some((low * libm::exp(-margin), high * libm::exp(margin)))
 }
 
-/// Bounds in multiples of π/2 that enclose some angles in rad, and at least [-π, π].
+/// Bounds in multiples of π/2 that enclose some angles in rad.
 pub(super) fn angle_bounds(angles: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = bounds(angles).unwrap_or((0.0, 0.0));
-    ((low.min(-PI) / FRAC_PI_2).floor() * FRAC_PI_2, (high.max(PI) / FRAC_PI_2).ceil() * FRAC_PI_2)
+    let (low, high) = bounds(angles).unwrap_or((-PI, PI));
+    let low = (low / FRAC_PI_2).floor() * FRAC_PI_2;
+    (low, ((high / FRAC_PI_2).ceil() * FRAC_PI_2).max(low + FRAC_PI_2))
 }
 
 /// Least and largest of the values that can be.
@@ -440,6 +452,7 @@ mod tests {
     fn angle_bounds_hold_all_data() {
         assert_eq!(angle_bounds([].into_iter()), (-PI, PI));
         let (low, high) = angle_bounds([-4.8, 0.1].into_iter());
-        assert!((low + 2.0 * PI).abs() < 1e-12 && (high - PI).abs() < 1e-12);
+        assert!((low + 2.0 * PI).abs() < 1e-12 && (high - FRAC_PI_2).abs() < 1e-12);
+        assert_eq!(angle_bounds([0.0].into_iter()), (0.0, FRAC_PI_2));
     }
 }

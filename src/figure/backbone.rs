@@ -6,10 +6,11 @@ use super::frame::{Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Picture, Stroke};
-use super::sets::{ETA, Grid};
+use super::sets::Grid;
 use super::style::{BAR_WIDTH, BLACK, BLUE, GREY, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetRow};
+use crate::sweep::label;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -56,7 +57,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
     ]);
-    let x = Axis::logarithmic(ETA, low, high);
+    let x = Axis::logarithmic(&label("eta").axis(""), low, high).with_enough_numbers();
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
@@ -86,7 +87,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
-    let bar = density.as_ref().map(|density| ColourBar::of_axis("density (1/rad)", &density.shades, shade));
+    let bar = density.as_ref().map(|density| ColourBar::of_axis(&density.shades, shade));
     let panel = Panel { bar, ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers) };
     Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
 }
@@ -136,7 +137,7 @@ impl Density {
             })
             .collect();
         let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
-        Self { shades: Axis::logarithmic("", FAINTEST, most), cells }
+        Self { shades: Axis::logarithmic("density (1/rad)", FAINTEST, most), cells }
     }
 }
 

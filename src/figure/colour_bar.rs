@@ -13,21 +13,21 @@ const WIDTH: f64 = 18.0;
 /// Between the label's end and that of the bar's space.
 const INSET: f64 = 14.0;
 
-pub(super) struct ColourBar<'a> {
-    pub(super) label: &'a str,
+pub(super) struct ColourBar {
+    pub(super) label: String,
     /// Colours of equal height, from below.
     pub(super) colours: Vec<Color>,
     /// Places, 0 at the lower end and 1 at the upper, and their numbers.
     pub(super) ticks: Vec<(f64, String)>,
 }
 
-impl<'a> ColourBar<'a> {
+impl ColourBar {
     /// A bar of all colours of a scale, with the numbers of an axis.
-    pub(super) fn of_axis(label: &'a str, axis: &Axis, colour: fn(f64) -> Color) -> Self {
+    pub(super) fn of_axis(axis: &Axis, colour: fn(f64) -> Color) -> Self {
         const STEPS: u32 = 64;
         let colours = (0..STEPS).map(|step| colour(f64::from(step) / f64::from(STEPS - 1))).collect();
         let ticks = axis.ticks.iter().map(|(value, number)| (axis.place(*value), number.clone())).collect();
-        Self { label, colours, ticks }
+        Self { label: axis.label.clone(), colours, ticks }
     }
 
     /// Draws the bar right of a frame, and the label above it.
@@ -51,7 +51,7 @@ impl<'a> ColourBar<'a> {
             }
         }
         let end = frame.right() + COLOUR_BAR - INSET;
-        let size = fitting(self.label, LEGEND_TEXT, end - frame.y_label_end() - GAP).unwrap_or(NOTE_TEXT);
-        sheet.text((end, top - 12.0), self.label, size, Anchor::End);
+        let size = fitting(&self.label, LEGEND_TEXT, end - frame.y_label_end() - GAP).unwrap_or(NOTE_TEXT);
+        sheet.text((end, top - 12.0), &self.label, size, Anchor::End);
     }
 }

@@ -1,32 +1,22 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
 use super::axis::{Axis, DECADES};
-use super::dependence::{label, number};
 use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
 use super::picture::{Dot, Picture, Stroke};
-use super::sets::{FREQUENCY, MICROMETRES, ascending};
+use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
 use crate::model::Symbol;
-use crate::reduce::{EdgeRow, FREQUENCY as FREQUENCY_COLUMN};
+use crate::reduce::{EdgeRow, FREQUENCY, ascending};
+use crate::sweep::label;
 use crate::table::value::Shortest;
 use std::collections::BTreeSet;
-
-/// Label of an axis, and the factor to its unit.
-fn axis_of(key: &str) -> (String, f64) {
-    match (key, Symbol::from_key(key)) {
-        (FREQUENCY_COLUMN, _) => (FREQUENCY.to_owned(), 1.0),
-        (_, Some(Symbol::Delta)) => ("Amplitude Δ (µm)".to_owned(), MICROMETRES),
-        (_, Some(symbol)) => (label(symbol), 1.0),
-        (key, None) => (key.to_owned(), 1.0),
-    }
-}
 
 /// A parameter of a row, or the frequency.
 fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
     match Symbol::from_key(key) {
-        Some(symbol) => number(&edge.parameters, symbol),
+        Some(symbol) => edge.parameters.get(symbol).number(),
         None => edge.parameters.modulation_period.map(|period| 1.0 / period),
     }
 }
@@ -34,12 +24,13 @@ fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
 /// `None` if nothing else differs, or more than one quantity.
 pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let refined = edges.first()?.axis.as_str();
-    let is_refined = |key: &str| key == refined || (key == FREQUENCY_COLUMN && ["T", "eta"].contains(&refined));
+    let is_refined = |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
     let differs = |key: &str| ascending(edges.iter().filter_map(|edge| value(key, edge))).len() > 1;
     let parameters = Symbol::ALL.into_iter().filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
-    let keys = parameters.map(Symbol::key).chain([FREQUENCY_COLUMN]);
+    let keys = parameters.map(Symbol::key).chain([FREQUENCY]);
     let [key] = keys.filter(|key| !is_refined(key) && differs(key)).collect::<Vec<_>>()[..] else { return None };
-    let ((x_label, x_factor), (y_label, y_factor)) = (axis_of(key), axis_of(refined));
+    let (x_label, x_factor) = axis_of(key, edges.iter().filter_map(|edge| value(key, edge)));
+    let (y_label, y_factor) = axis_of(refined, edges.iter().filter_map(|edge| edge.edge));
     let place = |edge: &EdgeRow| Some((x_factor * value(key, edge)?, y_factor * edge.edge?));
     let bar = |edge: &EdgeRow| {
         let interval = edge.edge_interval?;
@@ -54,7 +45,11 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
         let threshold = Shortest(of_it().next()?.threshold);
-        legend.push(entry(Mark::Bar(dot(ink)), format!("{statistic} crosses {threshold}, with 95 % interval")));
+        let what = match statistic.split_once(" = ") {
+            Some((_, n)) => format!("share of n = {n} is"),
+            None => format!("{} =", label(statistic).symbol),
+        };
+        legend.push(entry(Mark::Bar(dot(ink)), format!("{what} {threshold}, 95 %")));
         layers.push(Layer::Bars(of_it().filter_map(bar).collect(), Stroke::solid(ink, BAR_WIDTH)));
         layers.push(Layer::Dots(of_it().filter_map(place).collect(), Dot::solid(ink, 0.7 * RADIUS)));
     }
@@ -91,7 +86,7 @@ mod tests {
         ];
         let svg = edges(&rows, &Look::default()).unwrap().svg();
         assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
-        assert!(svg.contains("resultant_length crosses 0.5") && svg.contains("resultant_drive crosses 0.5"));
+        assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
         assert!([INKS[0], INKS[1]].iter().all(|ink| svg.matches(ink).count() > 2));
         assert!(edges(&rows[..2], &Look::default()).is_none(), "nothing to draw it against");
         assert!(edges(&rows[3..], &Look::default()).is_none(), "no edge");

@@ -6,10 +6,10 @@ use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
-use super::sets::{modulation, setting, swept, thousands};
+use super::sets::{modulation, setting, thousands};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
-use crate::model::Parameters;
-use crate::reduce::{HistogramBin, SetRow};
+use crate::model::{Parameters, Symbol};
+use crate::reduce::{HistogramBin, SetRow, differing};
 
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
@@ -104,9 +104,10 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     shown.sort_by(|left, right| {
         left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
     });
-    let swept = swept(&shown.iter().copied());
+    let mut others = differing(shown.iter().copied());
+    others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
     let panel = |set: &SetRow| {
-        let settings = swept.iter().map(|&symbol| setting(&set.parameters, symbol));
+        let settings = others.iter().map(|&symbol| setting(&set.parameters, symbol));
         let twin = identical.iter().find(|twin| !is_identical(&set) && is_twin(twin, set));
         Panel {
             title: std::iter::once(modulation(&set.parameters)).chain(settings).collect::<Vec<_>>().join(", "),
@@ -115,7 +116,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
             period: set.parameters.modulation_period,
         }
     };
-    shown.into_iter().map(panel).collect()
+    shown.into_iter().map(panel).filter(|panel| panel.all_bars().next().is_some()).collect()
 }
 
 fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {

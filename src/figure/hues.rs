@@ -4,8 +4,8 @@ use super::axis::Axis;
 use super::colour_bar::ColourBar;
 use super::legend::{Entry, Mark, entry};
 use super::picture::{Dot, Ink};
-use super::sets::ascending;
-use super::style::{INKS, SCALE, shade};
+use super::style::{BLACK, INKS, SCALE, shade};
+use crate::reduce::{ascending, is_same};
 use kuva::render::color::Color;
 
 /// How the values of a quantity become colours.
@@ -28,8 +28,10 @@ impl Hues {
     pub(super) fn ink(&self, value: f64) -> Ink {
         match self {
             Self::Inks(values) => {
-                let index = values.iter().position(|(known, _)| *known == value).unwrap_or(0);
-                INKS[index % INKS.len()]
+                // What is off is black, so that others have the colours that they have without it.
+                let first = usize::from(values.first().is_some_and(|(least, _)| *least == 0.0));
+                let index = values.iter().position(|(known, _)| is_same(*known, value)).unwrap_or(0);
+                if index < first { BLACK } else { INKS[(index - first) % INKS.len()] }
             }
             Self::Scale(axis) => {
                 let steps = SCALE.len() as f64;
@@ -40,16 +42,17 @@ impl Hues {
         }
     }
 
-    /// Entries of the legend, with dots of this radius.
-    pub(super) fn entries(&self, radius: f64) -> Vec<Entry> {
+    /// Entries of the legend, with dots of this radius, of values that are shown.
+    pub(super) fn entries(&self, radius: f64, is_shown: impl Fn(f64) -> bool) -> Vec<Entry> {
         let Self::Inks(values) = self else { return Vec::new() };
-        values.iter().map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name)).collect()
+        let values = values.iter().filter(|(value, _)| is_shown(*value));
+        values.map(|(value, name)| entry(Mark::Dot(Dot::solid(self.ink(*value), radius)), name)).collect()
     }
 
     /// The colour bar, if there is a scale.
-    pub(super) fn bar(&self) -> Option<ColourBar<'_>> {
+    pub(super) fn bar(&self) -> Option<ColourBar> {
         let Self::Scale(axis) = self else { return None };
-        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(&axis.label, axis, shade) })
+        Some(ColourBar { colours: SCALE.map(Color::from).to_vec(), ..ColourBar::of_axis(axis, shade) })
     }
 }
 
@@ -62,9 +65,9 @@ mod tests {
         let hues = |count: u32| Hues::of("", (0..count).map(|step| f64::from(1 << step)), |value| value.to_string());
         let few = hues(3);
         assert_eq!([1.0, 2.0, 4.0].map(|value| few.ink(value)), [INKS[0], INKS[1], INKS[2]]);
-        assert!(few.entries(1.0).len() == 3 && few.bar().is_none());
+        assert!(few.entries(1.0, |_| true).len() == 3 && few.bar().is_none());
         let many = hues(7);
-        assert!(many.entries(1.0).is_empty() && many.bar().is_some());
+        assert!(many.entries(1.0, |_| true).is_empty() && many.bar().is_some());
         assert_eq!((many.ink(1.0), many.ink(8.0), many.ink(64.0)), (SCALE[0], SCALE[5], SCALE[9]));
         assert!(SCALE.contains(&many.ink(f64::NAN)), "no panic");
     }

@@ -6,9 +6,10 @@ use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Picture};
-use super::sets::three_digits;
+use super::sets::axis_of;
 use super::style::{GREY, GRID, LIGHT_GREY, Look};
 use crate::reduce::Point;
+use crate::sweep::label;
 
 const RADIUS: f64 = 1.8;
 const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
@@ -22,17 +23,23 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
         let (period, interval) = (point.period?, point.interval?);
         Some((period, interval / period))
     };
-    let slips: Vec<(&Point, Place)> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let mut slips: Vec<(&Point, Place)> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
+    let (x_label, factor) = axis_of("T", slips.iter().map(|slip| slip.1.0));
+    slips.iter_mut().for_each(|slip| slip.1.0 *= factor);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
-    let x = Axis::logarithmic("Modulation period T (s)", low, high);
+    let x = Axis::logarithmic(&x_label, low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
     let few = Axis::counts("τ / T: up to 12 periods", LINES);
 
     let phased = slips.iter().filter(|slip| slip.0.has_phase);
-    let velocity = |value: f64| format!("V₀ = {} m/s", three_digits(value));
-    let hues = Hues::of("V₀ (m/s)", phased.map(|slip| slip.0.drive_velocity), velocity);
-    let mut entries: Vec<Entry> = hues.entries(3.0);
+    let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();
+    // The same colours whatever has a phase.
+    let velocity = label("V0");
+    let hues = Hues::of(&velocity.short("m/s"), points.iter().map(|point| point.drive_velocity), |value| {
+        velocity.setting(value)
+    });
+    let mut entries: Vec<Entry> = hues.entries(3.0, |value| phased.contains(&value));
     if hues.bar().is_some() {
         entries.push(entry(Mark::Dot(Dot::solid(hues.ink(f64::INFINITY), RADIUS)), "slips of sets with a phase"));
     }

@@ -100,13 +100,13 @@ fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::style::{BLACK, curve};
+    use super::super::style::GRID;
     use super::*;
 
     #[test]
     fn a_legend_takes_as_many_rows_as_it_needs() {
         let entries: Vec<Entry> =
-            ["short", "a longer text", "another"].map(|text| entry(Mark::Line(curve(BLACK)), text)).to_vec();
+            ["short", "a longer text", "another"].map(|text| entry(Mark::Line(GRID), text)).to_vec();
         let rows = |room: f64| legend_rows(&entries, room).iter().map(Vec::len).collect::<Vec<_>>();
         assert_eq!(rows(1000.0), [3]);
         assert_eq!(rows(width(&entries[0]) + ENTRY_GAP + width(&entries[1])), [2, 1]);

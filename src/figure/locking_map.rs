@@ -41,7 +41,7 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let place = |set: &SetRow| set.parameters.modulation_period.map(|period| periods.place(period));
     let map =
         Map::of(&modulated, [&place, &|set| Some(MICROMETRES * set.parameters.modulation_amplitude)], MIN_VALUES)?;
-    let (x, y) = map.axes(periods.label, "Amplitude Δ (µm)");
+    let (x, y) = map.axes(&periods.label, "Amplitude Δ (µm)");
     let drive_velocity = modulated[0].parameters.drive_velocity;
     let critical_amplitude = |place: f64| MICROMETRES * drive_velocity * periods.period(place) / TAU;
     let lines = || {
@@ -51,16 +51,16 @@ pub(super) fn locking_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let numbers = Numbers::of(&modulated);
     let colour = |set: &SetRow| Some(whole_periods(set).map_or(Color::from(FREE), |n| shade(numbers.share(n))));
     let words = map.words(whole_periods, |n| (n.to_string(), numbers.share(n)));
-    let indices = ColourBar::of_axis("locking index", &Axis::linear("", 0.0, 1.0), shade);
+    let indices = ColourBar::of_axis(&Axis::linear("Locking index of τ", 0.0, 1.0), shade);
     let mut panels = vec![
         (map.coloured(colour), words, numbers.bar()),
         (map.coloured(|set| set.locking_index.map(shade)), Vec::new(), indices),
     ];
     if let Some((low, high)) = bounds(modulated.iter().filter_map(|set| set.resultant_excess)) {
         let most = MIN_EXCESS.max(-low).max(high);
-        let scale = Axis::linear("", -most, most);
+        let scale = Axis::linear(EXCESS, -most, most);
         let cells = map.coloured(|set| Some(diverging(scale.place(set.resultant_excess?))));
-        panels.push((cells, Vec::new(), ColourBar::of_axis(EXCESS, &scale, diverging)));
+        panels.push((cells, Vec::new(), ColourBar::of_axis(&scale, diverging)));
     }
     let panels = panels.into_iter().map(|(cells, words, bar)| {
         let inside = Layer::Inside(std::iter::once(cells).chain(lines()).collect());
@@ -98,12 +98,12 @@ impl Numbers {
     }
 
     /// The colours from the least number of periods to the largest that occur.
-    fn bar(&self) -> ColourBar<'static> {
+    fn bar(&self) -> ColourBar {
         let count = (self.last - self.first + 1) as f64;
         let number = |n: usize| if n > MAX_PERIODS { format!(">{MAX_PERIODS}") } else { n.to_string() };
         let all = self.first..=self.last;
         ColourBar {
-            label: "n = τ / T",
+            label: "n = τ / T".to_owned(),
             colours: all.clone().map(|n| shade(self.share(n))).collect(),
             ticks: all.map(|n| (((n - self.first) as f64 + 0.5) / count, number(n))).collect(),
         }

@@ -4,8 +4,8 @@ use super::axis::Axis;
 use super::frame::OVERLAP;
 use super::panel::{Cell, Layer};
 use super::picture::Stroke;
-use super::sets::{Grid, ascending};
-use crate::reduce::SetRow;
+use super::sets::Grid;
+use crate::reduce::{SetRow, ascending};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
-//! own.rs  -> any column of the sets against any other
+//! own.rs  -> sets against a column: the overview of a sweep, and any column against any other
 //!            sets.rs                 in what sets differ, and the grid on which they lie
 //!            panel.rs                panels as data: axes, layers between them; map.rs makes layers of sets on a grid
 //!            frame.rs, axis.rs       frames on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
@@ -13,13 +13,11 @@
 mod axis;
 mod backbone;
 mod colour_bar;
-mod dependence;
 mod drag;
 mod draw;
 mod edges;
 mod font;
 mod frame;
-mod friction;
 mod histograms;
 mod hues;
 mod intervals;
@@ -35,7 +33,6 @@ mod sets;
 mod simulation;
 mod staircase;
 mod style;
-mod values;
 mod work_precision;
 
 pub use draw::{draw_all, draw_own, write_own};

@@ -5,8 +5,7 @@ use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Frame, Layout};
 use super::legend::Entry;
 use super::picture::{Anchor, Dot, Fill, Picture, Sheet, Stroke};
-use super::style::{BAR_WIDTH, HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
-use crate::reduce::Statistic;
+use super::style::{HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
 use kuva::render::color::Color;
 
 /// A point of data.
@@ -43,14 +42,6 @@ pub(super) enum Layer<'a> {
 }
 
 impl Layer<'_> {
-    /// Statistics, with a bar for each confidence interval that is known, joined by a line.
-    pub(super) fn statistics(points: &[(f64, Statistic)], stroke: Stroke, radius: f64) -> [Self; 2] {
-        let values = || points.iter().map(|&(x, statistic)| (x, statistic.value)).collect();
-        let bars = points.iter().filter_map(|&(x, statistic)| Some((x, statistic.interval?))).collect();
-        let bars = Self::Bars(bars, Stroke::solid(stroke.ink, BAR_WIDTH));
-        [Self::Inside(vec![Self::Curve(values(), stroke), bars]), Self::Dots(values(), Dot::solid(stroke.ink, radius))]
-    }
-
     fn draw(self, sheet: &mut Sheet, frame: &Frame) {
         match self {
             Self::Inside(layers) => sheet.clipped([frame.left, frame.top, frame.width, frame.height], |sheet| {
@@ -114,7 +105,7 @@ pub(super) struct Panel<'a> {
     pub(super) head: f64,
     /// What it shows, and how much of it.
     pub(super) heading: Option<(String, String)>,
-    pub(super) bar: Option<ColourBar<'a>>,
+    pub(super) bar: Option<ColourBar>,
 }
 
 impl<'a> Panel<'a> {

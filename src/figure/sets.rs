@@ -1,29 +1,11 @@
 //! Sets compared: in what they differ, what each is called, and the grid on which they lie.
 
-use super::axis::{Axis, logarithmic_bounds};
+use super::axis::Axis;
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::SetRow;
-use crate::sweep::{Label, label};
-pub(super) use crate::sweep::{symbol_of, three_digits};
+use crate::reduce::{FREQUENCY, SetRow, ascending, differing, has_even_steps};
+use crate::sweep::{label, symbol_of};
 
-/// Steps that differ by less than this share are even: sweep files hold rounded numbers.
-const EVEN: f64 = 0.02;
 pub(super) const MICROMETRES: f64 = 1e6;
-/// Label of an axis of frequencies.
-pub(super) const FREQUENCY: &str = "Modulation frequency 1/T (Hz)";
-/// Label of an axis of η.
-pub(super) const ETA: &str = "η = 2πΔ / (T V₀)";
-
-/// Parameters other than those of the modulation in which sets differ.
-pub(super) fn swept<'a>(sets: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<Symbol> {
-    let is_swept = |symbol: &Symbol| {
-        let mut values = sets.clone().map(|set| set.parameters.get(*symbol));
-        let first = values.next();
-        !matches!(symbol, Symbol::Delta | Symbol::T | Symbol::Seed) && values.any(|value| Some(value) != first)
-    };
-    Symbol::ALL.into_iter().filter(is_swept).collect()
-}
-
 /// Sets that differ in the modulation alone.
 pub(super) struct Modulations<'a> {
     pub(super) modulated: Vec<&'a SetRow>,
@@ -37,7 +19,7 @@ pub(super) struct Modulations<'a> {
 impl<'a> Modulations<'a> {
     /// `None` if another parameter differs.
     pub(super) fn of(sets: impl Iterator<Item = &'a SetRow> + Clone) -> Option<Self> {
-        if !swept(&sets).is_empty() {
+        if differing(sets.clone()).iter().any(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T)) {
             return None;
         }
         let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) =
@@ -48,48 +30,28 @@ impl<'a> Modulations<'a> {
     }
 }
 
-/// Each value once, in their order.
-pub(super) fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.dedup();
-    values
-}
-
 /// Amplitude and frequency of a modulation, in symbols.
 pub(super) fn modulation(parameters: &Parameters) -> String {
-    let amplitude = amplitude(parameters.modulation_amplitude);
+    let amplitude = label("Delta").setting(parameters.modulation_amplitude);
     match parameters.modulation_period {
-        Some(period) => format!("{amplitude}, {}", frequency(period)),
+        Some(period) => format!("{amplitude}, {}", label(FREQUENCY).setting(1.0 / period)),
         None => amplitude,
     }
 }
 
-/// An amplitude in m, in symbols.
-pub(super) fn amplitude(amplitude: f64) -> String {
-    if amplitude == 0.0 { "Δ = 0".to_owned() } else { format!("Δ = {} µm", three_digits(MICROMETRES * amplitude)) }
-}
-
-/// The frequency of a period in s, in symbols.
-pub(super) fn frequency(period: f64) -> String {
-    format!("1/T = {} Hz", three_digits(1.0 / period))
-}
-
 /// A parameter and its value, in symbols.
 pub(super) fn setting(parameters: &Parameters, symbol: Symbol) -> String {
-    let description = symbol.description();
-    let value = match parameters.get(symbol) {
-        Value::Real(real) => three_digits(real),
-        value => value.to_string(),
-    };
-    format!("{} = {value} {}", symbol_of(symbol), description.unit).trim_end().to_owned()
+    match parameters.get(symbol) {
+        Value::Real(real) => label(symbol.key()).setting(real),
+        value => format!("{} = {value}", symbol_of(symbol)),
+    }
 }
 
-/// The label of an axis of a parameter: what it is, its symbol and its unit.
-pub(super) fn parameter(symbol: Symbol) -> String {
-    let Label { symbol, what, unit } = label(symbol.key());
-    let label = format!("{what} {symbol}");
-    if unit.is_empty() { label } else { format!("{label} ({unit})") }
+/// Of a column with these values: the label of its axis, and the factor to its unit.
+pub(super) fn axis_of(column: &str, values: impl Iterator<Item = f64>) -> (String, f64) {
+    let label = label(column);
+    let (factor, unit) = label.scale(values.fold(0.0, f64::max));
+    (label.axis(unit), factor)
 }
 
 /// What some parameters have in common, in symbols.
@@ -143,16 +105,6 @@ impl Grid {
         if self.is_linear { Axis::linear(label, low, high) } else { Axis::logarithmic(label, low, high) }
     }
 
-    /// An axis for points at the values, a little wider than them.
-    pub(super) fn wider_axis(&self, label: &str) -> Axis {
-        const MARGIN: f64 = 0.05;
-        let (low, high) = (self.values[0], self.values[self.values.len() - 1]);
-        match logarithmic_bounds(self.values.iter().copied()) {
-            Some((low, high)) if !self.is_linear => Axis::logarithmic(label, low, high),
-            _ => Axis::linear(label, low - MARGIN * (high - low), high + MARGIN * (high - low)),
-        }
-    }
-
     /// The ends of the cell around the value with this index: halfway to its neighbours.
     pub(super) fn cell(&self, index: usize) -> (f64, f64) {
         let at = |index: usize| if self.is_linear { self.values[index] } else { libm::log(self.values[index]) };
@@ -175,16 +127,10 @@ impl Grid {
     }
 }
 
-fn has_even_steps(values: &[f64]) -> bool {
-    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
-    let mean = steps().sum::<f64>() / steps().count() as f64;
-    steps().all(|step| (step - mean).abs() <= EVEN * mean)
-}
-
 /// Periods as an axis: T, or 1/T if its steps are even and those of T are not; in units of the mean interval without
 /// modulation if that is known.
 pub(super) struct Periods {
-    pub(super) label: &'static str,
+    pub(super) label: String,
     is_inverse: bool,
     unit: f64,
 }
@@ -194,13 +140,16 @@ impl Periods {
     pub(super) fn of(periods: &[f64], free: Option<f64>) -> Self {
         let inverse: Vec<f64> = periods.iter().rev().map(|period| 1.0 / period).collect();
         let is_inverse = !has_even_steps(periods) && has_even_steps(&inverse);
-        let label = match (is_inverse, free) {
-            (false, None) => "Modulation period T (s)",
-            (false, Some(_)) => "Modulation period T / τ₀",
-            (true, None) => FREQUENCY,
-            (true, Some(_)) => "Modulation frequency τ₀ / T",
+        let (label, unit) = match (is_inverse, free) {
+            (true, None) => (label(FREQUENCY).axis("Hz"), 1.0),
+            (true, Some(free)) => ("Modulation frequency τ₀ / T".to_owned(), free),
+            (false, Some(free)) => ("Period of the modulation T / τ₀".to_owned(), free),
+            (false, None) => {
+                let (label, factor) = axis_of("T", periods.iter().copied());
+                (label, 1.0 / factor)
+            }
         };
-        Self { label, is_inverse, unit: free.unwrap_or(1.0) }
+        Self { label, is_inverse, unit }
     }
 
     /// Where a period in s stands on the axis.
@@ -232,6 +181,7 @@ pub(super) mod tests {
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() };
         SetRow {
             set_id: format!("{amplitude:e} {period:e}"),
+            eta: if amplitude > 0.0 { parameters.eta() } else { 0.0 },
             parameters: Selected::new(parameters.validated().unwrap()),
             tau_mean: Some(tau),
             tau_interval: interval(tau),
@@ -255,19 +205,13 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn numbers_in_titles_are_short() {
-        let shown = [29.000_000_000_000_004, 1.0, 0.0, 1e-6, 0.123_456].map(three_digits);
-        assert_eq!(shown, ["29", "1", "0", "1e-6", "0.123"]);
-    }
-
-    #[test]
     fn small_print_has_what_all_have_in_common_and_symbols_have_their_subscripts() {
         let mut other = set(1e-6, 0.02, 4.0).parameters.parameters;
         other.blocks = 9;
         let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
         let found = common(all.iter()).replace('\u{a0}', " ");
         assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 1e8 N/m, Kd = 4e7 N/m"), "{found}");
-        assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1e-6 m, T = 0.02 s"), "{found}");
+        assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1 µm, T = 20 ms"), "{found}");
         assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
         let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);
         assert_eq!(symbols, ["ramp time", "seed", "τᵣ", "V₀"]);
@@ -298,7 +242,7 @@ pub(super) mod tests {
         assert_eq!(axis.label, "Modulation frequency 1/T (Hz)");
         assert!((axis.place(0.05) - 20.0).abs() < 1e-12 && (axis.period(20.0) - 0.05).abs() < 1e-15);
         let axis = Periods::of(&[0.1, 0.2, 0.4, 0.8], Some(0.1));
-        assert_eq!(axis.label, "Modulation period T / τ₀");
+        assert_eq!(axis.label, "Period of the modulation T / τ₀");
         assert!((axis.place(0.2) - 2.0).abs() < 1e-12 && (axis.period(2.0) - 0.2).abs() < 1e-15);
     }
 }

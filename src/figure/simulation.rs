@@ -82,7 +82,7 @@ pub fn simulation(
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
         let cells = Layer::Cells(cells(map, blocks, first, length, width), OVERLAP);
         let onsets = onsets.iter().map(|&onset| Layer::Upright(onset, ONSET));
-        let mut percent = ColourBar::of_axis("detached (%)", &Axis::linear("", 0.0, 1.0), shade);
+        let mut percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 1.0), shade);
         percent.ticks =
             [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
         Panel {

@@ -6,9 +6,10 @@ use super::frame::Layout;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Panel, Place};
 use super::picture::{Dot, Fill, Ink, Picture, Stroke};
-use super::sets::{Grid, Modulations, Periods, amplitude, ascending};
+use super::sets::{Grid, Modulations, Periods};
 use super::style::{BLACK, GREY, GRID, INKS, Look, REFERENCE, drive_alone};
-use crate::reduce::SetRow;
+use crate::reduce::{SetRow, ascending};
+use crate::sweep::label;
 
 /// Least values of the period that make a staircase.
 const MIN_PERIODS: usize = 24;
@@ -31,11 +32,15 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
     let free = sets.free.and_then(|set| set.tau_mean);
     let periods = Periods::of(&sets.periods, free);
     let grid = Grid::of(ascending(sets.periods.iter().map(|&period| periods.place(period))));
-    let x = grid.axis(periods.label);
+    let x = grid.axis(&periods.label);
     let ratios = sets.modulated.iter().filter_map(|set| quartiles(set)).flatten();
     let y = Axis::of_data("Slip interval τ / T, median", ratios, WIDE, f64::INFINITY)?;
-    let mut entries: Vec<Entry> =
-        sets.amplitudes.iter().zip(INKS).map(|(&height, ink)| entry(Mark::Dot(dot(ink)), amplitude(height))).collect();
+    let mut entries: Vec<Entry> = sets
+        .amplitudes
+        .iter()
+        .zip(INKS)
+        .map(|(&height, ink)| entry(Mark::Dot(dot(ink)), label("Delta").setting(height)))
+        .collect();
     entries.push(entry(Mark::Patch(Fill { ink: GREY, opacity: BOX }), "25 to 75 % of slips"));
     entries.push(entry(Mark::Line(GRID), "τ = nT"));
     entries.extend(free.map(|_| entry(Mark::Line(REFERENCE), "τ₀ / T, Δ = 0")));
@@ -63,7 +68,7 @@ pub(super) fn staircase(sets: &[SetRow], look: &Look) -> Option<Picture> {
         indices.push(Layer::Curve(values(|set| set.locking_index), Stroke::solid(ink, 1.2)));
         indices.push(Layer::Curve(values(|set| set.locking_index_drive), drive_alone(ink)));
     }
-    let lower = Panel::new(200.0, x.clone(), Axis::sparse("Locking index", 0.0, 1.0), indices);
+    let lower = Panel::new(200.0, x.clone(), Axis::sparse("Locking index of τ", 0.0, 1.0), indices);
     Some(panel::draw("staircase", look, Layout::column(558.0), &entries, vec![Panel::new(310.0, x, y, ratios), lower]))
 }
 
@@ -88,7 +93,7 @@ mod tests {
         };
         let mut sets = steps(1e-6, 24);
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
-        assert!(svg.contains(">Modulation period T (s)<") && svg.contains(">Δ = 1 µm<"));
+        assert!(svg.contains(">Period of the modulation T (ms)<") && svg.contains(">Δ = 1 µm<"));
         assert!(!svg.contains("by the drive alone"));
         for set in &mut sets {
             set.locking_index_drive = Some(0.4);
@@ -99,7 +104,7 @@ mod tests {
         assert!(with.matches("<path").count() - svg.matches("<path").count() > 40);
         sets.push(set(0.0, 0.11, 1.0));
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
-        assert!(svg.contains(">Modulation period T / τ₀<") && svg.contains(">τ₀ / T, Δ = 0<"));
+        assert!(svg.contains(">Period of the modulation T / τ₀<") && svg.contains(">τ₀ / T, Δ = 0<"));
         assert!(staircase(&steps(1e-6, 23), &Look::default()).is_none());
         let amplitudes = (1..=4).flat_map(|amplitude| steps(1e-7 * f64::from(amplitude), 24));
         assert!(staircase(&amplitudes.collect::<Vec<_>>(), &Look::default()).is_none());

@@ -166,11 +166,6 @@ pub(super) const STRIPE: Fill = Fill { ink: LIGHT_GREY, opacity: 0.35 };
 /// Radius of the dots of statistics.
 pub(super) const RADIUS: f64 = 4.2;
 
-/// Data joined by a line.
-pub(super) const fn curve(ink: Ink) -> Stroke {
-    Stroke::solid(ink, 1.6)
-}
-
 /// The part of the drive alone of data in this ink.
 pub(super) const fn drive_alone(ink: Ink) -> Stroke {
     Stroke::dashed(ink, 1.6, (3.0, 3.0))

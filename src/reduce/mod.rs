@@ -22,6 +22,7 @@ mod set;
 mod slip_stats;
 mod source;
 mod statistic;
+mod swept;
 mod values;
 
 pub use crate::sweep::{Interval, SetRow};
@@ -37,12 +38,13 @@ pub use histogram::HistogramBin;
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
 pub use quantile::quantile;
-pub use reduced::{Statistic, advise, read_reduced, read_sets};
+pub use reduced::{advise, read_reduced, read_sets};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
 pub use source::renew;
+pub use swept::{Swept, ascending, differing, has_even_steps, is_same, swept};
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 
 use crate::model::theory::{load_maximum_phase, minimum_phase};

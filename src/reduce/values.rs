@@ -28,7 +28,7 @@ type Shown<'a> = (&'a SetRow, Derived);
 #[derive(Clone, Debug)]
 pub struct Values {
     pub column: Column,
-    /// A number for each set; of a word its place among the words.
+    /// A number for each set, in SI; of a word its place among the words.
     pub numbers: Vec<Option<f64>>,
     /// Ends of the confidence intervals, where there are any.
     pub intervals: Vec<Option<(f64, f64)>>,
@@ -100,6 +100,17 @@ impl Values {
 
     pub fn label(&self) -> Label {
         label(&self.column.name)
+    }
+
+    /// The factor to the unit in which they are read best, and that unit.
+    pub fn scale(&self) -> (f64, &'static str) {
+        self.label().scale(self.numbers.iter().flatten().fold(0.0, |largest, value| value.abs().max(largest)))
+    }
+
+    /// Its symbol and one of its values or words.
+    pub fn setting(&self, value: f64) -> String {
+        let label = self.label();
+        self.word(value).map_or_else(|| label.setting(value), |word| format!("{}: {word}", label.symbol))
     }
 }
 

@@ -5,7 +5,9 @@ use crate::model::{Description, Symbol};
 use crate::table::columns::Row;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 33] = [
+const LABELS: [(&str, &str, &str); 35] = [
+    ("Delta", "Δ", "Amplitude"),
+    ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
     ("frequency", "1/T", "Modulation frequency"),
     ("failed_jobs", "failed", "Failed jobs"),
@@ -32,7 +34,7 @@ const LABELS: [(&str, &str, &str); 33] = [
     ("drop_sd", "σ(ΔF)", "S.d. of the stress drop"),
     ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
     ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
-    ("friction_coefficient", "μ", "Friction coefficient ⟨Fₛ⟩/F_N"),
+    ("friction_coefficient", "μ", "Friction coefficient"),
     ("slip_distance_mean", "slip distance", "Mean slip distance"),
     ("edge_distance_mean", "edge distance", "Mean slip distance of the driven edge"),
     ("least_attached_mean", "least attached", "Least attached contacts in a slip"),
@@ -56,7 +58,7 @@ pub struct Label {
 /// What ends the names of columns of a comparison.
 const COMPARED: [(&str, &str); 3] = [("_a", ", A"), ("_b", ", B"), ("_difference", ", B − A")];
 
-/// The label of a column of the sets, or of a comparison of such; a formula is its own.
+/// The label of a column of the sets, or of a comparison of such; that of a formula has symbols in place of columns.
 pub fn label(column: &str) -> Label {
     for (end, words) in COMPARED {
         if let Some(column) = column.strip_suffix(end) {
@@ -64,12 +66,21 @@ pub fn label(column: &str) -> Label {
             return Label { symbol: symbol + words, what: what + words, unit };
         }
     }
-    if let Some(symbol) = Symbol::from_key(column) {
-        let Description { meaning, unit, .. } = symbol.description();
-        let what = meaning.split([',', ';']).next().unwrap_or_default();
-        return Label { symbol: symbol_of(symbol), what: capitalised(what), unit };
+    let is_of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
+    if !column.chars().all(is_of_name) {
+        let words = column.split_inclusive(|letter| !is_of_name(letter)).map(|part| {
+            let name = part.trim_end_matches(|letter| !is_of_name(letter));
+            label(name).symbol + &part[name.len()..]
+        });
+        let symbol: String = words.collect();
+        return Label { what: symbol.clone(), symbol, unit: "" };
     }
     let known = LABELS.iter().find(|(key, ..)| *key == column);
+    if let Some(symbol) = Symbol::from_key(column) {
+        let Description { meaning, unit, .. } = symbol.description();
+        let what = known.map_or_else(|| meaning.split([',', ';']).next().unwrap_or_default(), |(.., what)| what);
+        return Label { symbol: symbol_of(symbol), what: capitalised(what), unit };
+    }
     let described = SetRow::columns().into_iter().find(|known| known.name == column);
     let plain = column.replace('_', " ");
     let symbol = known.map_or_else(|| plain.clone(), |(_, symbol, _)| (*symbol).to_owned());
@@ -95,6 +106,29 @@ impl Label {
             unit => (1.0, unit),
         }
     }
+
+    /// For an axis in this unit: what it is, its symbol unless that is a word or stands there already, and the unit.
+    pub fn axis(&self, unit: &str) -> String {
+        let Self { symbol, what, .. } = self;
+        let mut words = symbol.split(|letter: char| !letter.is_ascii_lowercase());
+        let is_word = words.any(|word| word.len() > 2) || what.split(' ').any(|word| word == symbol);
+        with_unit(&if is_word { what.clone() } else { format!("{what} {symbol}") }, unit)
+    }
+
+    /// The same with the symbol alone.
+    pub fn short(&self, unit: &str) -> String {
+        with_unit(&self.symbol, unit)
+    }
+
+    /// The symbol and a value, in SI.
+    pub fn setting(&self, value: f64) -> String {
+        let (factor, unit) = if value == 0.0 { (1.0, "") } else { self.scale(value.abs()) };
+        format!("{} = {} {unit}", self.symbol, three_digits(factor * value)).trim_end().to_owned()
+    }
+}
+
+fn with_unit(label: &str, unit: &str) -> String {
+    if unit.is_empty() { label.to_owned() } else { format!("{label} ({unit})") }
 }
 
 /// The symbol of a parameter in the paper, or its key, with the subscripts that there are letters for.
@@ -105,8 +139,8 @@ pub fn symbol_of(symbol: Symbol) -> String {
         Some((letter, "s")) => format!("{letter}ₛ"),
         Some((letter, "r")) => format!("{letter}ᵣ"),
         // There is no letter for other subscripts.
-        Some(_) => description.key.replace('_', " "),
-        None => name.replace("V0", "V₀"),
+        Some(_) if description.symbol.is_empty() => name.replace('_', " "),
+        _ => name.replace('_', "").replace("V0", "V₀"),
     }
 }
 
@@ -148,6 +182,22 @@ mod tests {
         let scaled = |column: &str, largest| label(column).scale(largest);
         assert_eq!((scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)), ((1e3, "ms"), (1.0, "s")));
         assert_eq!((scaled("Delta", 1e-6), scaled("V0", 1e-6)), ((1e6, "µm"), (1.0, "m/s")));
-        assert_eq!(label("tau_sd / tau_mean").symbol, "tau sd / tau mean");
+        assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 * ⟨τ⟩)");
+        let settings = [("Delta", 1e-6), ("Delta", 0.0), ("T", 0.034), ("V0", 1e-4)];
+        let settings = settings.map(|(column, value)| label(column).setting(value));
+        assert_eq!(settings, ["Δ = 1 µm", "Δ = 0", "T = 34 ms", "V₀ = 1e-4 m/s"]);
+    }
+
+    #[test]
+    fn axes_have_words_a_symbol_and_a_unit_each_once() {
+        let axis = |column: &str, largest| label(column).axis(label(column).scale(largest).1);
+        let found = [("tau_mean", 0.1), ("Delta", 1e-6), ("eta", 9.0), ("V0", 1e-4), ("slip_share", 1.0)]
+            .map(|(column, largest)| axis(column, largest));
+        let expected = ["Mean interval ⟨τ⟩ (ms)", "Amplitude Δ (µm)", "η = 2πΔ / (T V₀)", "Drive velocity V₀ (m/s)"];
+        assert_eq!(found[..4], expected);
+        assert_eq!(axis("resultant_length", 1.0), "Resultant length of the phase R");
+        assert_eq!(found[4], "Share of time within slips");
+        assert_eq!(axis("mean_friction", 300.0), "Mean friction ⟨Fₛ⟩ (N)");
+        assert_eq!(label("Delta").short("µm"), "Δ (µm)");
     }
 }

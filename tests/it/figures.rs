@@ -13,14 +13,14 @@ fn each_sweep_gets_the_figures_that_fit_it() {
     let table: &[(&str, &[&str])] = &[
         ("Delta = { log = [1e-7, 2e-6], points = 8 }\nfrequency = { log = [20, 400], points = 8 }", &["locking-map"]),
         ("Delta = [0, 1e-6]\nfrequency = { linear = [20, 400], points = 24 }", &["staircase"]),
-        ("Delta = { linear = [0, 2e-6], points = 8 }\nfrequency = { linear = [20, 400], points = 7 }", &[]),
-        ("Delta = [0, 1e-6]\nfrequency = [90]\ntau_r = [1e-3, 2e-3, 5e-3]", &["dependence"]),
+        ("Delta = { linear = [0, 2e-6], points = 8 }\nfrequency = { linear = [20, 400], points = 7 }", &["overview"]),
+        ("Delta = [0, 1e-6]\nfrequency = [90]\ntau_r = [1e-3, 2e-3, 5e-3]", &["overview"]),
         (
             "Delta = [0, 1e-6]\nfrequency = [90]\nbreak_on = [\"magnitude\", \"tension\"]",
-            &["dependence", "tau-histograms"],
+            &["overview", "tau-histograms"],
         ),
-        ("Delta = [0, 5e-7, 1e-6, 2e-6, 4e-6]\nfrequency = [90]", &["friction"]),
-        ("Delta = [0, 1e-6]\nfrequency = [90]", &["tau-histograms"]),
+        ("Delta = [0, 5e-7, 1e-6, 2e-6, 4e-6]\nfrequency = [90]", &["overview"]),
+        ("Delta = [0, 1e-6]\nfrequency = [90]", &["overview", "tau-histograms"]),
     ];
     let folder = Folder::new();
     for (index, (axes, expected)) in table.iter().enumerate() {
@@ -70,13 +70,12 @@ fn each_option_of_a_figure_changes_what_it_says() {
         fs::read_to_string(folder.path("own.svg")).unwrap()
     };
     let plain = svg("");
-    for text in ["Drive velocity V₀ (10⁻³ m/s)", "Mean interval (s)", "Sweep own"] {
+    for text in ["Drive velocity V₀ (m/s)", ">10⁻⁴<", "Mean interval ⟨τ⟩ (s)", ">Δ = 1 µm<", "Sweep own"] {
         assert!(plain.contains(text), "{text}");
     }
     for (options, text) in [
-        ("--log xy", ">10⁻⁴<"),
+        ("--log none", "Drive velocity V₀ (10⁻³ m/s)"),
         ("--log y --ylim 1e-4:10", ">10⁻³<"),
-        ("--colour Delta", ">Δ = 1e-6 m<"),
         ("--colour frequency", ">1/T = 90 Hz<"),
         ("--colour V0", ">V₀ (m/s)<"),
         ("--panels Delta", ">(b)<"),
@@ -169,5 +168,59 @@ fn the_list_of_columns_is_that_of_the_table_and_all_of_its_numbers_can_be_drawn(
     // A number of the table, a flag and a word.
     for name in ["eta", "jobs", "has_phase", "regime", "phase_mean", "mean_friction"] {
         folder.ends(0, &format!("plot r --x V0 --y {name} -o {name}.svg"));
+    }
+}
+
+/// Sweeps over one to four parameters, drawn by a fixed rule: each has a figure that says what it shows.
+#[test]
+fn every_sweep_has_a_figure_without_raw_names_and_without_an_empty_panel() {
+    const AXES: [&str; 8] = [
+        "V0 = { log = [1e-5, 1e-2], points = 5 }",
+        "Kd = [1e7, 4e7]",
+        "tau_r = [1e-3, 5e-3, 2e-2]",
+        "dfs = [0, 6.9e-3, 0.1, 0.3]",
+        "break_on = [\"magnitude\", \"tension\"]",
+        "N = [3, 5, 9]",
+        "Delta = [0, 1e-6]\nfrequency = [29, 58, 90]",
+        "[axes.sobol]\npoints = 6\nDelta = { log = [1e-7, 2e-6] }\neta = { log = [0.5, 20] }",
+    ];
+    let (folder, mut state) = (Folder::new(), 9_u32);
+    let mut draw = |below: usize| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        usize::try_from(state >> 16).unwrap() % below
+    };
+    for index in 0..12 {
+        let mut axes: Vec<&str> = Vec::new();
+        while axes.len() <= index % 4 {
+            let axis = AXES[draw(AXES.len())];
+            let keys = |axis: &str| axis.split(['\n', '=']).next().unwrap().trim().to_owned();
+            let has_modulation = |axis: &str| axis.contains("Delta");
+            let clashes = |other: &&str| keys(other) == keys(axis) || (has_modulation(other) && has_modulation(axis));
+            if !axes.iter().any(clashes) {
+                axes.push(axis);
+            }
+        }
+        let model = if axes.iter().any(|axis| axis.starts_with("N ")) { "" } else { "N = 5\n" };
+        // A table comes after what stands alone.
+        axes.sort_by_key(|axis| axis.starts_with('['));
+        let axes = axes.join("\n");
+        let text = format!("name = \"s\"\n[model]\n{model}Ns = 5\n[axes]\n{axes}\n[record]\nslips = 4\n");
+        folder.write("sweep.toml", &text);
+        folder.ends(0, &format!("run sweep.toml --out r{index}"));
+        let figures = folder.contents(&format!("r{index}/figures"));
+        let svgs: Vec<String> = figures
+            .iter()
+            .filter(|(path, _)| path.extension().is_some_and(|extension| extension == "svg"))
+            .map(|(_, bytes)| String::from_utf8(bytes.clone().unwrap()).unwrap())
+            .collect();
+        assert!(!svgs.is_empty(), "{axes}");
+        for svg in svgs {
+            let texts = svg.split("<text").skip(1).map(|text| text.split(['>', '<']).nth(1).unwrap());
+            assert_eq!(texts.filter(|text| text.contains('_')).collect::<Vec<_>>(), [""; 0], "{axes}");
+            // What is drawn inside a frame comes between the clip and its end, dots after it.
+            for panel in svg.split("clip-path=\"").skip(1) {
+                assert!(["<circle", "<rect"].iter().any(|mark| panel.contains(mark)), "{axes}");
+            }
+        }
     }
 }
