@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stickslip::reduce::{BackboneBin, CellRow, HistogramBin, Point, SetInRounds, SetRow};
+use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow};
 use stickslip::results::layout::Layout;
 use stickslip::results::parts::committed_files;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, PrecursorRow, SLIPS, SlipRow};
@@ -90,7 +90,7 @@ fn reduced_schema(table: &str) -> Option<(&'static str, SchemaRef)> {
     fn of<R: TableRow>() -> (&'static str, SchemaRef) {
         (R::NAME, schema::<R>())
     }
-    let all = [of::<SetRow>(), of::<CellRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
+    let all = [of::<SetRow>(), of::<EdgeRow>(), of::<HistogramBin>(), of::<BackboneBin>(), of::<Point>()];
     all.into_iter().find(|(name, _)| *name == table)
 }
 
@@ -144,8 +144,8 @@ impl Wanted {
                 }
                 committed_files(layout, self.table, &layout.dataset(JOBS)?)?
             }
-            CellRow::NAME if results.sweep().rounds().is_none_or(|rounds| rounds.refinement.is_none()) => {
-                let problem = "has no cells: its sweep file has no [refine]";
+            EdgeRow::NAME if results.sweep().refinement().is_none() => {
+                let problem = "has no edges: its sweep file has no [refine]";
                 return Err(ResultsError::refused(layout.root(), problem).into());
             }
             _ => {

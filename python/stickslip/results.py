@@ -62,13 +62,12 @@ class Results:
         """One row per parameter set, all seeds together: statistics of intervals, phases and friction, with intervals."""
         return self._table("sets", columns)
 
-    def cells(self, columns: Sequence[str] | None = None) -> Table:
-        """One row per cell of a refined grid; `differs` says in which the edge lies, if the sweep has `[refine]`.
+    def edges(self, columns: Sequence[str] | None = None) -> Table:
+        """One row per edge, with its 95 % interval, and per row of sets without one, if the sweep has `[refine]`.
 
-        >>> cells = results.cells().to_pandas()
-        >>> cells[cells["differs"]][["x", "x_low", "x_high"]]
+        >>> results.edges(["T", "edge", "edge_low", "edge_high", "ended"]).to_pandas()
         """
-        return self._table("cells", columns)
+        return self._table("edges", columns)
 
     def histograms(self, columns: Sequence[str] | None = None) -> Table:
         """One row per bin of the intervals of a set."""

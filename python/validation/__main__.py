@@ -49,8 +49,9 @@ def document(results: Path) -> str:
             "Brackets hold 95 % intervals: the jackknife over seeds or parameter sets, or the bootstrap where a statistic"
             " is not smooth ([`statistics.py`](../python/stickslip/statistics.py)).",
             "Where the paper gives no number, the criterion is a choice.",
-            "*Random loads* are slips without any [locking](model.md#phase-and-locking): for η > 1 even these are bunched"
-            " in φ, and their intervals near multiples of T.",
+            "Of locking there are two questions: what is seen, and what of it lies beyond *the drive alone*, which is slips"
+            " at the loads of the unmodulated slider ([definition](model.md#phase-and-locking)).",
+            "*Random loads* are slips at independent loads: for η > 1 even these are bunched in φ.",
         ),
         table(summary),
         "## The paper's statements",

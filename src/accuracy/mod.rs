@@ -1,26 +1,26 @@
-//! Accuracy: speed against error of every solver in one run, and what happens in hard cases.
+//! Accuracy: speed against error of every solver in one run.
 //!
 //! ```text
 //! breaks.rs     before chaos: break times, contact by contact
 //! distance.rs   after chaos: distances of distributions and biases, with intervals
 //! study.rs      every solver at every set of parameters, timed on one thread
-//! hard_cases.*  parameters that break a naive code, each audited
 //! cost.rs       what a computation costs
+//! verdict.rs    what that says of a sweep's solver
 //! report.rs     tables as Parquet and JSON, figures
 //! ```
 
 pub mod breaks;
 pub mod cost;
 pub mod distance;
-mod hard_cases;
 mod report;
 mod study;
+mod verdict;
 
 pub use cost::Cost;
 pub use distance::Distances;
-pub use hard_cases::{HardCase, Stability, hard_cases};
-pub use report::{Report, stability_report, study_report};
+pub use report::{Report, study_report};
 pub use study::{DistanceRow, Findings, MethodRow, QUANTITIES, Study};
+pub use verdict::verdict;
 
 use crate::model::{Parameters, Symbol, Value};
 use crate::solver::{Resolve, Solver};

@@ -2,7 +2,7 @@
 
 use super::distance::Distances;
 use super::study::{Findings, MethodRow, Study};
-use super::{Stability, cost, other_settings};
+use super::{cost, other_settings, verdict};
 use crate::figure::{ErrorPanel, Look, Picture, WorkPrecision, work_precision};
 use crate::model::Parameters;
 use crate::results::commit::Commit;
@@ -19,15 +19,20 @@ const FORMAT: u32 = 4;
 
 /// The findings of a study, with a figure for the sets that differ in the modulation alone.
 pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>> {
-    let settings = json!({
+    let json = json!({
+        "format": FORMAT,
+        "program": PROGRAM,
+        "processor": cost::processor(),
         "seeds": study.seeds,
         "first_set_multiple": study.first_set_multiple,
         "slips": study.slips,
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
+        "verdict": verdict(study, findings),
     });
-    let mut report =
-        Report::new("accuracy", settings).table("methods", &findings.methods).table("distances", &findings.distances);
+    let mut report = Report { json, tables: Vec::new(), pictures: Vec::new() }
+        .table("methods", &findings.methods)
+        .table("distances", &findings.distances);
     let mut drawn = Vec::new();
     for set in study.sets.iter().map(unmodulated) {
         if !drawn.contains(&set) {
@@ -40,31 +45,17 @@ pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<
     Ok(report)
 }
 
-pub fn stability_report(cases: &[Stability]) -> Report<'_> {
-    Report::new("hard-cases", json!({})).table("cases", cases)
-}
-
 /// Writes a table into a file.
 type TableFile<'a> = Box<dyn Fn(StoredFile, &Footer) -> Result<(), DatasetError> + 'a>;
 
-/// Tables, JSON and figures of one command.
+/// Tables, JSON and figures.
 pub struct Report<'a> {
-    /// Name of the file of the JSON.
-    name: &'static str,
     pub json: Value,
     tables: Vec<(&'static str, TableFile<'a>)>,
     pictures: Vec<(String, Picture)>,
 }
 
 impl<'a> Report<'a> {
-    /// A report with these fields in its JSON, and those that every report has.
-    fn new(name: &'static str, mut json: Value) -> Self {
-        json["format"] = FORMAT.into();
-        json["program"] = PROGRAM.into();
-        json["processor"] = cost::processor().into();
-        Self { name, json, tables: Vec::new(), pictures: Vec::new() }
-    }
-
     /// Adds a table, whose rows become a field of the JSON, too.
     fn table<R: Table>(mut self, field: &str, rows: &'a [R]) -> Self {
         self.json[field] = rows.iter().map(arrow::json).collect();
@@ -89,7 +80,7 @@ impl<'a> Report<'a> {
             write(commit.stage(&file)?, &footer)?;
             files.push(file);
         }
-        let mut documents = vec![(format!("{}.json", self.name), self.json.to_string().into_bytes())];
+        let mut documents = vec![("accuracy.json".to_owned(), self.json.to_string().into_bytes())];
         for (name, picture) in &self.pictures {
             documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
             documents.push((format!("{name}.png"), picture.png()?));
@@ -157,7 +148,10 @@ fn points(
         let drive = match row.parameters.modulation_period {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
-            Some(period) => format!("Δ = {:e} m, {:.4} Hz", row.parameters.modulation_amplitude, 1.0 / period),
+            Some(period) => {
+                let frequency = (1e4 / period).round() / 1e4;
+                format!("Δ = {:e} m, {frequency} Hz", row.parameters.modulation_amplitude)
+            }
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());
@@ -256,13 +250,9 @@ mod tests {
     fn every_field_of_the_json_is_documented() {
         let page = include_str!("../../docs/commands.md");
         let (study, findings) = (Study { sets: vec![Parameters::default()], ..Study::quick() }, findings());
-        let reports =
-            [("accuracy", study_report(&study, &findings).unwrap()), ("accuracy --hard-cases", stability_report(&[]))];
-        for (command, report) in reports {
-            let row = page.lines().find(|line| line.starts_with(&format!("| `{command}` |"))).unwrap();
-            for field in report.json.as_object().unwrap().keys() {
-                assert!(row.contains(&format!("`{field}`")), "{command}: {field}");
-            }
+        let row = page.lines().find(|line| line.starts_with("| `accuracy` |")).unwrap();
+        for field in study_report(&study, &findings).unwrap().json.as_object().unwrap().keys() {
+            assert!(row.contains(&format!("`{field}`")), "{field}");
         }
     }
 
@@ -278,6 +268,5 @@ mod tests {
         };
         described(MethodRow::NAME, MethodRow::columns());
         described(DistanceRow::NAME, DistanceRow::columns());
-        described(Stability::NAME, Stability::columns());
     }
 }

@@ -38,6 +38,10 @@ pub struct Study {
     /// Sets of parameters, with seed 0.
     pub sets: Vec<Parameters>,
     pub solvers: Vec<Solver>,
+    /// The one of them that the verdict is about.
+    pub own: Solver,
+    /// Slips that the sweep records of each set; none without a sweep.
+    pub slips_of_sets: Vec<u64>,
     /// Realisations of each ensemble, each timed once, in turn with those of the other solvers.
     pub seeds: u64,
     /// Multiple of these realisations at the first set; those beyond them are not timed.
@@ -66,6 +70,8 @@ impl Study {
                 &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7],
                 &[1e-3, 1e-4, 1e-6, 1e-8, 1e-10],
             ),
+            own: Solver::EventDriven { tolerance: 1e-3, resolve: Resolve::Grid },
+            slips_of_sets: Vec::new(),
             seeds: 8,
             first_set_multiple: 8,
             slips: 100,
@@ -94,17 +100,17 @@ impl Study {
     pub fn at(self, sets: Vec<Parameters>, solver: Solver) -> Self {
         let (mut time_steps, mut on_the_grid, mut in_taylor_steps) =
             (Vec::new(), vec![1e-2, 1e-3, 1e-4, 1e-5, 1e-6], vec![1e-3, 1e-4, 1e-6, 1e-8]);
-        let (settings, setting) = match solver {
-            Solver::FixedStep { time_step } => (&mut time_steps, time_step),
+        let (settings, setting, own) = match solver {
+            Solver::FixedStep { time_step } => (&mut time_steps, time_step, solver),
             Solver::EventDriven { tolerance, resolve } if resolve.takes_grid(tolerance) => {
-                (&mut on_the_grid, tolerance)
+                (&mut on_the_grid, tolerance, Solver::EventDriven { tolerance, resolve: Resolve::Grid })
             }
-            Solver::EventDriven { tolerance, .. } => (&mut in_taylor_steps, tolerance),
+            Solver::EventDriven { tolerance, .. } => (&mut in_taylor_steps, tolerance, taylor(tolerance)),
         };
         settings.push(setting);
         settings.sort_by(|a, b| b.total_cmp(a));
         settings.dedup();
-        Self { sets, solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps), first_set_multiple: 1, ..self }
+        Self { sets, solvers: solvers(&time_steps, &on_the_grid, &in_taylor_steps), own, first_set_multiple: 1, ..self }
     }
 }
 
@@ -188,6 +194,13 @@ columns! {
 tables! {
     DistanceRow = "distances",
         "One row per set of parameters, solver setting and quantity, in the unit of its column in `slips`";
+}
+
+impl DistanceRow {
+    /// Of the interval of the bias of the mean.
+    pub fn half_width(&self) -> f64 {
+        0.5 * (self.distances.mean_bias_high - self.distances.mean_bias_low)
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,13 +2,11 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::{self, PresetFlag, settings_as_sweep};
+use super::sweep::{self, PresetFlag, Variation, changes};
 use super::threads::ThreadsFlag;
-use crate::accuracy::{
-    self, DistanceRow, Distances, Findings, MethodRow, QUANTITIES, Report, Stability, Study, hard_cases, set_in_words,
-    stability_report, study_report,
-};
+use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
 use crate::model::Parameters;
+use crate::results::layout::Layout;
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
@@ -18,6 +16,7 @@ use std::path::PathBuf;
 
 /// More sets would take long, and their tables would be too many to read.
 const MAX_SETS: usize = 12;
+const DEFAULT_OUT: &str = "results/accuracy";
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -31,27 +30,32 @@ The cost is the CPU time of one thread in the cheapest realisation. Realisations
 their spread shows whether other work disturbed the timing, so keep the machine free. --threads is about what is not
 timed.
 
-By default the study takes the paper's parameters. A sweep file or --set chooses others: it then shows what a slip
-costs at each tolerance of the event-driven solver, and by how much the tolerance biases slips.
+The first lines say how exact a sweep with this solver is: whether a bias was found, which must be larger than what
+chance gives in as many comparisons; by how much breaks are off; and whether the slips that the sweep records could
+tell. Below, each setting has what a slip costs, and its bias; -> marks the solver of the sweep.
+
+By default the study takes the paper's parameters and the default solver. A sweep file or --set chooses others. Seeds
+are those of the study.
 
 Examples:
   stickslip accuracy --quick                 a first look, in about a minute
-  stickslip accuracy --out results/accuracy  the full study: tables, accuracy.json, work-precision figures
+  stickslip accuracy --all                   the full study of the paper's parameters, with a table for each set
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
-  stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver
-  stickslip accuracy --hard-cases            parameters that break a naive code, one row each")]
+  stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver")]
 pub struct Arguments {
     /// Sweep file whose sets and solver are studied in place of the paper's
-    #[arg(value_name = "SWEEP.toml", conflicts_with_all = ["settings", "hard_cases"])]
+    #[arg(value_name = "SWEEP.toml")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
-    /// Set a parameter of the model, and study this one set; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["preset", "hard_cases"])]
-    settings: Vec<String>,
-    /// Folder for tables, JSON and figures
-    #[arg(short, long, value_name = "DIR", default_value = "results/accuracy")]
-    out: PathBuf,
+    #[command(flatten)]
+    variation: Variation,
+    /// Folder for tables, JSON and figures [default: results/<name of the sweep>-accuracy, or results/accuracy]
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the tables of each set: timings, how long trajectories stay together, ledgers, biases of all quantities
+    #[arg(long)]
+    all: bool,
     /// Take fewer slips
     #[arg(long)]
     quick: bool,
@@ -64,38 +68,37 @@ pub struct Arguments {
     slips: Option<u64>,
     #[command(flatten)]
     threads: ThreadsFlag,
-    /// Run the hard cases instead
-    #[arg(long, conflicts_with_all = ["preset", "quick", "seeds", "slips", "threads"])]
-    hard_cases: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
-    let out = &arguments.out;
-    if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(out))).into());
-    }
-    if arguments.hard_cases {
-        return run_hard_cases(arguments);
-    }
     if let Some(setting) =
-        arguments.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
+        arguments.variation.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
     {
         let problem = format!("--set {setting}: a study has seeds of its own; --seeds says how many");
         return Err(UsageError(problem).into());
     }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
-    let sweep = match (arguments.sweep.as_deref(), arguments.preset.preset) {
-        (None, None) if arguments.settings.is_empty() => None,
-        (None, None) => Some(settings_as_sweep(&arguments.settings)?),
-        (file, preset) => Some(sweep::read(file, preset)?),
-    };
-    if let Some(sweep) = sweep {
+    let changes = changes(&arguments.variation)?;
+    let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
+    let mut out = PathBuf::from(DEFAULT_OUT);
+    if has_file || !changes.is_empty() {
+        let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
         output::warn(&sweep.warnings());
-        study = study.at(sets_of(&sweep)?, sweep.solver());
+        let (sets, jobs): (Vec<_>, Vec<u64>) = sets_of(&sweep)?.into_iter().unzip();
+        study = study.at(sets, sweep.solver());
+        if has_file {
+            study.slips_of_sets = jobs.iter().map(|jobs| jobs * sweep.recording().slips).collect();
+            out = Layout::default_root(&sweep);
+            out.as_mut_os_string().push("-accuracy");
+        }
+        if sweep.jobs_of_grid().any(|job| job.parameters.seed != 0) {
+            output::report("the seeds of the sweep are not used: a study has its own, and --seeds says how many");
+        }
     }
+    let out = writable(arguments.out.clone().unwrap_or(out))?;
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
     for (flag, count) in [("--seeds", study.seeds), ("--slips", study.slips)] {
@@ -107,37 +110,33 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    write_and_print(arguments, &study_report(&study, &findings)?, &study_text(&study, &findings))?;
+    let report = study_report(&study, &findings)?;
+    let files = report.write(&out)?;
+    if arguments.json {
+        output::plain_json(&report.json)?;
+    } else {
+        output::print(&study_text(&study, &findings, arguments.all))?;
+        files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
+    }
     Ok(Exit::Done)
 }
 
-fn run_hard_cases(arguments: &Arguments) -> Result<Exit> {
-    let mut rows = Vec::new();
-    for case in hard_cases() {
-        output::report(&format!("{}: {}", case.threat, case.name()));
-        rows.extend(case.run());
+/// A folder that can be written to.
+fn writable(out: PathBuf) -> Result<PathBuf, UsageError> {
+    if !out.is_dir() && out.symlink_metadata().is_ok() {
+        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))));
     }
-    write_and_print(arguments, &stability_report(&rows), &stability_text(&rows))?;
-    Ok(if rows.iter().all(|row| row.passed) { Exit::Done } else { Exit::Failed })
+    Ok(out)
 }
 
-/// Writes the report, and prints it as JSON or text.
-fn write_and_print(arguments: &Arguments, report: &Report<'_>, text: &str) -> Result<()> {
-    let files = report.write(&arguments.out)?;
-    if arguments.json {
-        return output::plain_json(&report.json);
-    }
-    output::print(text)?;
-    files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))
-}
-
-/// The sets of a sweep, with seed 0.
-fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
-    let mut sets: Vec<Parameters> = Vec::new();
+/// The sets of a sweep, with seed 0, and the number of jobs of each.
+fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
+    let mut sets: Vec<(Parameters, u64)> = Vec::new();
     for job in sweep.jobs_of_grid() {
         let set = Parameters { seed: 0, ..job.parameters };
-        if !sets.contains(&set) {
-            sets.push(set);
+        match sets.iter_mut().find(|(known, _)| *known == set) {
+            Some((_, jobs)) => *jobs += 1,
+            None => sets.push((set, 1)),
         }
         if sets.len() > MAX_SETS {
             let problem = format!(
@@ -153,198 +152,70 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<Parameters>> {
     Ok(sets)
 }
 
-/// What each solver costs at each set, how far its first breaks are off, and by how much it biases the means of slips.
-fn study_text(study: &Study, findings: &Findings) -> String {
-    let mut lines = vec![format!(
-        "{}; one thread\n\
-         ms/slip: CPU time in the cheapest of {} realisations; median and dearest: as multiples of it\n\
-         break times: median (largest) error of the first {} breaks; together: breaks and model time until the\n\
-         trajectory leaves that of the reference; ledger: residual of the energy over the work of the drive",
+/// The verdict, and what is behind it: costs, errors of break times and biases of the interval, or of all quantities.
+fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
+    let mut lines = verdict(study, findings);
+    lines.push(format!(
+        "\n{}; one thread\n\
+         ms/slip: CPU time in the cheapest of {} realisations, * extrapolated from that of a step\n\
+         break times: median (largest) error of the first {}; others: bias of the mean ± 95 % interval, each one of many,\n\
+         those of a column against the same reference",
         accuracy::cost::processor(),
         study.seeds,
         study.breaks
-    )];
-    for set in &study.sets {
-        let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
-        lines.extend(cost_table(set, &rows));
-        lines.extend(bias_table(findings, &rows));
-    }
-    lines.push(String::new());
-    lines.extend(legend(findings));
-    let exceed = |of: fn(&Distances) -> bool| findings.distances.iter().filter(|row| of(&row.distances)).count();
-    lines.push(format!(
-        "of {} comparisons with the reference, {} show a bias of the mean; in {} the W1 distance, and in {} the KS distance\n\
-         is larger than in 95 % of comparisons of equal distributions",
-        findings.distances.len(),
-        exceed(is_biased),
-        exceed(|found| found.w1 > found.w1_floor),
-        exceed(|found| found.ks > found.ks_floor)
     ));
+    if all {
+        lines.push(
+            "median and dearest: costs as multiples of the cheapest; together: breaks and model time until the trajectory\n\
+             leaves that of the reference, or > at least; ledger: residual of the energy over the work of the drive"
+                .to_owned(),
+        );
+    }
+    lines.extend(study.sets.iter().flat_map(|set| table(study, findings, set, all)));
     lines.push(String::new());
     lines.join("\n")
 }
 
-/// What the marks mean that occur in the tables.
-fn legend(findings: &Findings) -> Vec<String> {
-    let methods = || findings.methods.iter();
-    let marks = [
-        (methods().any(|row| row.cost.is_extrapolated()), "* extrapolated from the cost of a step"),
-        (methods().any(is_together_throughout), "> or longer: the reference ends here"),
-        (
-            findings.distances.iter().any(|row| is_biased(&row.distances)),
-            "! the 95 % interval excludes zero, which happens by chance in one of 20",
-        ),
-    ];
-    marks.into_iter().filter(|(occurs, _)| *occurs).map(|(_, meaning)| meaning.to_owned()).collect()
-}
-
-/// Whether the breaks agree as far as the reference reaches.
-const fn is_together_throughout(row: &MethodRow) -> bool {
-    row.break_times.together_throughout && row.break_times.together.is_some()
-}
-
-fn is_biased(found: &Distances) -> bool {
-    found.mean_bias_low > 0.0 || found.mean_bias_high < 0.0
-}
-
-/// Costs and errors of the solvers at a set.
-fn cost_table(set: &Parameters, rows: &[&MethodRow]) -> Vec<String> {
-    let mut lines = vec![
-        format!("\n{}", set_in_words(set)),
-        format!(
-            "{:30}{:>9} {:>7} {:>7} {:>8} {:>18} {:>24} {:>9}",
-            "solver", "ms/slip", "median", "dearest", "ns/step", "break times (s)", "together", "ledger"
-        ),
-    ];
-    for row in rows {
-        let errors = row.break_times;
-        let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
-        let together = errors.together.zip(errors.together_seconds).map(|(breaks, seconds)| {
-            let mark = if is_together_throughout(row) { ">" } else { "" };
-            format!("{mark}{breaks} breaks, {seconds:.3} s")
-        });
-        let mark = if row.cost.is_extrapolated() { "*" } else { "" };
-        lines.push(format!(
-            "{:30}{:>9} {:>7.2} {:>7.2} {:>8.0} {:>18} {:>24} {:>9}",
-            row.solver.to_string(),
-            format!("{:.3}{mark}", 1e3 * row.cost.per_slip),
-            row.median_per_slip / row.cost.per_slip,
-            row.largest_per_slip / row.cost.per_slip,
-            1e9 * row.cost.per_step,
-            times.unwrap_or_else(|| "-".to_owned()),
-            together.unwrap_or_else(|| "-".to_owned()),
-            row.ledger_residual.map_or_else(|| "-".to_owned(), |residual| format!("{:.1e}", residual.abs())),
-        ));
-    }
-    lines
-}
-
-/// Of the interval of a bias.
-fn half_width(row: &DistanceRow) -> f64 {
-    0.5 * (row.distances.mean_bias_high - row.distances.mean_bias_low)
-}
-
-/// Biases of the means of slips at a set.
-fn bias_table(findings: &Findings, rows: &[&MethodRow]) -> Vec<String> {
-    let found = |quantity: &str| rows.iter().find_map(|row| findings.distances_of(row, quantity));
-    let quantities = QUANTITIES.map(|(quantity, _)| quantity);
-    let quantities: Vec<&str> = quantities.into_iter().filter(|quantity| found(quantity).is_some()).collect();
-    let Some(slips) = quantities.first().and_then(|quantity| found(quantity)) else { return Vec::new() };
-    let cells = |texts: Vec<String>| texts.iter().map(|text| format!("{text:>18}")).collect::<Vec<_>>().concat();
+/// A line for each solver at a set; -> before that of the sweep.
+fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Vec<String> {
+    let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
+    let is_there = |quantity: &str| rows.iter().any(|row| findings.distances_of(row, quantity).is_some());
+    let quantities = QUANTITIES.map(|(quantity, _)| quantity).into_iter();
+    let quantities: Vec<_> = quantities.filter(|&name| (all || name == "interval") && is_there(name)).collect();
     let unit = |quantity: &str| if quantity == "phase" { "rad" } else { "%" };
-    let heading = quantities.iter().map(|quantity| format!("{quantity} ({})", unit(quantity))).collect();
-    let mut lines = vec![
-        format!(
-            "bias of the mean ± 95 % interval: {} slips compared with {} of one reference, so that marks in a column come together",
-            slips.slips, slips.reference_slips
-        ),
-        format!("{:30}{}", "", cells(heading)),
-    ];
-    for row in rows {
-        let bias = |quantity: &&str| {
-            findings.distances_of(row, quantity).map_or_else(
-                || "-".to_owned(),
-                |row| {
-                    let scale = if unit(quantity) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
-                    let mark = if is_biased(&row.distances) { "!" } else { " " };
-                    format!("{:+.3} ± {:.3}{mark}", scale * row.distances.mean_bias, scale * half_width(row))
-                },
-            )
-        };
-        let biases: Vec<String> = quantities.iter().map(bias).collect();
-        if biases.iter().any(|bias| bias != "-") {
-            lines.push(format!("{:30}{}", row.solver.to_string(), cells(biases)));
-        }
+    let mut heading = format!("{:33}{:>9}{:>18}", "   solver", "ms/slip", "break times (s)");
+    heading.extend(quantities.iter().map(|name| format!("{:>18}", format!("{name} ({})", unit(name)))));
+    if all {
+        heading = format!("{heading}{:>8}{:>8}{:>9}{:>24}{:>9}", "median", "dearest", "ns/step", "together", "ledger");
     }
-    let intervals = rows.iter().filter_map(|row| findings.distances_of(row, "interval"));
-    let halves = intervals.map(|row| 100.0 * half_width(row) / row.reference_mean);
-    if let Some(hidden) = halves.max_by(f64::total_cmp) {
-        lines.push(format!(
-            "these slips may hide a bias of the interval below {hidden:.1} %; more --seeds show smaller ones"
-        ));
+    let mut lines = vec![format!("\n{}", set_in_words(set)), heading];
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    for &row in &rows {
+        let (mark, errors) = (if row.solver == study.own.into() { "->" } else { "  " }, row.break_times);
+        let star = if row.cost.is_extrapolated() { "*" } else { "" };
+        let cost = format!("{:.3}{star}", 1e3 * row.cost.per_slip);
+        let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
+        let mut line = format!("{:33}{cost:>9}{:>18}", format!("{mark} {}", row.solver), or_none(times));
+        for name in &quantities {
+            let bias = findings.distances_of(row, name).map(|row| {
+                let scale = if unit(name) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
+                format!("{:+.3} ± {:.3}", scale * row.distances.mean_bias, scale * row.half_width())
+            });
+            line = format!("{line}{:>18}", or_none(bias));
+        }
+        if all {
+            let mark = if errors.together_throughout { ">" } else { "" };
+            let together = errors.together.zip(errors.together_seconds);
+            line = format!(
+                "{line}{:>8.2}{:>8.2}{:>9.0}{:>24}{:>9}",
+                row.median_per_slip / row.cost.per_slip,
+                row.largest_per_slip / row.cost.per_slip,
+                1e9 * row.cost.per_step,
+                or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s"))),
+                or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))),
+            );
+        }
+        lines.push(line);
     }
     lines
-}
-
-fn stability_text(rows: &[Stability]) -> String {
-    let mut lines = Vec::new();
-    let mut threat = "";
-    for row in rows {
-        if row.threat != threat {
-            threat = &row.threat;
-            lines.push(format!("\n{threat}"));
-        }
-        let mark = if row.passed { "ok    " } else { "FAILED" };
-        let time = row.simulated_seconds.map_or_else(String::new, |time| {
-            let (steps, cpu) = (row.steps, row.cpu_seconds);
-            let (breaks, grid) = (row.breaks, if row.grid_steps > 0 { " on the grid" } else { "" });
-            let ledger = row.ledger_residual.map_or_else(String::new, |residual| format!(", ledger {residual:.1e}"));
-            format!("; {time:.3} s in {steps} steps{grid}, {breaks} breaks{ledger}, {cpu:.2} s")
-        });
-        lines.push(format!("  {mark} {} ({}): {}{time}", row.case, row.solver, row.outcome));
-    }
-    let failed = rows.iter().filter(|row| !row.passed).count();
-    lines.push(format!("\n{} of {} runs passed\n", rows.len() - failed, rows.len()));
-    lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::accuracy::Cost;
-    use crate::accuracy::breaks::BreakErrors;
-    use crate::model::selected::Selected;
-    use crate::solver::Solver;
-
-    /// The lines below the tables of a study with one solver, of which this number of slips was timed.
-    fn explained(timed_slips: u64, together_throughout: bool) -> String {
-        let parameters = Parameters::default();
-        let row = MethodRow {
-            parameters: Selected::new(parameters.clone()),
-            case: String::new(),
-            solver: Solver::default().into(),
-            cost: Cost { per_slip: 1e-3, timed_slips, ..Cost::default() },
-            timings: 1,
-            median_per_slip: 1e-3,
-            largest_per_slip: 1e-3,
-            break_times: BreakErrors {
-                together: Some(9),
-                together_seconds: Some(0.1),
-                together_throughout,
-                ..BreakErrors::default()
-            },
-            ledger_residual: None,
-        };
-        let study = Study { sets: vec![parameters], ..Study::quick() };
-        study_text(&study, &Findings { methods: vec![row], distances: Vec::new() })
-    }
-
-    #[test]
-    fn a_mark_is_explained_if_it_occurs() {
-        let (star, further) = ("\n* extrapolated", "\n> or longer");
-        let text = explained(0, true);
-        assert!(text.contains("1.000*") && text.contains(star) && text.contains(further), "{text}");
-        let text = explained(6, false);
-        assert!(!text.contains('*') && !text.contains(further) && !text.contains("\n! "), "{text}");
-    }
 }

@@ -86,7 +86,7 @@ const HYPERQUEUE: &str = include_str!("batch/hyperqueue.sh");
 
 pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
     let Arguments { time, threads, workers, options, .. } = arguments;
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &[])?;
     output::warn(&sweep.warnings());
     let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
     let program = match program {

@@ -2,11 +2,11 @@
 
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::Preset;
+use super::sweep::{Preset, Variation, changes, vary};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,9 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   stickslip init mine.toml                       every key with its unit, meaning and default
+  stickslip init mine.toml --question friction   a question, with a figure as its answer, in half a minute
   stickslip init mine.toml --preset locking-map  from a sweep of the paper, or beyond it
+  stickslip init mine.toml --set N=140 --axis V0=log:1e-5:1e-3:9 --axis seed=count:8
   stickslip plan mine.toml                       next: what would run")]
 pub struct Arguments {
     /// File to write; its name becomes that of the sweep
@@ -25,6 +27,35 @@ pub struct Arguments {
     /// Start from a sweep of the paper, or beyond it
     #[arg(long, value_name = "NAME")]
     preset: Option<Preset>,
+    /// Start from a sweep that answers a question
+    #[arg(long, value_name = "NAME", conflicts_with = "preset")]
+    question: Option<Question>,
+    #[command(flatten)]
+    variation: Variation,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Question {
+    /// How strong must modulation be to lower friction?
+    Friction,
+    /// How long from slip to slip, and where do slips end, as the drive gets faster?
+    Interval,
+    /// At which frequencies and amplitudes do slips lock to the modulation?
+    Locking,
+    /// Where does the slider slide, in place of stick-slip?
+    Sliding,
+}
+
+impl Question {
+    /// The sweep that answers it: a preset, and axes in place of its own, which are cheaper.
+    fn sweep(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Friction => ("friction", &[]),
+            Self::Interval => ("velocity", &[]),
+            Self::Locking => ("locking-map", &["frequency=linear:10:70:31", "Delta=log:2e-7:4e-6:9"]),
+            Self::Sliding => ("regimes", &["V0=log:1e-5:1e-2:10", "tau_r=log:1e-4:1e-1:10"]),
+        }
+    }
 }
 
 /// A sweep that runs as it is, with all other keys as comments.
@@ -33,9 +64,25 @@ const TEMPLATE: Preset = Preset { name: "sweep", text: include_str!("init/templa
 pub fn init(arguments: &Arguments) -> Result<Exit> {
     let file = &arguments.file;
     let name = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-    let preset = arguments.preset.unwrap_or(TEMPLATE);
+    let (preset, axes) = match arguments.question.map(Question::sweep) {
+        Some((name, axes)) => (Preset::from_str(name, false).map_err(anyhow::Error::msg)?, axes),
+        None => (arguments.preset.unwrap_or(TEMPLATE), [].as_slice()),
+    };
     let text = preset.text.replace(&format!("name = \"{}\"", preset.name), &format!("name = \"{name}\""));
-    Sweep::parse(&text, file).with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
+    let sweep = Sweep::parse(&text, file);
+    let sweep = sweep.with_context(|| format!("{}: the name of the file must suit a sweep", shown(file)))?;
+    let axes: Vec<String> = axes.iter().map(|&axis| axis.to_owned()).collect();
+    let own = changes(&arguments.variation)?;
+    let of_question = changes(&Variation { settings: Vec::new(), axes })?;
+    let text = vary(vary(sweep, &of_question)?, &own)?.text().to_owned();
+    // What is set stands no longer as a comment with its default.
+    let is_set = |line: &str| own.iter().any(|change| line.starts_with(&format!("# {} = ", change.key)));
+    let text: String = text.split_inclusive('\n').filter(|line| !is_set(line)).collect();
+    let question = arguments.question.and_then(|question| question.to_possible_value());
+    let text = match question.as_ref().and_then(|question| question.get_help()) {
+        Some(question) => format!("# {question}\n{}", &text[text.find("name = ").unwrap_or(0)..]),
+        None => text,
+    };
     write_new(file, &text)?;
     let quoted = output::quoted_path(file);
     output::report(&format!("wrote {}. See what it would run: stickslip plan {quoted}", shown(file)));
@@ -104,11 +151,28 @@ mod tests {
     }
 
     #[test]
+    fn what_is_set_is_no_comment_any_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("mine.toml");
+        let variation = Variation { settings: vec!["N=140".to_owned()], axes: vec!["tolerance=1e-5,1e-4".to_owned()] };
+        let arguments = Arguments { file: file.clone(), preset: None, question: None, variation };
+        assert!(init(&arguments).unwrap_err().to_string().contains("tolerance"), "no axis");
+        assert!(!file.exists());
+        let variation = Variation { axes: vec!["V0=1e-5,1e-4".to_owned()], ..arguments.variation };
+        init(&Arguments { variation, ..arguments }).unwrap();
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert!(text.contains("\nN = 140  # --set\n") && !text.contains("# N = 70"), "{text}");
+        assert_eq!(sweep(&text).jobs().count(), 2 * (1 + 2) * 2);
+    }
+
+    #[test]
     fn a_file_that_is_there_is_not_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("mine.toml");
         std::fs::write(&file, "mine").unwrap();
-        let error = init(&Arguments { file: file.clone(), preset: None }).unwrap_err();
+        let error =
+            init(&Arguments { file: file.clone(), preset: None, question: None, variation: Variation::default() })
+                .unwrap_err();
         assert!(error.to_string().contains("is there already"), "{error}");
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
     }

@@ -78,12 +78,13 @@ pub fn count(number: u64, noun: &str) -> String {
 
 /// How far the rounds of a sweep are.
 pub fn rounds(rounds: &RoundsSoFar) -> String {
-    let Standing { sets_done, sets_open, sets_capped, cells_capped } = rounds.standing;
+    let Standing { sets_done, sets_open, sets_capped, edges_capped } = rounds.standing;
     let over = if rounds.is_over { "the last" } else { "not the last" };
     let sets = format!("{} ({over}): {} done, {sets_open} open", rounds.round, count(sets_done, "set"));
     let capped = [
         (sets_capped > 0).then(|| format!("; {} with all seeds allowed, above the target", count(sets_capped, "set"))),
-        (cells_capped > 0).then(|| format!("; {} left undivided, at the limit of sets", count(cells_capped, "cell"))),
+        (edges_capped > 0)
+            .then(|| format!("; {} wider than wanted, at the limit of seeds or jobs", count(edges_capped, "edge"))),
     ];
     capped.into_iter().flatten().fold(sets, |text, more| text + &more)
 }

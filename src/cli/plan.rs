@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output;
-use super::sweep::{self, PresetFlag};
+use super::sweep::{self, PresetFlag, Variation};
 use crate::results::layout::Layout;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::{ErrorKind, Results};
@@ -22,14 +22,17 @@ use std::path::PathBuf;
 Examples:
   stickslip plan sweeps/fig3.toml --json
   stickslip plan --preset fig3
-  stickslip plan sweeps/fig3.toml --out /scratch/fig3")]
+  stickslip plan sweeps/fig3.toml --out /scratch/fig3
+  stickslip plan sweeps/fig3.toml --set slips=100 --axis V0=log:1e-5:1e-3:9")]
 pub struct Arguments {
     /// Sweep file
     #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
-    /// Results directory to compare with, if it is there [default: results/<name of the sweep>]
+    #[command(flatten)]
+    variation: Variation,
+    /// Results directory to compare with, if it is there [default: results/<name of the sweep>; none with --set or --axis]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON
@@ -109,9 +112,11 @@ impl Directory {
 }
 
 pub fn plan(arguments: &Arguments) -> Result<Exit> {
-    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset)?;
+    let changes = sweep::changes(&arguments.variation)?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     output::warn(&sweep.warnings());
-    let root = arguments.out.clone().unwrap_or_else(|| Layout::default_root(&sweep));
+    let default = changes.is_empty().then(|| Layout::default_root(&sweep));
+    let root = arguments.out.clone().or(default);
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let report = Report {
@@ -127,7 +132,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         worker_memory_bytes: MEMORY,
         thread_memory_bytes: MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part,
         at_most: sweep.bounds(),
-        directory: Directory::of(&sweep, root)?,
+        directory: root.map_or(Ok(None), |root| Directory::of(&sweep, root))?,
     };
     if arguments.json {
         output::json(FORMAT, &report)?;

@@ -3,7 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use crate::figure::{Format, Look, OwnFigure, Size, Style, draw_all, draw_own, write_own};
-use crate::reduce::set_columns;
+use crate::reduce::{renew, set_columns};
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::table::shown::shown;
@@ -12,7 +12,7 @@ use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Draw the figures of a results directory from its reduced data, or one of your own
+/// Draw the figures of a results directory, or one of your own; reduces first where the reduced data are not of its tables
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -71,6 +71,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
     }
     let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
     let results = Results::read(&Layout::new(&Disk, directory))?;
+    renew(&results)?;
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = if arguments.own.x.is_none() {
         draw_all(layout, &look, arguments.formats())?

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 const PLAIN_SPACING: Duration = Duration::from_secs(10);
 /// Steps of the bar: thousandths of the predicted cost.
 const RESOLUTION: u32 = 1000;
+/// Share of the predicted cost below which the pace so far says little about the rest.
+const GUESS: f64 = 0.05;
 
 pub struct Progress {
     bar: ProgressBar,
@@ -53,7 +55,7 @@ impl Progress {
                     others => format!(", shared with {}", output::count(others as u64, "worker")),
                 };
                 self.say(&format!(
-                    "running {}, {jobs_there} there already; about {} on {}{variable}{beside}",
+                    "running {}, {jobs_there} there already; predicted: {} on {}{variable}{beside}",
                     output::count(jobs, "job"),
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),
@@ -98,7 +100,8 @@ impl Progress {
         let (Tally { jobs, jobs_done, jobs_of_others, .. }, share) = (self.tally, self.tally.share());
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = if share > 0.0 {
-            output::duration(elapsed * (1.0 - share) / share) + " left"
+            let guess = if share < GUESS { ", a guess so far" } else { "" };
+            format!("{} left{guess}", output::duration(elapsed * (1.0 - share) / share))
         } else {
             "time left unknown".to_owned()
         };

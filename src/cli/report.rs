@@ -23,7 +23,7 @@ Examples:
 
 The page needs no network and no other file. It shows the swept parameters, regimes, failed jobs with
 their commands, charts, the table of parameter sets, predicted and measured cost, and versions. Reduced data that are
-older than the tables are updated first.")]
+not of the tables as they are get updated first.")]
 pub struct Arguments {
     /// Results directory
     #[arg(value_name = "DIR")]

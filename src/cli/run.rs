@@ -1,9 +1,9 @@
 //! `stickslip run`: the missing jobs of a sweep, then reduced data and figures.
 
-use super::exit::Exit;
+use super::exit::{Exit, UsageError};
 use super::progress::Progress;
 use super::report::Reporter;
-use super::sweep::{self, PresetFlag};
+use super::sweep::{self, PresetFlag, Variation};
 use super::threads::ThreadsFlag;
 use super::{output, reduce, show, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
@@ -28,6 +28,7 @@ Examples:
   stickslip run sweeps/fig3.toml
   stickslip run sweeps/fig3.toml --out /scratch/fig3 --threads 16
   stickslip run --preset fig3                    a sweep of the paper, without a file
+  stickslip run sweeps/fig3.toml --set slips=100 --axis V0=1e-5,1e-4 -o finer    another sweep, without an editor
   stickslip run results/fig3                     resume, without the sweep file
   stickslip run sweeps/fig3.toml --shard 2/8 --out part2    without a common disk; see docs/clusters.md
   stickslip run sweeps/fig3.toml --report        with results/fig3/report.html, to watch it in a browser
@@ -47,7 +48,9 @@ pub struct Arguments {
     sweep: Option<PathBuf>,
     #[command(flatten)]
     preset: PresetFlag,
-    /// Results directory [default: results/<name of the sweep>, or the one to resume]
+    #[command(flatten)]
+    variation: Variation,
+    /// Results directory; needed with --set or --axis [default: results/<name of the sweep>, or the one to resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -103,14 +106,26 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 
 impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
-        let (sweep, default_root) = if let Some(directory) = self.sweep.as_deref().filter(|path| path.is_dir()) {
-            (Results::read(&Layout::new(&Disk, directory))?.sweep().clone(), directory.to_owned())
+        let changes = sweep::changes(&self.variation)?;
+        let (sweep, root) = if let Some(directory) = self.sweep.as_deref().filter(|path| path.is_dir()) {
+            let own = Results::read(&Layout::new(&Disk, directory))?.sweep().clone();
+            (sweep::vary(own, &changes)?, directory.to_owned())
         } else {
-            let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset)?;
+            let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset, &changes)?;
             let root = Layout::default_root(&sweep);
             (sweep, root)
         };
-        Ok((sweep, self.out.clone().unwrap_or(default_root)))
+        if let Some(out) = &self.out {
+            return Ok((sweep, out.clone()));
+        }
+        let is_own = |results: Results<'_>| results.sweep().text() == sweep.text();
+        if !changes.is_empty() && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own) {
+            let root = shown(&root);
+            let problem =
+                format!("--set, --axis: make another sweep than that of {root}; name its directory with --out DIR");
+            return Err(UsageError(problem).into());
+        }
+        Ok((sweep, root))
     }
 }
 

@@ -3,10 +3,12 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use crate::model::{Parameters, Symbol};
-use crate::reduce::{FREQUENCY, SetRow, Values, compare, differing, read_reduced, sets_where};
+use crate::reduce::{
+    EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
+};
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::sweep::{Sweep, three_digits};
+use crate::sweep::{Sweep, label, three_digits};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -92,6 +94,9 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         .iter()
         .map(|name| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}"))))
         .collect::<Result<_, _>>()?;
+    if !arguments.json && !arguments.csv {
+        output::print(&edges(&results)?)?;
+    }
     print(arguments, &columns, &rows)?;
     if !arguments.json && !arguments.csv {
         for note in notes(&results, &rows) {
@@ -124,16 +129,14 @@ pub fn summary(results: &Results<'_>) -> Result<String> {
         let root = output::quoted_path(results.layout().root());
         notes.insert(0, format!("… {} more: stickslip show {root}", rows.len() - FIRST));
     }
-    Ok(notes.into_iter().fold(aligned(&columns, &rows, FIRST), |text, note| text + &note + "\n"))
+    let text = edges(results)? + &aligned(&columns, &rows, FIRST);
+    Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
 }
 
 /// The reduced sets, controls left out.
 fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
-    let layout = results.layout();
-    if !layout.storage.exists(&layout.reduced_file("sets"))? {
-        crate::reduce::reduce(results)?;
-    }
-    Ok(read_reduced::<SetRow>(layout)?.into_iter().filter(|row| !row.is_control).collect())
+    renew(results)?;
+    Ok(read_reduced::<SetRow>(results.layout())?.into_iter().filter(|row| !row.is_control).collect())
 }
 
 /// The parameters in which sets differ, and what was found of them.
@@ -197,19 +200,63 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let cells: Vec<Vec<String>> = columns.iter().map(|values| column(values, rows, most)).collect();
-    let widths: Vec<usize> =
-        cells.iter().map(|cells| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0)).collect();
-    let mut text = String::new();
-    for line in 0..cells.first().map_or(0, Vec::len) {
-        let padded = cells.iter().zip(&widths).zip(columns).map(|((cells, &width), values)| {
-            let cell = &cells[line];
-            if values.is_worded() { format!("{cell:width$}") } else { format!("{cell:>width$}") }
+    let cells = columns.iter().map(|values| (values.is_worded(), column(values, rows, most))).collect();
+    side_by_side(cells)
+}
+
+/// Columns of cells side by side, those of words to the left.
+fn side_by_side(columns: Vec<(bool, Vec<String>)>) -> String {
+    let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
+    let lines = columns.first().map_or(0, |(_, cells)| cells.len());
+    let line = |line: usize| {
+        let padded = columns.iter().map(|(is_worded, cells)| {
+            let (cell, width) = (&cells[line], width(cells));
+            if *is_worded { format!("{cell:width$}") } else { format!("{cell:>width$}") }
         });
-        text += padded.collect::<Vec<_>>().join("  ").trim_end();
-        text.push('\n');
+        format!("{}\n", padded.collect::<Vec<_>>().join("  ").trim_end())
+    };
+    (0..lines).map(line).collect()
+}
+
+/// The edges that a sweep has found, and a blank line; empty for one that looks for none.
+fn edges(results: &Results<'_>) -> Result<String> {
+    if results.sweep().rounds().is_none_or(|rounds| rounds.refinement.is_none()) {
+        return Ok(String::new());
     }
-    text
+    let edges = read_reduced::<EdgeRow>(results.layout())?;
+    let Some(first) = edges.first() else { return Ok(String::new()) };
+    let rows: Vec<SetRow> =
+        edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
+    let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
+    let others = differing(&rows).into_iter().filter(|symbol| *symbol != axis);
+    let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
+    let mut columns: Vec<(bool, Vec<String>)> =
+        others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();
+    let label = label(&first.axis);
+    let (factor, unit) = label.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
+    let number = |value: f64| {
+        let digits: f64 = format!("{:.3e}", factor * value).parse().unwrap_or(value);
+        digits.to_string()
+    };
+    let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
+        columns.push((true, std::iter::once(head).chain(edges.iter().map(cell)).collect()));
+    };
+    add("edge of".to_owned(), &|edge| {
+        let statistic = edge.statistic.split(' ').next().unwrap_or_default();
+        let symbol =
+            if statistic == edge.statistic { crate::sweep::label(statistic).symbol } else { edge.statistic.clone() };
+        format!("{symbol} = {}", three_digits(edge.threshold))
+    });
+    add(format!("{} ({unit})", label.symbol), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
+    add("95 %".to_owned(), &|edge| match edge.edge_interval {
+        Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),
+        None if edge.edge.is_none() => format!("from {} to {}", number(edge.bracket_low), number(edge.bracket_high)),
+        None => "–".to_owned(),
+    });
+    add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
+    add("jobs".to_owned(), &|edge| edge.jobs.to_string());
+    add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
+    Ok(side_by_side(columns) + "\n")
 }
 
 /// The head of a column and its first cells.

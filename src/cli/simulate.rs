@@ -8,26 +8,26 @@ mod outputs;
 use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
 use super::output;
-use super::sweep::{self, PresetFlag, as_flags, number, real, written, written_settings};
+use super::sweep::{self, PresetFlag, Variation, changes, number, real};
 use crate::model::{Parameters, Symbol};
 use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
-use crate::simulate::{self as single, Request, Written};
-use crate::sweep::Sweep;
+use crate::simulate::{self as single, Request};
+use crate::sweep::Change;
 use crate::table::file::Footer;
 use anyhow::Result;
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Simulate one realisation and show what it does
 #[derive(Debug, Args)]
-#[command(after_help = after_help(), group(ArgGroup::new(JOB).multiple(true).conflicts_with_all(["sweep", "preset"])))]
+#[command(after_help = after_help())]
 pub struct Arguments {
-    /// Sweep file with exactly one job, in place of the flags that describe one
+    /// Sweep file with exactly one job, once the flags below have set what they name
     #[arg(value_name = "SWEEP.toml")]
     sweep: Option<PathBuf>,
     #[command(flatten)]
@@ -43,35 +43,29 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The group of the flags of a job; a sweep takes their place.
-const JOB: &str = "job";
-
 #[derive(Debug, Args)]
 #[command(next_help_heading = "The job")]
 struct JobFlags {
-    /// Set a parameter of the model; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", group = JOB)]
+    /// Set a parameter of the model, or what else a sweep file has; repeatable
+    #[arg(long = "set", visible_alias = "record", value_name = "KEY=VALUE")]
     settings: Vec<String>,
-    /// Slips to record after start-up [default: 20, unless --time is given]
-    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "N")]
+    /// Slips to record after start-up [default: that of the file; without one 20, unless --time is given]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "N")]
     slips: Option<String>,
     /// Model time at which the job ends even without its slips, in s
-    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
-    /// Set what else is recorded, as [record] of a sweep file has it; repeatable
-    #[arg(long = "record", value_name = "KEY=VALUE", group = JOB)]
-    records: Vec<String>,
-    /// Method
-    #[arg(long, value_parser = ["event-driven", "fixed-step"], default_value = "event-driven", group = JOB)]
-    solver: String,
+    /// Method [default: event-driven]
+    #[arg(long, value_parser = ["event-driven", "fixed-step"])]
+    solver: Option<String>,
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
-    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "X")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
     /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or whichever is better
-    #[arg(long, group = JOB, value_name = "auto|grid|taylor")]
+    #[arg(long, value_name = "auto|grid|taylor")]
     resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
-    #[arg(long, group = JOB, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
 }
 
@@ -144,11 +138,10 @@ Examples:
   stickslip simulate --set Delta=1e-6 --set frequency=58 --time 2 --plot slips.png
   stickslip simulate --set dfs=0 --slips 1 --record discard=0 --contacts contacts.parquet
   stickslip simulate --preset fig1d --panel force --from 0.6 --plot fig1d.svg --plot fig1d.png
+  stickslip simulate sweeps/fig3.toml --set V0=1e-4 --set Delta=1e-6 --set eta=2 --set seed=0
 
 Keys of --set, in SI units; and eta or frequency (Hz) in place of T:
 {}
-
-Keys of --record:
 {}",
         lines(&Symbol::ALL.map(Symbol::key)),
         lines(&RecordingKey::ALL.map(RecordingKey::key)),
@@ -185,10 +178,8 @@ struct Report {
 }
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
-    let sweep = match (&arguments.sweep, arguments.preset.preset) {
-        (None, None) => Sweep::parse(&arguments.job.as_sweep()?, Path::new("flags")).map_err(as_flags)?,
-        (file, preset) => sweep::read(file.as_deref(), preset)?,
-    };
+    let changes = arguments.job.changes()?;
+    let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
     check_outputs(arguments, &sweep, parameters)?;
@@ -215,40 +206,19 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
 }
 
 impl JobFlags {
-    /// The text of a sweep with one point.
-    fn as_sweep(&self) -> Result<String, UsageError> {
-        let is_fixed = self.solver == "fixed-step";
-        for (flag, is_misplaced, place) in [
-            ("--dt", self.dt.is_some() && !is_fixed, "fixed-step"),
-            ("--tolerance", self.tolerance.is_some() && is_fixed, "event-driven; use --dt"),
-            ("--resolve", self.resolve.is_some() && is_fixed, "event-driven"),
-        ] {
-            if is_misplaced {
-                return Err(UsageError(format!("{flag}: goes with --solver {place}")));
-            }
-        }
-        let word = |text: &String| format!("{text:?}");
-        let solver = [
-            ("method", Some(word(&self.solver))),
-            ("tolerance", self.tolerance.clone()),
-            ("resolve", self.resolve.as_ref().map(word)),
-            ("dt", self.dt.clone().or_else(|| is_fixed.then(|| "1e-6".to_owned()))),
+    /// What the flags set, each as a key of a sweep file.
+    fn changes(&self) -> Result<Vec<Change>, UsageError> {
+        let is_fixed = self.solver.as_deref() == Some("fixed-step");
+        let flags = [
+            ("slips", &self.slips),
+            ("max_time", &self.time),
+            ("method", &self.solver),
+            ("tolerance", &self.tolerance),
+            ("resolve", &self.resolve),
+            ("dt", &self.dt.clone().or_else(|| is_fixed.then(|| "1e-6".to_owned()))),
         ];
-        let solver = solver.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect();
-        Ok(single::sweep_text(&written_settings(&self.settings)?, &self.recorded()?, &solver))
-    }
-
-    /// What is recorded, by `--slips`, `--time` and `--record`.
-    fn recorded(&self) -> Result<Written, UsageError> {
-        let mut recorded = written("--record", "energies=true", &self.records)?;
-        for (flag, key, value) in [("--slips", "slips", &self.slips), ("--time", "max_time", &self.time)] {
-            let Some(value) = value else { continue };
-            if recorded.iter().any(|(given, _)| given == key) {
-                return Err(UsageError(format!("{flag} {value}: --record sets {key}, too; keep one")));
-            }
-            recorded.push((key.to_owned(), value.clone()));
-        }
-        Ok(recorded)
+        let flags = flags.into_iter().filter_map(|(key, value)| Some(format!("{key}={}", value.as_ref()?)));
+        changes(&Variation { settings: self.settings.iter().cloned().chain(flags).collect(), axes: Vec::new() })
     }
 }
 

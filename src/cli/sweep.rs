@@ -2,7 +2,7 @@
 
 use super::exit::UsageError;
 use crate::simulate as single;
-use crate::sweep::{Sweep, SweepError};
+use crate::sweep::{Change, Sweep, SweepError, varied, written};
 use anyhow::Result;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
@@ -21,11 +21,11 @@ macro_rules! presets {
     };
 }
 
-const PRESETS: [Preset; 31] = presets! {
-    "choices" "contacts" "disorder" "drag" "drag-strong" "energies" "eq1" "fig1d" "fig2" "fig3" "fig3-full"
+const PRESETS: [Preset; 30] = presets! {
+    "choices" "contacts" "disorder" "drag" "drag-strong" "drive-alone" "energies" "eq1" "fig1d" "fig2" "fig3" "fig3-full"
     "fig3-precise" "fig4b" "fig4d" "friction" "friction-drives" "friction-precise" "fronts" "locking-edge"
     "locking-map" "regimes" "size" "sliding-edge" "staircase" "startup" "stiff-drive" "stochasticity" "tongue-4"
-    "tongues" "tongues-fine" "velocity"
+    "velocity"
 };
 
 impl Preset {
@@ -60,67 +60,72 @@ pub struct PresetFlag {
     pub preset: Option<Preset>,
 }
 
-/// Reads a sweep file, or takes a preset; the command line asks for one of them.
-pub fn read(file: Option<&Path>, preset: Option<Preset>) -> Result<Sweep, SweepError> {
-    match (file, preset) {
-        (Some(file), _) => Sweep::from_file(file),
-        (None, Some(preset)) => preset.sweep(),
-        (None, None) => unreachable!("the command line asks for one of them"),
-    }
+/// How a sweep is varied.
+#[derive(Debug, Default, Args)]
+pub struct Variation {
+    /// Set a key of the sweep file, such as V0=1e-5 or slips=20; it is no axis then. Repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub settings: Vec<String>,
+    /// Give a key several values: V0=1e-5,1e-4 or V0=log:1e-5:1e-3:9, likewise linear, or seed=count:8. Repeatable
+    #[arg(long = "axis", value_name = "KEY=VALUES")]
+    pub axes: Vec<String>,
 }
 
-/// The values of a flag that sets keys, such as `--set V0=1e-5`, as a sweep file has them.
-pub fn written(flag: &str, example: &str, settings: &[String]) -> Result<single::Written, UsageError> {
-    let mut written = single::Written::new();
-    for setting in settings {
-        let no_setting = || UsageError(format!("{flag} {setting}: must be KEY=VALUE, such as {flag} {example}"));
-        let (key, value) = setting.split_once('=').ok_or_else(no_setting)?;
+/// What `--set` and `--axis` change.
+pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
+    let mut changes: Vec<Change> = Vec::new();
+    let settings = settings.iter().map(|text| ("--set", "VALUE", "1e-5", text));
+    for (flag, form, example, text) in settings.chain(axes.iter().map(|text| ("--axis", "VALUES", "1e-5,1e-4", text))) {
+        let no_change = || UsageError(format!("{flag} {text}: must be KEY={form}, such as {flag} V0={example}"));
+        let (key, value) = text.split_once('=').ok_or_else(no_change)?;
         let (key, value) = (key.trim(), value.trim());
-        if written.iter().any(|(earlier, _)| earlier == key) {
-            return Err(UsageError(format!("{flag} {setting}: {key} is set before; keep one")));
+        if changes.iter().any(|earlier| earlier.key == key) {
+            return Err(UsageError(format!("{flag} {text}: {key} is set before; keep one")));
         }
         if key.is_empty() || !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(no_setting());
+            return Err(no_change());
         }
-        // A word such as tension needs quotes in a sweep file.
-        let value = match value {
-            "true" | "false" => value.to_owned(),
-            value => number(value).unwrap_or_else(|_| format!("{value:?}")),
-        };
-        written.push((key.to_owned(), value));
+        changes.push(match flag {
+            "--set" => Change::setting(key, value),
+            _ => Change::axis(key, value).ok_or_else(no_change)?,
+        });
     }
-    Ok(written)
+    Ok(changes)
 }
 
-/// The values of `--set`.
-pub fn written_settings(settings: &[String]) -> Result<single::Written, UsageError> {
-    written("--set", "V0=1e-5", settings)
+/// Reads a sweep file, or takes a preset, as varied; without either, a sweep with one point, of what is set.
+pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
+    let sweep = match (file, preset) {
+        (Some(file), _) => Sweep::from_file(file),
+        (None, Some(preset)) => preset.sweep(),
+        (None, None) => {
+            let [model, record, solver] = ["model", "record", "solver"].map(|section| written(changes, section));
+            return of_flags(&single::sweep_text(&model, &record, &solver));
+        }
+    };
+    vary(sweep?, changes)
 }
 
-/// A number in the form that a sweep file takes.
-pub fn number(text: &str) -> Result<String, &'static str> {
-    if let Ok(whole) = text.parse::<i128>() {
-        return Ok(whole.to_string());
-    }
-    real(text).map(|real| if real.is_nan() { "nan".to_owned() } else { format!("{real:?}") })
+/// A sweep as varied.
+pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
+    if changes.is_empty() { Ok(sweep) } else { of_flags(&varied(sweep.text(), changes)) }
 }
 
 pub fn real(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_| "must be a number")
 }
 
-/// A sweep with one set, of the values of `--set`.
-pub fn settings_as_sweep(settings: &[String]) -> Result<Sweep> {
-    let text = single::sweep_text(&written_settings(settings)?, &single::Written::new(), &single::Written::new());
-    Sweep::parse(&text, Path::new("flags")).map_err(as_flags)
+/// A number, as text.
+pub fn number(text: &str) -> Result<String, &'static str> {
+    real(text).map(|_| text.to_owned())
 }
 
-/// A message about the text that flags were made into, as one about the flags.
-pub fn as_flags(error: SweepError) -> anyhow::Error {
-    match error {
+/// Reads a text that flags were made into; mistakes are those of the flags.
+fn of_flags(text: &str) -> Result<Sweep> {
+    Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
         SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
-    }
+    })
 }
 
 #[cfg(test)]

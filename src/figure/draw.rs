@@ -1,14 +1,13 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
 use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, drag, histograms, intervals, locking_map, refined, regimes, staircase};
+use super::{backbone, drag, edges, histograms, intervals, locking_map, regimes, staircase};
 use super::{own, sets};
-use crate::reduce::{CellRow, SetRow, WRITER, advise, read_reduced, read_sets};
+use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
-use crate::table::shown::shown;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use std::path::PathBuf;
 
 /// Sets that figures hold at once, about a kilobyte each; of more, no figure of sets is drawn.
@@ -20,7 +19,6 @@ const ADVICE: &str = "if it is missing or damaged, reduce the tables again";
 /// Returns the files, in the order in which they were written.
 pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<Vec<PathBuf>> {
     let _alone = exclusive_lock(layout, WRITER)?;
-    check_reduced(layout)?;
     let points = read(layout)?;
     let sets = read_sets(layout, MAX_SETS).map_err(advise(ADVICE))?;
     let look = &look.with_note(&sets::common(sets.iter().map(|set| &*set.parameters)));
@@ -37,8 +35,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
         }
         pictures.extend(maps.into_iter().flatten());
     }
-    if layout.storage.exists(&layout.reduced_file(CellRow::NAME))? {
-        pictures.extend(refined::refined(&read(layout)?, &sets, look));
+    if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
+        pictures.extend(edges::edges(&read(layout)?, look));
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
@@ -48,7 +46,6 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 
 /// Draws a figure of one's own from the sets of a results directory; writes nothing.
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
-    check_reduced(layout)?;
     let rows: Vec<SetRow> = read(layout)?;
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
     let picture = own::own(&rows, figure, look)?;
@@ -64,14 +61,6 @@ pub fn write_own(layout: &Layout<'_>, picture: Picture, look: &Look, formats: &[
 
 fn read<R: FromRow + Table>(layout: &Layout<'_>) -> Result<Vec<R>> {
     read_reduced(layout).map_err(advise(ADVICE))
-}
-
-fn check_reduced(layout: &Layout<'_>) -> Result<()> {
-    if layout.storage.exists(&layout.reduced())? {
-        return Ok(());
-    }
-    let root = shown(layout.root());
-    Err(anyhow!("{root}: has no reduced data to draw; run `stickslip reduce {root}` first"))
 }
 
 /// A picture is larger than it is asked to be if its frames would be too small to read.

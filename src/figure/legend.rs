@@ -18,8 +18,8 @@ const TOP: f64 = 8.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Mark {
     Dot(Dot),
-    /// A circle with a hole.
-    Ring(Ink, f64),
+    /// A circle with a hole, by their radii.
+    Ring(Ink, f64, f64),
     /// A dot with an error bar.
     Bar(Dot),
     Line(Stroke),
@@ -85,9 +85,9 @@ fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
             let dot = Dot { radius: dot.radius.max(3.0), opacity: dot.opacity.max(0.7), ..dot };
             sheet.discs([centre], dot);
         }
-        Mark::Ring(ink, radius) => {
+        Mark::Ring(ink, radius, hole) => {
             sheet.dot(centre, radius, Color::from(ink));
-            sheet.dot(centre, radius - 1.6, Color::from(WHITE));
+            sheet.dot(centre, hole, Color::from(WHITE));
         }
         Mark::Bar(dot) => {
             sheet.line(vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)], Stroke::solid(dot.ink, 1.6));

@@ -348,7 +348,7 @@ impl<'a> Chart<'a> {
         }
         entries.extend((!free.is_empty()).then(|| entry(Mark::Line(REFERENCE), "Δ = 0")));
         let slides = inside.iter().any(|&set| self.slides(set));
-        entries.extend(slides.then(|| entry(Mark::Ring(BLACK, RADIUS), "sliding")));
+        entries.extend(slides.then(|| entry(Mark::Ring(BLACK, RADIUS, RADIUS - 1.6), "sliding")));
         if self.ys.iter().any(|y| y.name() == "slip_share") {
             let [mixed, sliding] = Regime::MIN_SHARES;
             entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));
@@ -545,6 +545,7 @@ pub(super) mod tests {
             };
             let tau = 10.0 / f64::from(1 << step);
             SetRow {
+                frequency: parameters.modulation_period.map(|period| 1.0 / period),
                 parameters: Selected::new(parameters.validated().unwrap()),
                 tau_mean: Some(tau),
                 tau_interval: Some(Interval { low: 0.9 * tau, high: 1.1 * tau }),
@@ -654,6 +655,7 @@ pub(super) mod tests {
         let mut periods = vec![rows[0].clone(); 3];
         for (row, period) in periods.iter_mut().zip([0.02, 0.01, 0.04]) {
             row.parameters.parameters.modulation_period = Some(period);
+            row.frequency = Some(1.0 / period);
         }
         assert_eq!(lines(&periods, "frequency"), [vec![2, 0, 1]]);
     }

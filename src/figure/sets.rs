@@ -181,6 +181,7 @@ pub(super) mod tests {
             Parameters { modulation_amplitude: amplitude, modulation_period: Some(period), ..Parameters::default() };
         SetRow {
             set_id: format!("{amplitude:e} {period:e}"),
+            frequency: of_modulated(1.0 / period),
             eta: if amplitude > 0.0 { parameters.eta() } else { 0.0 },
             parameters: Selected::new(parameters.validated().unwrap()),
             tau_mean: Some(tau),

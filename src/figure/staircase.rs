@@ -95,7 +95,9 @@ mod tests {
         let svg = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(svg.contains(">Period of the modulation T (ms)<") && svg.contains(">Δ = 1 µm<"));
         assert!(!svg.contains("by the drive alone"));
-        sets.iter_mut().for_each(|set| set.locking_index_drive = Some(0.4));
+        for set in &mut sets {
+            set.locking_index_drive = Some(0.4);
+        }
         let with = staircase(&sets, &Look::default()).unwrap().svg();
         assert!(with.contains(">by the drive alone<"));
         // A mark of few dashes, and a curve of many.

@@ -16,10 +16,16 @@ const HEIGHT: f64 = 340.0;
 /// Width of the bars of uncertainty.
 const UNCERTAINTY: f64 = 1.0;
 
-/// The look of a drive: dashes and gaps of its line, and whether its dots have a hole.
-type Pattern = (Option<(f64, f64)>, bool);
+/// The look of a drive: dashes and gaps of its line, and radii of its dots and of the holes in them.
+type Pattern = (Option<(f64, f64)>, f64, f64);
 
-const PATTERNS: [Pattern; 2] = [(None, false), (Some((5.0, 3.0)), true)];
+/// No two of twelve drives look the same.
+fn pattern(drive: usize) -> Pattern {
+    let radius = RADIUS * [1.0, 1.5, 2.0, 0.7][drive / 3 % 4];
+    let hole = radius * [0.0, 0.62, 0.3][drive % 3];
+    let dashes = (drive > 0).then_some((5.0 + drive as f64, 3.0));
+    (dashes, radius, hole)
+}
 
 /// Error and cost of a method at one setting, under one drive.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,15 +55,15 @@ impl ErrorPanel {
     }
 
     /// A method under a drive, on an axis of errors that begins at `least`: joined by a line unless errors are chance.
-    fn layer<'a>(&self, of: (&str, &str), (ink, (dashes, has_holes)): (Ink, Pattern), least: f64) -> Layer<'a> {
+    fn layer<'a>(&self, of: (&str, &str), (ink, (dashes, radius, hole)): (Ink, Pattern), least: f64) -> Layer<'a> {
         let points = || self.usable().filter(|point| (&*point.method, &*point.drive) == of);
         let places = || points().map(|point| (point.error, point.work)).collect();
         let line = self.by_chance.is_none().then(|| Layer::Curve(places(), Stroke { ink, width: 1.8, dashes }));
         let bars = points().map(|WorkPrecision { uncertainty: (low, high), work, .. }| {
             Layer::Curve(vec![(low.max(least), *work), (*high, *work)], Stroke::solid(ink, UNCERTAINTY))
         });
-        let dots = Layer::Dots(places(), Dot::solid(ink, RADIUS));
-        let holes = has_holes.then(|| Layer::Dots(places(), Dot::solid(WHITE, RADIUS - 1.6)));
+        let dots = Layer::Dots(places(), Dot::solid(ink, radius));
+        let holes = (hole > 0.0).then(|| Layer::Dots(places(), Dot::solid(WHITE, hole)));
         Layer::Inside(line.into_iter().chain(bars).chain([dots]).chain(holes).collect())
     }
 }
@@ -72,12 +78,13 @@ pub fn work_precision(work_label: &str, panels: &[ErrorPanel], look: &Look) -> R
     let (methods, drives) = (distinct(all().map(|point| &*point.method)), distinct(all().map(|point| &*point.drive)));
     let inks = methods.iter().zip(INKS.into_iter().cycle());
     let looks = inks.flat_map(|(method, ink)| {
-        drives.iter().zip(PATTERNS.into_iter().cycle()).map(move |(drive, pattern)| ((*method, *drive), (ink, pattern)))
+        drives.iter().enumerate().map(move |(place, drive)| ((*method, *drive), (ink, pattern(place))))
     });
     let is_known = |of: (&str, &str)| all().any(|point| (&*point.method, &*point.drive) == of);
     let looks: Vec<_> = looks.filter(|(of, _)| is_known(*of)).collect();
-    let lines = looks.iter().map(|&((method, drive), (ink, (_, has_holes)))| {
-        let mark = if has_holes { Mark::Ring(ink, RADIUS) } else { Mark::Dot(Dot::solid(ink, RADIUS)) };
+    let lines = looks.iter().map(|&((method, drive), (ink, (_, radius, hole)))| {
+        let dot = Mark::Dot(Dot::solid(ink, radius));
+        let mark = if hole > 0.0 { Mark::Ring(ink, radius, hole) } else { dot };
         entry(mark, format!("{method}, {drive}"))
     });
     let has_chance = panels.iter().any(|panel| panel.by_chance.is_some());
@@ -111,6 +118,12 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn twelve_drives_look_different() {
+        let looks: Vec<(f64, f64)> = (0..12).map(pattern).map(|(_, radius, hole)| (radius, hole)).collect();
+        assert!(looks.iter().enumerate().all(|(place, look)| !looks[..place].contains(look)), "{looks:?}");
+    }
 
     #[test]
     fn a_method_has_one_ink_in_all_panels_and_an_entry_for_each_drive() {

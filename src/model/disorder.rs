@@ -235,7 +235,7 @@ fn quantile_outside_tails(probability: f64) -> f64 {
 
 /// A quantile of the standard normal distribution, be it in the tails.
 #[expect(clippy::excessive_precision, reason = "coefficients as published")]
-fn standard_normal_quantile(probability: f64) -> f64 {
+pub fn standard_normal_quantile(probability: f64) -> f64 {
     const TAIL_NUMERATOR: [f64; 8] = [
         6.657_904_643_501_103_777_20,
         5.463_784_911_164_114_369_90,

@@ -12,7 +12,7 @@ pub mod selected;
 pub(crate) mod simd;
 pub mod theory;
 
-pub use disorder::{Contact, Disorder, RNG_SCHEME};
+pub use disorder::{Contact, Disorder, RNG_SCHEME, standard_normal_quantile};
 pub use drive::Drive;
 pub use fields::Description;
 pub use interface::{Change, ContactEvent, Interface};

@@ -4,7 +4,7 @@ use super::PhaseLimits;
 use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use super::set::{FinishedSet, OfSet};
-use crate::model::theory::{minimum_phase, minimum_phase_asymptote, random_load_mean};
+use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::table::columns::{columns, tables};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -28,11 +28,7 @@ columns! {
             "lower end of its 95 % confidence interval, for these sets; the whole turn if no direction is excluded";
         phase_mean_high: Option<f64> = "rad", "upper end";
         resultant_length: Option<f64> = "", "|<exp(i phi)>| of all slips";
-        expected_resultant: Option<f64> = "",
-            "the same of slips at random loads that exceed all before, which is no locking";
         rayleigh_p: Option<f64> = "", "p-value of the Rayleigh test of all slips, with effective_slips";
-        load_rayleigh_p: Option<f64> = "",
-            "the same of the load phases phi + eta cos(phi), with their effective number, for eta < 1";
         set_phase_mean: Option<f64> = "rad", "circular mean over the sets that have a phase of their mean phase";
         set_phase_mean_low: Option<f64> = "rad", "lower end of its 95 % confidence interval, for these sets";
         set_phase_mean_high: Option<f64> = "rad", "upper end";
@@ -53,9 +49,6 @@ pub(super) struct Backbone {
 struct Bin {
     sets: u64,
     phases: Together,
-    loads: Together,
-    /// Sum over the slips of the mean unit vector that slips at random loads have.
-    expected: [f64; 2],
     /// Mean phases of the sets that have one, as unit vectors.
     means: Together,
 }
@@ -139,12 +132,8 @@ impl Backbone {
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        for (pool, of_set) in [(&mut bin.phases, &set.phases), (&mut bin.loads, &set.loads)] {
-            pool.push((of_set.1.count(), of_set.1.total()), &set.seeds, of_set, |deviation| deviation);
-        }
-        let count = set.phases.1.count() as f64;
-        let expected = random_load_mean(set.row.eta);
-        bin.expected = [bin.expected[0] + count * expected[0], bin.expected[1] + count * expected[1]];
+        let all = (set.phases.1.count(), set.phases.1.total());
+        bin.phases.push(all, &set.seeds, &set.phases, |deviation| deviation);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
             let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total());
@@ -161,7 +150,7 @@ impl Backbone {
             let (eta_low, eta_high) = (edge(index), edge(index + 1));
             let eta_centre = (eta_low * eta_high).sqrt();
             let limits = PhaseLimits::at(eta_centre);
-            let [phases, loads, means] = [bin.phases, bin.loads, bin.means].map(Together::estimate);
+            let [phases, means] = [bin.phases, bin.means].map(Together::estimate);
             let [interval, means_interval] = [&phases, &means].map(|of| of.direction_interval(limits.top));
             BackboneBin {
                 eta_low,
@@ -175,9 +164,7 @@ impl Backbone {
                 phase_mean_low: interval.map(|interval| interval.low),
                 phase_mean_high: interval.map(|interval| interval.high),
                 resultant_length: phases.resultant_length(),
-                expected_resultant: Some(bin.expected[0].hypot(bin.expected[1]) / phases.count() as f64),
                 rayleigh_p: phases.rayleigh(),
-                load_rayleigh_p: loads.rayleigh(),
                 set_phase_mean: means.direction(limits.top),
                 set_phase_mean_low: means_interval.map(|interval| interval.low),
                 set_phase_mean_high: means_interval.map(|interval| interval.high),
@@ -195,7 +182,6 @@ mod tests {
     use super::super::set::SetSlips;
     use super::super::set::tests::{jobs, slip};
     use super::*;
-    use std::f64::consts::TAU;
 
     #[test]
     fn eta_of_one_begins_a_bin() {
@@ -227,23 +213,6 @@ mod tests {
         assert!((bins[0].set_phase_mean.unwrap() + 0.8).abs() < 1e-12);
         assert!(bins[0].phase_mean.unwrap() > -0.8);
         assert!((bins[0].eta_centre - 10_f64.powf(0.875)).abs() < 1e-12);
-    }
-
-    #[test]
-    fn below_locking_a_bin_tells_the_resultant_of_slips_at_random_loads() {
-        let mut backbone = Backbone::default();
-        // η = 0.628 with 30 slips and 0.785 with 10: one bin.
-        for (period, slips) in [(0.1, 30), (0.08, 10)] {
-            let (jobs, mut set) = (jobs(1e-6, period), SetSlips::default());
-            let limits = PhaseLimits::at(jobs.parameters.eta());
-            for number in 0..slips {
-                set.push(0, &slip(None, Some(f64::from(number) * 2.4 - 3.0)), &limits);
-            }
-            backbone.push(&set.finish(jobs));
-        }
-        let bins = backbone.finish();
-        assert_eq!((bins.len(), bins[0].slips), (1, 40));
-        assert!((bins[0].expected_resultant.unwrap() - 0.5 * 0.01 * TAU * (0.75 / 0.1 + 0.25 / 0.08)).abs() < 1e-12);
     }
 
     /// The bin of sets of these phases, each of the jobs of some seeds.

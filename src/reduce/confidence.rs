@@ -107,7 +107,7 @@ pub(crate) fn mean_of(values: &[f64]) -> (Option<f64>, Option<Interval>) {
 }
 
 /// Student's t for a two-sided probability of [`CONFIDENCE`], at >= 1 degrees of freedom, to 1e-6.
-fn student(freedom: f64) -> f64 {
+pub(super) fn student(freedom: f64) -> f64 {
     // Normal quantile; beyond the limit t differs from it by less than 1e-6.
     const NORMAL: f64 = 1.959_963_984_540_054;
     const LARGE: f64 = 3e6;

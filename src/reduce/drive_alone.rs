@@ -52,17 +52,29 @@ impl Controls {
         Ok(Self(controls))
     }
 
-    /// Adds to a set what the drive alone explains of its jobs with these seeds, which are in order.
-    pub(super) fn explain(&self, sweep: &Sweep, row: &mut SetRow, seeds: &[u64]) {
-        let parameters = &row.parameters.parameters;
-        row.is_control = sweep.is_control(parameters);
+    /// What the drive alone explains of a set with these parameters.
+    pub(super) fn explain(&self, sweep: &Sweep, parameters: &Parameters) -> Explained {
         let control = sweep.control_of(parameters).and_then(|control| self.0.get(&control));
-        let Some(control) = control else { return };
-        let passages: Vec<Passage> = control
-            .iter()
-            .filter(|(seed, _)| seeds.binary_search(seed).is_ok())
-            .map(|(_, slips)| Passage::of(parameters, slips))
-            .collect();
+        let passage = |(&seed, slips): (&u64, &Vec<Onset>)| (seed, Passage::of(parameters, slips));
+        let passages = control.map(|control| control.iter().map(passage).collect());
+        Explained { is_control: sweep.is_control(parameters), passages }
+    }
+}
+
+/// What the drive alone explains of a set: the passages by their seeds; none without a control.
+#[derive(Debug, Default)]
+pub(super) struct Explained {
+    is_control: bool,
+    passages: Option<BTreeMap<u64, Passage>>,
+}
+
+impl Explained {
+    /// Adds to a set what is explained of its jobs with these seeds, which are in order.
+    pub(super) fn add_to(&self, row: &mut SetRow, seeds: &[u64]) {
+        row.is_control = self.is_control;
+        let Some(passages) = &self.passages else { return };
+        let passages: Vec<&Passage> =
+            passages.iter().filter(|(seed, _)| seeds.binary_search(seed).is_ok()).map(|(_, passage)| passage).collect();
         let phases = Sequences::of(passages.iter().map(|job| job.phases.iter().copied())).estimate();
         let intervals = Sequences::of(passages.iter().map(|job| job.periods.iter().copied())).estimate();
         let seen = (row.resultant_length, row.length_interval);
@@ -90,6 +102,7 @@ fn beyond(
 }
 
 /// The passages of a job: the unit vectors of their phases, and of their intervals in periods as angles.
+#[derive(Debug)]
 struct Passage {
     phases: Vec<[f64; 2]>,
     periods: Vec<[f64; 2]>,
@@ -141,8 +154,9 @@ mod tests {
         };
         let control = (0..).zip(onsets.iter().map(slips)).collect();
         let controls = Controls(HashMap::from([(sweep.control_of(&parameters).unwrap(), control)]));
+        let explained = controls.explain(&sweep, &parameters);
         let mut row = SetRow { parameters: Selected::new(parameters), ..row };
-        controls.explain(&sweep, &mut row, seeds);
+        explained.add_to(&mut row, seeds);
         row
     }
 

@@ -8,15 +8,15 @@
 //! the next sets.
 
 use super::PhaseLimits;
-use super::drive_alone::Controls;
+use super::drive_alone::{Controls, Explained};
 use super::sample::Point;
 use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
+use crate::results::Results;
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
-use crate::results::{Results, ResultsError};
 use crate::sweep::Sweep;
 use crate::table::columns::columns;
 use crate::table::file::{Dataset, DatasetError};
@@ -51,18 +51,26 @@ columns! {
 /// Which jobs are wanted, by their parameters.
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
-/// The sets of the wanted jobs, in the order of their parameters.
-pub fn reduce_jobs(
-    results: &Results<'_>,
-    is_wanted: impl Fn(&Parameters) -> bool,
-) -> Result<Vec<SetRow>, ResultsError> {
-    let gathered = Gathering::of_jobs(results, &is_wanted)?;
-    let mut rows = Vec::new();
-    gathered.each_set(MAX_SLIPS, u64::MAX, |set, _| {
-        rows.push(set.row);
-        Ok(())
-    })?;
+/// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
+pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, DatasetError> {
+    let mut rows = BTreeMap::new();
+    each_chosen(results, |number, set, explained| drop(rows.insert(number, set.finish_with(explained).0.row)))?;
     Ok(rows)
+}
+
+/// Hands on these sets before anything is computed, each with what the drive alone explains.
+pub(super) fn each_chosen(
+    results: &Results<'_>,
+    mut gathered: impl FnMut(u64, Gathered, &Explained),
+) -> Result<(), DatasetError> {
+    let (sweep, chosen) = (results.sweep(), results.chosen());
+    let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
+    Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
+        if let Some(number) = sweep.set_with(&set.jobs.parameters).filter(|&number| number < sweep.point_count()) {
+            gathered(number, set, explained);
+        }
+        Ok(())
+    })
 }
 
 /// The jobs of a directory, whose slips are still to be gathered.
@@ -93,18 +101,18 @@ impl<'a> Gathering<'a> {
         Ok(Self { sets, slips, is_wanted, sweep, controls })
     }
 
-    /// Hands on set after set, each with every `spacing`-th slip of the table as a point and its place in the table.
+    /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
+    /// place in the table, and with what the drive alone explains.
     pub(super) fn each_set(
         self,
         max_slips: u64,
         spacing: u64,
-        mut finished: impl FnMut(FinishedSet, Vec<(u64, Point)>) -> Result<(), DatasetError>,
+        mut gathered: impl FnMut(Gathered, &Explained) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
         for chunk in chunks(self.sets, max_slips) {
             for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
-                let (mut set, points) = set.finish();
-                self.controls.explain(self.sweep, &mut set.row, &set.seeds);
-                finished(set, points)?;
+                let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
+                gathered(set, &explained)?;
             }
         }
         Ok(())
@@ -153,10 +161,11 @@ fn chunks(sets: Vec<SetJobs>, max_slips: u64) -> Vec<Vec<SetJobs>> {
 }
 
 /// A set and its slips so far.
+#[derive(Clone)]
 pub(super) struct Gathered {
     pub(super) jobs: SetJobs,
     limits: PhaseLimits,
-    slips: SetSlips,
+    pub(super) slips: SetSlips,
     /// Points among them, with their place in table order.
     points: Vec<(u64, Point)>,
 }
@@ -176,8 +185,19 @@ impl Gathered {
         }
     }
 
-    pub(super) fn finish(self) -> (FinishedSet, Vec<(u64, Point)>) {
-        (self.slips.finish(self.jobs), self.points)
+    /// What the jobs with some of the seeds say.
+    pub(super) fn only(&self, keeps: impl Fn(u64) -> bool) -> Self {
+        let mut part = self.clone();
+        part.jobs.averages.retain(|&seed, _| keeps(seed));
+        part.jobs.running.retain(|&(seed, _)| keeps(seed));
+        part.slips.retain(keeps);
+        part
+    }
+
+    pub(super) fn finish_with(self, explained: &Explained) -> (FinishedSet, Vec<(u64, Point)>) {
+        let mut set = self.slips.finish(self.jobs);
+        explained.add_to(&mut set.row, &set.seeds);
+        (set, self.points)
     }
 }
 

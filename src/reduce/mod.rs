@@ -2,11 +2,11 @@
 //! of τ, and a sample of slips for scatter figures.
 
 mod backbone;
-mod cells;
 mod circular;
 mod compare;
 mod confidence;
 mod drive_alone;
+mod edges;
 mod gather;
 mod histogram;
 #[cfg(test)]
@@ -20,19 +20,20 @@ mod sample;
 mod sequence;
 mod set;
 mod slip_stats;
+mod source;
 mod statistic;
 mod swept;
 mod values;
 
 pub use crate::sweep::{Interval, SetRow};
 pub use backbone::BackboneBin;
-#[cfg(test)]
-pub(crate) use cells::{CellOfGrid, Cells};
-pub use cells::{CellRow, divide};
 pub use compare::compare;
 #[cfg(test)]
 pub(crate) use confidence::mean_of;
-pub use gather::reduce_jobs;
+#[cfg(test)]
+pub(crate) use edges::{Edge, GROUPS, Sample};
+pub use edges::{EdgeRow, Line, SetOfEdges, lines, sets_of_edges};
+pub use gather::reduce_chosen;
 pub use histogram::HistogramBin;
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
@@ -42,6 +43,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
+pub use source::renew;
 pub use swept::{Swept, ascending, differing, has_even_steps, is_same, swept};
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 
@@ -82,7 +84,7 @@ mod tests {
         let tables = [
             markdown::<SetRow>(),
             markdown::<RoundOfSet>(),
-            markdown::<CellRow>(),
+            markdown::<EdgeRow>(),
             markdown::<HistogramBin>(),
             markdown::<BackboneBin>(),
             markdown::<Point>(),

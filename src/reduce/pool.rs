@@ -1,7 +1,7 @@
 //! Large pools of jobs of the model, of which repetitions of a measurement take some.
 
 use super::backbone::{Backbone, BackboneBin};
-use super::drive_alone::Controls;
+use super::drive_alone::{Controls, Explained};
 use super::gather::{Gathered, JobFacts, JobOfSet, each_job};
 use super::set::{FinishedSet, SetJobs, SetRow};
 use crate::model::Parameters;
@@ -10,7 +10,6 @@ use crate::results::layout::Layout;
 use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
 use crate::results::{Results, ResultsError};
-use crate::sweep::Sweep;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -25,13 +24,14 @@ pub(crate) struct PooledJob {
 /// All jobs of a directory by their sets, in the order of amplitude, then η, and seeds; and their controls.
 pub(crate) struct Pool {
     pub sets: Vec<(Parameters, Vec<PooledJob>)>,
-    sweep: Sweep,
-    controls: Controls,
+    /// What the drive alone explains of each set.
+    explained: Vec<Explained>,
 }
 
 impl Pool {
     pub(crate) fn of(layout: &Layout<'_>) -> Result<Self, ResultsError> {
-        let sweep = Results::read(layout)?.sweep().clone();
+        let results = Results::read(layout)?;
+        let sweep = results.sweep();
         let jobs = layout.dataset(JOBS)?;
         let slips = committed_files(layout, SLIPS, &jobs)?;
         let mut sets: BTreeMap<String, (Parameters, BTreeMap<u64, PooledJob>)> = BTreeMap::new();
@@ -47,41 +47,38 @@ impl Pool {
                 }
             }
         }
-        let controls = Controls::read(slips, &sweep, sets.values().map(|(set, _)| set))?;
+        let controls = Controls::read(slips, sweep, sets.values().map(|(set, _)| set))?;
         let mut sets: Vec<_> = sets.into_values().map(|(set, jobs)| (set, jobs.into_values().collect())).collect();
         sets.sort_by(|(left, _): &(Parameters, Vec<_>), (right, _)| {
             let key = |set: &Parameters| (set.modulation_amplitude, set.eta());
             key(left).partial_cmp(&key(right)).expect("numbers")
         });
-        Ok(Self { sets, sweep, controls })
+        let explained = sets.iter().map(|(set, _)| controls.explain(sweep, set)).collect();
+        Ok(Self { sets, explained })
     }
 
-    fn finish<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> (FinishedSet, Vec<u64>) {
-        let mut set = Gathered::new(SetJobs { parameters: self.sets[set].0.clone(), ..SetJobs::default() });
-        let mut seeds = Vec::new();
+    fn finish<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> FinishedSet {
+        let parameters = self.sets[set].0.clone();
+        let mut gathered = Gathered::new(SetJobs { parameters, ..SetJobs::default() });
         for PooledJob { seed, facts, slips } in jobs {
-            seeds.push(*seed);
-            set.jobs.push(*seed, facts);
+            gathered.jobs.push(*seed, facts);
             for slip in slips {
-                set.push(*seed, slip);
+                gathered.push(*seed, slip);
             }
         }
-        seeds.sort_unstable();
-        (set.finish().0, seeds)
+        gathered.finish_with(&self.explained[set]).0
     }
 
     /// The row of a set of these of its jobs.
     pub(crate) fn row<'a>(&self, set: usize, jobs: impl IntoIterator<Item = &'a PooledJob>) -> SetRow {
-        let (mut finished, seeds) = self.finish(set, jobs);
-        self.controls.explain(&self.sweep, &mut finished.row, &seeds);
-        finished.row
+        self.finish(set, jobs).row
     }
 
     /// The bin of all sets with these of their jobs; all of them lie within one.
     pub(crate) fn bin(&self, jobs: Range<usize>) -> BackboneBin {
         let mut backbone = Backbone::default();
         for (set, (_, all)) in self.sets.iter().enumerate() {
-            backbone.push(&self.finish(set, &all[jobs.clone()]).0);
+            backbone.push(&self.finish(set, &all[jobs.clone()]));
         }
         backbone.finish()[0]
     }

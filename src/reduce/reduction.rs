@@ -2,12 +2,13 @@
 //! same tables give the same bytes.
 
 use super::backbone::{Backbone, BackboneBin};
-use super::cells::{CellRow, cell_rows};
+use super::edges::{EdgeRow, edge_rows};
 use super::gather::{Gathering, MAX_SLIPS};
 use super::histogram::{HistogramBin, histogram};
 use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
+use super::source::{SOURCE, source};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::tables::JOBS;
@@ -16,7 +17,6 @@ use crate::table::file::TableWriter;
 use crate::table::shown::shown;
 use anyhow::{Result, bail};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Name of the lock and of the staging folder of what is made from the tables: one process reduces or draws at a time.
@@ -56,11 +56,10 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
     let _alone = exclusive_lock(layout, WRITER)?;
     let (commit, summary) = stage(results, max_slips)?;
     results.publish(commit)?;
-    let cells = layout.reduced_file(CellRow::NAME);
-    let is_refined = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
-    if !is_refined && layout.storage.exists(&cells)? {
+    let edges = layout.reduced_file(EdgeRow::NAME);
+    if results.sweep().refinement().is_none() && layout.storage.exists(&edges)? {
         // Of a sweep before.
-        layout.storage.remove(&cells)?;
+        layout.storage.remove(&edges)?;
     }
     Ok(summary)
 }
@@ -68,6 +67,8 @@ fn reduce_by(results: &Results<'_>, max_slips: u64) -> Result<ReductionSummary> 
 /// Reads the tables, and stages what they are reduced to.
 fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, ReductionSummary)> {
     let layout = results.layout();
+    // In this order: what is committed in between makes these data old.
+    let footer = &results.footer_of_all().with(SOURCE, &source(results)?);
     let gathering = Gathering::of_jobs(results, &|_| true)?;
     let all_jobs = &gathering.sets;
     if all_jobs.is_empty() {
@@ -87,22 +88,19 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     layout.ensure_folder(&layout.reduced())?;
     let mut commit = Commit::begin(layout, &layout.staging(WRITER))?;
     let mut stage = |name: &str| commit.stage(&layout.reduced_file(name));
-    let footer = &results.footer_of_all();
     let mut set_writer = SetWriter::new(results, stage(SetRow::NAME)?, footer)?;
-    let refinement = results.sweep().rounds().and_then(|rounds| rounds.refinement.as_ref());
-    let mut refined_sets = BTreeMap::new();
     let mut histogram_writer = TableWriter::new(stage(HistogramBin::NAME)?, footer)?;
     let mut backbone_writer = TableWriter::new(stage(BackboneBin::NAME)?, footer)?;
     let mut point_writer = TableWriter::new(stage(Point::NAME)?, footer)?;
 
     let (mut pooled, mut kept) = (Backbone::default(), Vec::new());
-    gathering.each_set(max_slips, spacing(total), |set, points| {
+    gathering.each_set(max_slips, spacing(total), |set, explained| {
+        let (set, points) = set.finish_with(explained);
         let row = &set.row;
-        let chosen = set_writer.push(row)?.filter(|_| refinement.is_some());
+        set_writer.push(row)?;
         if row.is_control {
             return Ok(());
         }
-        refined_sets.extend(chosen.map(|number| (number, row.clone())));
         summary.sets += 1;
         histogram(row, &set.intervals).iter().try_for_each(|bin| histogram_writer.push(bin))?;
         pooled.push(&set);
@@ -120,10 +118,10 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     for bin in &summary.backbone {
         backbone_writer.push(bin)?;
     }
-    if let Some(refinement) = refinement {
-        let mut cell_writer = TableWriter::new(stage(CellRow::NAME)?, footer)?;
-        cell_rows(results.sweep(), refinement, &refined_sets).iter().try_for_each(|cell| cell_writer.push(cell))?;
-        cell_writer.finish()?;
+    if let Some(refinement) = results.sweep().refinement() {
+        let mut edge_writer = TableWriter::new(stage(EdgeRow::NAME)?, footer)?;
+        edge_rows(results, refinement)?.iter().try_for_each(|edge| edge_writer.push(edge))?;
+        edge_writer.finish()?;
     }
     set_writer.finish()?;
     histogram_writer.finish()?;
@@ -161,8 +159,8 @@ mod tests {
         // Names not in the order of the parameters.
         let names = Names { job_id: format!("{set:016x}{seed:016x}"), set_id: format!("{:032x}", 100 - set) };
         let parameters = parameters.validated().unwrap();
-        let eta = parameters.eta();
-        (names, Selected::new(parameters), Loading { eta })
+        let loading = Loading::of(&parameters);
+        (names, Selected::new(parameters), loading)
     }
 
     fn job_result((_, parameters, _): &Label<DriveAndSeed>, slips: u32) -> Measurements {

@@ -61,16 +61,14 @@ impl<'a> SetWriter<'a> {
         Ok(Self::InRounds(TableWriter::new(file, footer)?, rounds))
     }
 
-    /// Writes a set, and returns its number if the rounds have chosen it.
-    pub(super) fn push(&mut self, row: &SetRow) -> Result<Option<u64>, DatasetError> {
+    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), DatasetError> {
         match self {
-            Self::Plain(writer) => writer.push(row).map(|()| None),
+            Self::Plain(writer) => writer.push(row),
             Self::InRounds(writer, Rounds { sweep, precision, of_sets }) => {
-                let chosen = sweep.set_with(&row.parameters.parameters).filter(|set| of_sets.contains_key(set));
+                let number = sweep.set_with(&row.parameters.parameters);
                 let error = precision.and_then(|precision| row.error_over_target(precision));
-                let round = chosen.map(|set| of_sets[&set].clone()).unwrap_or_default();
-                writer.push(&(row.clone(), RoundOfSet { target_met: error.map(|error| error <= 1.0), ..round }))?;
-                Ok(chosen)
+                let round = number.and_then(|set| of_sets.get(&set)).cloned().unwrap_or_default();
+                writer.push(&(row.clone(), RoundOfSet { target_met: error.map(|error| error <= 1.0), ..round }))
             }
         }
     }

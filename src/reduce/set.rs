@@ -115,6 +115,18 @@ impl SetSlips {
         }
     }
 
+    /// Leaves the slips of other seeds out.
+    pub(super) fn retain(&mut self, keeps: impl Fn(u64) -> bool) {
+        self.jobs.retain(|&seed, _| keeps(seed));
+    }
+
+    /// The share of the intervals that are nearest to this number of periods.
+    pub(super) fn share_of_periods(&self, periods: f64) -> Option<f64> {
+        let all = self.jobs.values().flat_map(|job| &job.slips).filter_map(|slip| non_nan(slip.periods));
+        let nearest: Vec<f64> = all.map(|found| f64::from(u8::from(found.round() == periods))).collect();
+        (!nearest.is_empty()).then(|| nearest.iter().sum::<f64>() / nearest.len() as f64)
+    }
+
     fn means(&self) -> [Option<f64>; SUMS] {
         std::array::from_fn(|index| {
             let all = self.jobs.values().map(|job| job.sums[index]);
@@ -141,8 +153,8 @@ impl SetSlips {
         let locking = over_period.estimate(|slip| unit(TAU * slip.periods.fract()));
         let of_angle =
             |angle: fn(&SlipStats) -> f64| sequences(&by_job, |slip| non_nan(angle(slip)).map(unit)).centred();
-        let (of_phases, of_loads) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
-        let (phases, loads) = (of_phases.1, of_loads.1);
+        let (of_phases, (_, loads)) = (of_angle(|slip| slip.phase), of_angle(|slip| slip.load_phase));
+        let phases = of_phases.1;
 
         let phase_interval = phases.direction_interval(limits.top);
         let expected = (phases.count() > 0).then(|| {
@@ -166,6 +178,7 @@ impl SetSlips {
         let whole = |periods: f64| periods.round() as u64;
         let row = SetRow {
             set_id: jobs.set_id,
+            frequency: jobs.parameters.modulation_period.map(|period| 1.0 / period),
             parameters: Selected::new(jobs.parameters),
             eta,
             finished_jobs: jobs.finished,
@@ -221,7 +234,7 @@ impl SetSlips {
         };
         let intervals = tau.sorted;
         let seeds = self.jobs.into_keys().collect();
-        FinishedSet { row, intervals, seeds, phases: of_phases, loads: of_loads }
+        FinishedSet { row, intervals, seeds, phases: of_phases }
     }
 }
 
@@ -305,8 +318,6 @@ pub(super) struct FinishedSet {
     /// Seeds of the jobs of these phases.
     pub(super) seeds: Vec<u64>,
     pub(super) phases: OfSet,
-    /// Its load phases, for η < 1.
-    pub(super) loads: OfSet,
 }
 
 #[cfg(test)]

@@ -1,25 +1,15 @@
 //! What a sweep file asks of a set: a statistic by its name, and how far its interval is from the target.
 
 use crate::sweep::{Precision, SetRow, Target};
-use crate::table::columns::{Row, Value};
+use crate::table::columns::Row;
 
 impl SetRow {
-    /// What `read` takes from a column, by its name; `None` if there is no such column.
-    pub fn column<T>(&self, name: &str, mut read: impl FnMut(Value<'_>) -> T) -> Option<T> {
-        let wanted = Self::columns().iter().position(|known| known.name == name);
-        let (mut position, mut found) = (0, None);
-        self.cells(&mut |cell| {
-            if Some(position) == wanted {
-                found = Some(read(cell));
-            }
-            position += 1;
-        });
-        found
-    }
-
-    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
-    fn number(&self, column: &str) -> Option<f64> {
-        self.column(column, |value| value.number()).flatten()
+    /// The number in a column of this name; `None` if it has none.
+    pub fn number(&self, column: &str) -> Option<f64> {
+        let place = Self::columns().iter().position(|known| known.name == column)?;
+        let mut numbers = Vec::new();
+        self.cells(&mut |cell| numbers.push(cell.number()));
+        numbers.swap_remove(place)
     }
 
     /// The half-width of the interval of the least precise statistic over its target: 1 or less if all are as precise as

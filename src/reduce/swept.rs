@@ -120,7 +120,8 @@ mod tests {
             modulation_period: period,
             ..Parameters::default()
         };
-        SetRow { eta: parameters.eta(), parameters: Selected::new(parameters), ..SetRow::default() }
+        let frequency = period.map(|period| 1.0 / period);
+        SetRow { frequency, eta: parameters.eta(), parameters: Selected::new(parameters), ..SetRow::default() }
     }
 
     fn names(rows: &[SetRow]) -> Vec<String> {

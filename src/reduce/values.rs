@@ -10,7 +10,6 @@ columns! {
     /// What is shown of a set that the table of sets leaves to its parameters.
     #[derive(Clone, Copy, Debug)]
     struct Derived {
-        frequency: Option<f64> = "Hz", "modulation frequency 1/T; null without modulation";
         friction_coefficient: Option<f64> = "", "mean_friction over the normal force FN";
     }
 }
@@ -18,10 +17,7 @@ columns! {
 impl Derived {
     fn of(row: &SetRow) -> Self {
         let parameters = &row.parameters;
-        Self {
-            frequency: parameters.modulation_period.map(|period| 1.0 / period),
-            friction_coefficient: row.mean_friction.map(|friction| friction / parameters.normal_force),
-        }
+        Self { friction_coefficient: row.mean_friction.map(|friction| friction / parameters.normal_force) }
     }
 }
 
@@ -163,6 +159,7 @@ mod tests {
 
     fn rows() -> Vec<SetRow> {
         let row = |period: Option<f64>| SetRow {
+            frequency: period.map(|period| 1.0 / period),
             parameters: Selected::new(Parameters { modulation_period: period, ..Parameters::default() }),
             is_control: period.is_some(),
             tau_mean: Some(2.0),

@@ -15,13 +15,9 @@ mod page;
 mod slips;
 mod tables;
 
-use crate::reduce::{SetRow, WRITER, reduce};
+use crate::reduce::{WRITER, renew};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
-use crate::results::layout::Layout;
-use crate::results::tables::JOBS;
-use crate::table::columns::Table;
-use crate::table::storage::StorageError;
 use anyhow::{Context, Result};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -29,13 +25,11 @@ use std::time::Duration;
 /// What to do about a table that cannot be read.
 const ADVICE: &str = "`stickslip verify` says what to do about damage";
 
-/// The report of a directory as HTML. Reduces the tables first if they are newer than the reduced data.
+/// The report of a directory as HTML. Reduces the tables first unless the reduced data are theirs.
 ///
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
 pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> {
-    if !is_reduced(results.layout())? {
-        reduce(results)?;
-    }
+    renew(results)?;
     let (content, slips) = content::content(results, refresh)?;
     page::html(&content, &slips).context("the report cannot be encoded")
 }
@@ -48,18 +42,4 @@ pub fn write(results: &Results<'_>, refresh: Option<Duration>) -> Result<PathBuf
     commit.stage_bytes(&layout.report(), page.as_bytes())?;
     results.publish(commit)?;
     Ok(layout.report())
-}
-
-/// Whether the reduced data are newer than the tables.
-fn is_reduced(layout: &Layout<'_>) -> Result<bool, StorageError> {
-    let (storage, reduced, jobs) = (layout.storage, layout.reduced_file(SetRow::NAME), layout.table(JOBS));
-    if !storage.exists(&reduced)? {
-        return Ok(false);
-    }
-    if !storage.exists(&jobs)? {
-        return Ok(true);
-    }
-    let changed = storage.modified(&jobs)?;
-    // A clock may be coarse: at the same instant it is unknown which came first.
-    Ok(storage.modified(&reduced)? > changed)
 }

@@ -6,7 +6,7 @@ use crate::results::commit::exclusive_lock;
 use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::workers::Member;
-use crate::sweep::{Extension, Round, Standing};
+use crate::sweep::{Extension, Round, Standing, merged};
 use serde::{Deserialize, Serialize};
 
 const LOCK: &str = "round";
@@ -18,7 +18,7 @@ pub struct RoundsSoFar {
     pub round: u64,
     /// Whether it is done, and there will be no more.
     pub is_over: bool,
-    /// How sets and cells stood when it began; at the end, when the rounds are over.
+    /// How sets and edges stood when it began; at the end, when the rounds are over.
     #[serde(flatten)]
     pub standing: Standing,
 }
@@ -29,6 +29,13 @@ impl Results<'_> {
         let text = self.sweep().text();
         let others = self.extensions().iter().rev().skip_while(|extension| extension.sweep.text() == text).count();
         &self.extensions()[others..]
+    }
+
+    /// All points that these have chosen.
+    pub fn chosen(&self) -> Round {
+        let rounds = self.rounds().iter().filter_map(|extension| extension.round.as_ref());
+        let points = merged(rounds.flat_map(|round| round.points.iter().cloned()).collect());
+        Round { points, ..Round::default() }
     }
 
     /// The round that was begun last; `None` if the sweep has none.

@@ -48,7 +48,14 @@ columns! {
     /// What the modulation amounts to.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Loading {
+        frequency: Option<f64> = "Hz", "1/T; null without modulation";
         eta: f64 = "", "2 pi Delta / (T V0), harmonic against uniform loading rate; 0 without modulation";
+    }
+}
+
+impl Loading {
+    pub fn of(parameters: &Parameters) -> Self {
+        Self { frequency: parameters.modulation_period.map(|period| 1.0 / period), eta: parameters.eta() }
     }
 }
 
@@ -87,7 +94,7 @@ pub(super) fn schema_of(table: &str) -> SchemaRef {
 /// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
     let [job_id, set_id] = [sweep.job_id(parameters).to_string(), sweep.set_id(parameters).to_string()];
-    (Names { job_id, set_id }, Selected::new(parameters.clone()), Loading { eta: parameters.eta() })
+    (Names { job_id, set_id }, Selected::new(parameters.clone()), Loading::of(parameters))
 }
 
 /// The same label with other parameters.

@@ -1,10 +1,10 @@
 //! How often intervals hold the true value: what stopping by looking does to that, and the intervals of all statistics with
 //! the model.
 
-use super::precision::{MIN_SEEDS, need, seeds_for};
+use super::precision::{need, seeds_for};
 use crate::reduce::{Pool, PooledJob, SetRow, mean_of};
 use crate::results::layout::Layout;
-use crate::sweep::{Precision, STATISTICS, Statistic, StatisticKind, Target};
+use crate::sweep::{MIN_SEEDS, Precision, STATISTICS, Statistic, StatisticKind, Target};
 use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -51,7 +51,7 @@ fn ended(repetitions: u64, least: u64, precision: &Precision, truth: f64, row: i
 
 fn precision(key: &str, target: Target) -> Precision {
     let statistics = Statistic::from_key(key).into_iter().collect();
-    Precision { statistics, target, seeds: FROM..=MOST }
+    Precision { statistics, target }
 }
 
 /// Values of mean 0 and variance 1, one a seed.
@@ -144,19 +144,14 @@ fn of_repetition(pool: &Pool, set: usize, repetition: u64, most: usize) -> Vec<&
     (0..most).map(next).collect()
 }
 
-#[expect(clippy::redundant_closure_for_method_calls, reason = "the method is of one lifetime")]
-fn number(row: &SetRow, column: &str) -> Option<f64> {
-    row.column(column, |value| value.number()).flatten()
-}
-
 fn ends(row: &SetRow, statistic: Statistic) -> Option<[f64; 2]> {
-    let [low, high] = ["low", "high"].map(|end| number(row, &format!("{}_{end}", statistic.key)));
+    let [low, high] = ["low", "high"].map(|end| row.number(&format!("{}_{end}", statistic.key)));
     Some([low?, high?])
 }
 
 /// Whether the interval of a statistic holds its true value; of an angle, any turn of it.
 fn holds(row: &SetRow, truth: &SetRow, statistic: Statistic) -> bool {
-    let (Some([low, high]), Some(truth)) = (ends(row, statistic), number(truth, statistic.key)) else { return false };
+    let (Some([low, high]), Some(truth)) = (ends(row, statistic), truth.number(statistic.key)) else { return false };
     let turns: &[f64] = if statistic.kind == StatisticKind::Angle { &[-TAU, 0.0, TAU] } else { &[0.0] };
     turns.iter().any(|turn| low <= truth + turn && truth + turn <= high)
 }
@@ -178,14 +173,13 @@ fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statist
         let (pool, truth) = (&pools[0], &truths[0]);
         let [low, high] = ends(truth, statistic).unwrap();
         let half = 0.5 * (high - low) * (pool.sets[set].1.len() as f64 / enough).sqrt();
-        let precision =
-            Precision { statistics: vec![statistic], target: Target::Absolute(half), seeds: MIN_SEEDS..=MAX_JOBS };
+        let precision = Precision { statistics: vec![statistic], target: Target::Absolute(half) };
         share(|repetition| {
             let jobs = of_repetition(pool, set, repetition, usize::try_from(MAX_JOBS).unwrap());
             let mut seeds = MIN_SEEDS;
             loop {
                 let row = pool.row(set, jobs[..usize::try_from(seeds).unwrap()].iter().copied());
-                match need(&precision, seeds, &row) {
+                match need(&precision, seeds, MAX_JOBS, &row) {
                     Some(more) if more > seeds => seeds = more,
                     _ => return holds(&row, truth, statistic),
                 }
@@ -230,7 +224,7 @@ fn coverage_is_measured() {
     for statistic in STATISTICS.iter().copied().filter(|statistic| statistic.has_interval()) {
         let mut all = Vec::new();
         for (set, locking) in ["weak", "middle", "strong"].into_iter().enumerate() {
-            let truth = number(&truths[set][0], statistic.key).unwrap();
+            let truth = truths[set][0].number(statistic.key).unwrap();
             let found = cells(&pools, &truths[set], set, statistic);
             lines.push(format!("| `{}` | {locking} | {truth:.4} | {} |", statistic.key, shown(&found)));
             all.push(found);

@@ -10,15 +10,12 @@
 //! `docs/rounds.md`.
 
 use crate::reduce::SetRow;
-use crate::sweep::Precision;
-
-/// Seeds of a set below which its interval is not trusted, unless it may have no more.
-pub const MIN_SEEDS: u64 = 24;
+use crate::sweep::{MIN_SEEDS, Precision};
 
 /// The seeds that a set with some and these statistics is to have next: no more than it has if it may have no more. `None` if
 /// every statistic is known to the target, or if there is nothing to know: no job has a value.
-pub(super) fn need(precision: &Precision, seeds: u64, row: &SetRow) -> Option<u64> {
-    seeds_for(seeds, row.error_over_target(precision)?, MIN_SEEDS, *precision.seeds.end())
+pub(super) fn need(precision: &Precision, seeds: u64, most: u64, row: &SetRow) -> Option<u64> {
+    seeds_for(seeds, row.error_over_target(precision)?, MIN_SEEDS, most)
 }
 
 /// The seeds that a set with some gets next, if its half-width is `error` times the target; `None` if it needs no more.
@@ -56,7 +53,7 @@ mod tests {
     }
 
     fn precision(keys: &[&str], target: Target) -> Precision {
-        Precision { statistics: keys.iter().map(|key| statistic(key)).collect(), target, seeds: 4..=256 }
+        Precision { statistics: keys.iter().map(|key| statistic(key)).collect(), target }
     }
 
     fn row(mean: f64, half: f64) -> SetRow {
@@ -67,7 +64,7 @@ mod tests {
     #[test]
     fn a_set_gets_the_predicted_seeds_within_bounds_until_its_target_is_met() {
         let relative = precision(&["tau_mean"], Target::Relative(0.01));
-        let seeds = |seeds, half| need(&relative, seeds, &row(2.0, half));
+        let seeds = |seeds, half| need(&relative, seeds, 256, &row(2.0, half));
         // The target is 0.02.
         assert_eq!(seeds(40, 0.0199), None);
         assert_eq!(seeds(40, 0.024), Some(58));
@@ -82,19 +79,19 @@ mod tests {
         assert_eq!(seeds(16, 1e-6), Some(MIN_SEEDS));
         assert_eq!(seeds(MIN_SEEDS, 1e-6), None);
         let absolute = precision(&["tau_mean"], Target::Absolute(0.05));
-        assert_eq!(need(&absolute, 40, &row(2.0, 0.0499)), None);
-        assert_eq!(need(&absolute, 40, &row(1e-3, 0.06)), Some(58));
+        assert_eq!(need(&absolute, 40, 256, &row(2.0, 0.0499)), None);
+        assert_eq!(need(&absolute, 40, 256, &row(1e-3, 0.06)), Some(58));
     }
 
     #[test]
     fn the_worst_of_several_statistics_counts_and_one_without_value_does_not() {
         let both = precision(&["tau_mean", "drop_mean"], Target::Relative(0.01));
         let row = SetRow { drop_mean: Some(1.0), ..row(2.0, 0.01) };
-        assert_eq!(need(&both, 40, &row), Some(80), "a value without interval");
+        assert_eq!(need(&both, 40, 256, &row), Some(80), "a value without interval");
         let interval = Some(Interval { low: 0.995, high: 1.005 });
-        assert_eq!(need(&both, 40, &SetRow { drop_interval: interval, ..row }), None);
+        assert_eq!(need(&both, 40, 256, &SetRow { drop_interval: interval, ..row }), None);
         // A slider that slides has no intervals between slips, and never will.
-        assert_eq!(need(&both, 4, &SetRow::default()), None);
+        assert_eq!(need(&both, 4, 256, &SetRow::default()), None);
     }
 
     proptest! {

@@ -7,7 +7,7 @@
 use super::axes::Axis;
 use super::grid::{Sweep, find_rows};
 use super::quantity::{Point, Quantity};
-use super::rounds::{Bounds, Round, Rounds, Standing};
+use super::rounds::{Bounds, Refinement, Round, Rounds, Standing};
 use crate::model::{Parameters, Symbol};
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
@@ -16,6 +16,11 @@ impl Sweep {
     /// What it decides by itself; none for a sweep that runs its whole grid.
     pub const fn rounds(&self) -> Option<&Rounds> {
         self.rounds.as_ref()
+    }
+
+    /// Where it looks for edges, if it does.
+    pub fn refinement(&self) -> Option<&Refinement> {
+        self.rounds.as_ref()?.refinement.as_ref()
     }
 
     /// Number of the axis of seeds, if they have one.
@@ -114,18 +119,21 @@ impl Sweep {
         let rounds = self.rounds.as_ref()?;
         let costs: Vec<f64> =
             self.first_sets().into_iter().flat_map(|set| self.jobs_at(set..set + 1)).map(|job| job.cost).collect();
-        let sets = rounds.refinement.as_ref().map_or(costs.len() as u64, |refinement| refinement.max_sets);
         let dearest = costs.iter().copied().fold(0.0, f64::max);
-        let of_a_seed = costs.iter().sum::<f64>() + (sets - costs.len() as u64) as f64 * dearest;
-        let seeds = self.seed_count();
-        let (jobs, predicted_cost) = (sets * seeds, of_a_seed * seeds as f64);
+        let known = costs.len() as u64;
+        let (seeds, jobs) = match &rounds.refinement {
+            None => (self.seed_count(), known * self.seed_count()),
+            Some(refinement) => (*rounds.seeds.start(), refinement.max_jobs),
+        };
+        let sets = jobs / seeds;
+        let predicted_cost = costs.iter().sum::<f64>() * seeds as f64 + (jobs - known * seeds) as f64 * dearest;
         let controls = self.controls.as_ref().map_or(0, |controls| controls.point_count().min(jobs));
         Some(Bounds { sets, jobs: jobs + controls, predicted_cost: predicted_cost + controls as f64 * dearest })
     }
 
     /// The first round; `None` for a sweep without.
     pub fn first_round(&self) -> Option<Round> {
-        let seeds = self.rounds.as_ref()?.seeds_at_first(self.seed_count());
+        let seeds = *self.rounds.as_ref()?.seeds.start();
         let sets = self.first_sets();
         let points = self.with_controls(sets.iter().flat_map(|&set| self.points_of_set(set, 0..seeds)).collect());
         Some(Round { points, standing: Standing { sets_open: sets.len() as u64, ..Standing::default() } })

@@ -7,6 +7,7 @@
 use super::axes::Axis;
 use super::grid::Sweep;
 use super::quantity::{Point, Quantity};
+use super::rounds::Rounds;
 use super::set::Statistic;
 use super::source::{Refused, Section, Source};
 use crate::model::Symbol;
@@ -128,7 +129,11 @@ impl Sweep {
                 "eta = {eta:.3e} at a point; from {low:e} to {high:e} there is locking to see: check Delta, T and V0"
             )
         });
-        fast.into_iter().chain(odd).collect()
+        let few = self.rounds.as_ref().filter(|rounds| rounds.asked < *rounds.seeds.start());
+        let few = few.map(|Rounds { asked, seeds, .. }| {
+            format!("seeds: from = {asked} is raised to {}: intervals of fewer seeds are not trusted", seeds.start())
+        });
+        fast.into_iter().chain(odd).chain(few).collect()
     }
 }
 
@@ -163,8 +168,8 @@ fn controls(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
     let rounds = sweep.rounds.as_ref();
     let precise =
         rounds.and_then(|rounds| rounds.precision.as_ref()).map_or(&[][..], |precision| &precision.statistics);
-    let refined = rounds.and_then(|rounds| rounds.refinement.as_ref()).map(|refinement| &refinement.by);
-    let mut named = precise.iter().map(|by| ("precision", by)).chain(refined.map(|by| ("refine", by)));
+    let refined = sweep.refinement().map_or(&[][..], |refinement| &refinement.by);
+    let mut named = precise.iter().map(|by| ("precision", by)).chain(refined.iter().map(|by| ("refine", by)));
     match named.find(|(_, by)| by.needs_control()) {
         None => Ok(()),
         Some((section, Statistic { key, .. })) => {

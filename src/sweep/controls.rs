@@ -123,14 +123,14 @@ mod tests {
     #[test]
     fn the_key_changes_no_id_and_rounds_take_the_controls_of_their_points() {
         let axes = "[axes]\nDelta = [3e-7, 6e-7]\nfrequency = [29, 58]\n[precision]\nof = \"tau_mean\"\nrelative = 0.1\n\
-                    seeds = { from = 4, to = 16 }\n";
+                    seeds = { from = 24, to = 48 }\n";
         let with = sweep(axes);
         let without = Sweep::parse(&format!("name = \"a\"\n{axes}"), Path::new("test.toml")).unwrap();
         assert!(without.differences(&with).is_empty());
         let ids = |sweep: &Sweep| sweep.jobs().map(|job| sweep.job_id(&job.parameters)).collect::<Vec<_>>();
-        assert_eq!(ids(&with)[..64], ids(&without)[..]);
+        assert_eq!(ids(&with)[..192], ids(&without)[..]);
         let points = |sweep: &Sweep| sweep.first_round().unwrap().points.into_iter().flatten().count();
-        assert_eq!((points(&without), points(&with)), (16, 20));
+        assert_eq!((points(&without), points(&with)), (96, 120));
         let round = with.with_controls(with.points_of_set(0, 4..7).collect());
         let seeds = |point: u64| with.jobs_at(point..point + 1).next().unwrap().parameters.seed;
         assert_eq!(round.into_iter().flatten().map(seeds).collect::<Vec<_>>(), [4, 5, 6, 4, 5, 6]);

@@ -9,6 +9,7 @@
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set; labels.rs: how it is called before people
+//! variation.rs: a file with other values, as text
 //! ```
 //!
 //! Nothing here runs or writes anything. A plan is a function of texts and of what was done before them: the same jobs in
@@ -37,6 +38,7 @@ mod set;
 mod source;
 #[cfg(test)]
 mod tests;
+mod variation;
 
 pub use cost::predicted_cost;
 pub use expression::{Expression, ExpressionError};
@@ -44,9 +46,10 @@ pub use grid::Sweep;
 pub use job::{Id, Identity, Job};
 pub use labels::{Label, capitalised, label, symbol_of, three_digits};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
-pub use rounds::{Bounds, Contrast, Precision, RefinedAxis, Refinement, Round, Rounds, Standing, Target, merged};
-pub use set::{Interval, STATISTICS, SetRow, Statistic, StatisticKind};
+pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
+pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic, StatisticKind};
 pub use source::{Mistake, SweepError, nearest};
+pub use variation::{Change, varied, written};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
 /// is left to [`Sweep::parse`].

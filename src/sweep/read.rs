@@ -11,7 +11,7 @@ use super::grid::Sweep;
 use super::job::Identity;
 use super::quantity::Quantity;
 use super::read_axes;
-use super::read_rounds::{Wanted, read_precision, read_refinement};
+use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
 use crate::model::{Parameters, Value};
@@ -48,40 +48,43 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
     let mut places = Places::new(source);
     let model = read_section(&file, "model", "[model]", |model| read_model(model, &mut places));
     let wanted = read_section(&file, "refine", "[refine]", |refine| read_refinement(refine).map(Some));
-    let finer = wanted.as_ref().ok().and_then(Option::as_ref);
-    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places, finer));
-    let precision =
-        read_section(&file, "precision", "[precision]", |precision| read_precision(precision, &mut places).map(Some));
+    let axes = read_section(&file, "axes", "[axes]", |axes| read_axes::read(axes, &mut places));
+    let precision = read_section(&file, "precision", "[precision]", |precision| read_precision(precision).map(Some));
+    let (key, title) =
+        if file.entry("refine").is_some() { ("refine", "[refine]") } else { ("precision", "[precision]") };
+    let seeds = read_section(&file, key, title, |section| read_seeds(section, &mut places).map(Some));
+    if let (Some(_), Some(precision)) = (file.entry("refine"), file.entry("precision")) {
+        let problem =
+            "[precision]: [refine] gives sets the seeds that its edges need; keep one of them, or take two sweeps";
+        source.refuse(precision.at, problem);
+    }
     let conditions = file.entry("where").map_or(Ok(Vec::new()), |entry| read_conditions(&entry));
     let recording = read_section(&file, "record", "[record]", read_recording);
     let solver = read_section(&file, "solver", "[solver]", read_solver);
     source.passed()?;
     let ((base, period), recording, solver) = (model?, recording?, solver?);
     let (wanted, precision) = (wanted?, precision?);
-    let axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
-    let refinement = wanted.as_ref().map(|wanted| wanted.over(&axes)).transpose()?;
-    let (precision, seeds) = precision.unzip();
+    let mut axes: Vec<Axis> = period.into_iter().chain(axes?).collect();
+    let swept = || file.entry("axes").and_then(|entry| entry.section("[axes]"));
+    let refinement = wanted.as_ref().map(|wanted| wanted.over(&mut axes, swept())).transpose()?;
+    let rounds = |(seeds, asked, axis)| (Rounds { seeds, asked, precision, refinement }, axis);
+    let (rounds, seeds) = seeds?.map(rounds).unzip();
     let axes = axes.into_iter().chain(seeds).collect();
-    let has_rounds = precision.is_some() || refinement.is_some();
-    let rounds = has_rounds.then_some(Rounds { precision, refinement });
     let identity = Identity::new(solver, &recording);
     let (name, conditions, text) = (name?, conditions?, source.text.to_owned());
     let mut sweep = Sweep { name, text, base, axes, conditions, recording, solver, identity, rounds, controls: None };
     sweep.controls = recording.control.then(|| Box::new(sweep.unmodulated()));
     checks::whole(&sweep, &file, &places)?;
-    if has_rounds {
+    if let Some(Rounds { seeds, .. }) = &sweep.rounds {
         let sets = sweep.first_sets().len() as u64;
-        match &wanted {
-            Some(Wanted { max_sets, max_sets_at, .. }) if *max_sets < sets => {
-                return Err(max_sets_at.must_be(&format!("at least the {sets} sets of the axes as they stand")));
-            }
-            None if sets > MAX_SETS => {
-                let problem = format!(
-                    "[axes]: {sets} sets; a sweep with [precision] has at most {MAX_SETS}; take several sweeps"
-                );
-                return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
-            }
-            _ => {}
+        if sets > MAX_SETS {
+            let problem =
+                format!("[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps");
+            return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+        }
+        let least = sets * seeds.start();
+        if let Some(wanted) = wanted.as_ref().filter(|wanted| wanted.refinement.max_jobs < least) {
+            return Err(wanted.jobs.must_be(&format!("at least the {least} of the first round")));
         }
     }
     Ok(sweep)

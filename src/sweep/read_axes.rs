@@ -14,7 +14,6 @@
 use super::axes::{Axis, Column, MAX_ROWS, Repeated};
 use super::checks::Places;
 use super::quantity::Quantity;
-use super::read_rounds::{Wanted, WantedAxis};
 use super::samples::{Range, Sample};
 use super::source::{Entry, Refused, Section, all};
 use crate::model::Value;
@@ -26,18 +25,13 @@ const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in
 
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
-/// Reads all axes, those that are to be refined as fine as that.
-pub(super) fn read(
-    section: &Section<'_>,
-    places: &mut Places<'_>,
-    wanted: Option<&Wanted<'_>>,
-) -> Result<Vec<Axis>, Refused> {
+pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
     let axes = all(section.entries().iter().map(|entry| {
         let (title, read): (_, TableReader) = match entry.key {
             "zip" => ("[axes.zip]", read_zip),
             "sobol" => ("[axes.sobol]", |table, places| read_sample(table, Sample::Sobol, places)),
             "latin" => ("[axes.latin]", |table, places| read_sample(table, Sample::Latin, places)),
-            _ => return Ok(vec![read_single(entry, places, wanted)?]),
+            _ => return Ok(vec![read_single(entry, places)?]),
         };
         all(tables(entry, title)?.iter().map(|table| read(table, places)))
     }));
@@ -63,12 +57,12 @@ fn known(entry: &Entry<'_>, title: &str, also: &[&'static str], places: &mut Pla
     Ok(quantity)
 }
 
-fn read_single(entry: &Entry<'_>, places: &mut Places<'_>, wanted: Option<&Wanted<'_>>) -> Result<Axis, Refused> {
+fn read_single(entry: &Entry<'_>, places: &mut Places<'_>) -> Result<Axis, Refused> {
     let quantity = known(entry, "[axes]", &["zip", "sobol", "latin"], places)?;
     if let (Some((first, count)), Quantity::Parameter(symbol)) = (read_count(entry, quantity)?, quantity) {
         return Ok(Axis::Counted { symbol, first, count });
     }
-    let values = read_values(entry, quantity, wanted.and_then(|wanted| wanted.axis(quantity)))?;
+    let values = read_values(entry, quantity)?;
     let column = Column { quantity, values: values.iter().map(|&(value, _)| value).collect() };
     Axis::table(vec![column]).map_err(|Repeated { earlier, later }| {
         let (value, at) = values[later];
@@ -82,12 +76,8 @@ fn read_single(entry: &Entry<'_>, places: &mut Places<'_>, wanted: Option<&Wante
     })
 }
 
-/// Reads the values of a quantity, each with the byte of the text that sets it; more of a range that is to be refined.
-fn read_values(
-    entry: &Entry<'_>,
-    quantity: Quantity,
-    finer: Option<&WantedAxis<'_>>,
-) -> Result<Vec<(Value, usize)>, Refused> {
+/// Reads the values of a quantity, each with the byte of the text that sets it.
+fn read_values(entry: &Entry<'_>, quantity: Quantity) -> Result<Vec<(Value, usize)>, Refused> {
     if let Some(list) = entry.list() {
         if list.is_empty() {
             return Err(entry.refuse("an axis needs at least one value"));
@@ -107,6 +97,12 @@ fn read_values(
         }
         None => {}
     }
+    let (range, points) = read_spaced(entry, quantity)?;
+    Ok(range.spaced(points).map(|value| (ranged(quantity, value), entry.at)).collect())
+}
+
+/// Reads a range of an axis, and the number of its values.
+pub(super) fn read_spaced(entry: &Entry<'_>, quantity: Quantity) -> Result<(Range, u64), Refused> {
     let Some(table) = entry.section("an axis") else {
         let setting =
             if matches!(quantity, Quantity::Parameter(_)) { "; a single value belongs in [model]" } else { "" };
@@ -116,8 +112,13 @@ fn read_values(
     table.only(&["linear", "log", "points"])?;
     // One point would leave out an end.
     let points = table.required("points", &format!("write {RANGE_FORMS}"))?.count(2, MAX_ROWS)?;
-    let points = finer.map_or(Ok(points), |axis| axis.points(&range, points))?;
-    Ok(range.spaced(points).map(|value| (ranged(quantity, value), entry.at)).collect())
+    Ok((range, points))
+}
+
+/// The axis of a range with this many values; `None` if two of these are one.
+pub(super) fn spaced(range: &Range, points: u64, quantity: Quantity) -> Option<Axis> {
+    let values = range.spaced(points).map(|value| ranged(quantity, value)).collect();
+    Axis::table(vec![Column { quantity, values }]).ok()
 }
 
 /// Reads the first of counted values and their number; none if the entry has another form.
@@ -192,7 +193,7 @@ fn read_zip(table: &Section<'_>, places: &mut Places<'_>) -> Result<Axis, Refuse
     let entries = table.entries();
     let columns = all(entries.iter().map(|entry| {
         let quantity = known(entry, table.title, &[], places)?;
-        let values = read_values(entry, quantity, None)?.into_iter().map(|(value, _)| value).collect();
+        let values = read_values(entry, quantity)?.into_iter().map(|(value, _)| value).collect();
         Ok(Column { quantity, values })
     }))?;
     let [first, _, ..] = columns.as_slice() else {

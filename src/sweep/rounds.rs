@@ -1,16 +1,24 @@
 //! Rounds: what `[precision]` and `[refine]` ask for, and the points that one round runs.
 
 use super::set::Statistic;
-use crate::table::value::Shortest;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::RangeInclusive;
 
 /// Most sets of a sweep with rounds: the points of every round are listed in the file of its extension.
 pub(super) const MAX_SETS: u64 = 100_000;
+/// Most jobs of a sweep that looks for edges.
+pub(super) const MAX_JOBS: u64 = 1_000_000;
 
-/// What a sweep decides by itself.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Seeds of a set below which its interval is not trusted, unless it may have no more: see `rounds/precision.rs`.
+pub const MIN_SEEDS: u64 = 24;
+
+/// What a sweep decides by itself: one of the two.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Rounds {
+    /// Seeds of a set in the first round, and at most.
+    pub seeds: RangeInclusive<u64>,
+    /// Seeds in the first round as the sweep file has them, which may be fewer.
+    pub asked: u64,
     pub precision: Option<Precision>,
     pub refinement: Option<Refinement>,
 }
@@ -22,8 +30,6 @@ pub struct Precision {
     pub statistics: Vec<Statistic>,
     /// Largest half-width of their intervals.
     pub target: Target,
-    /// Seeds of a set in the first round, and at most.
-    pub seeds: RangeInclusive<u64>,
 }
 
 /// Largest half-width of an interval.
@@ -34,37 +40,22 @@ pub enum Target {
     Absolute(f64),
 }
 
-/// Cells of the grid are divided where something happens.
+/// Sets and seeds are added where a statistic crosses a threshold along an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refinement {
-    /// The axes along which cells are divided.
-    pub axes: Vec<RefinedAxis>,
-    /// What tells the sets of a cell apart.
-    pub by: Statistic,
-    pub contrast: Contrast,
-    /// Most sets of the sweep.
-    pub max_sets: u64,
-}
-
-/// An axis along which cells are divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RefinedAxis {
     pub axis: usize,
-    /// How often a cell of the first round can be halved.
+    /// How often the distance of two sets of the first round can be halved on it.
     pub levels: u32,
-}
-
-/// When the sets of a cell differ in a statistic.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Contrast {
-    /// They are not all the same.
-    Class,
-    /// Some have this value, and some have not.
-    Value(String),
-    /// Some are above this value, and some are not.
-    Threshold(f64),
-    /// Largest and smallest differ by more than this.
-    Step(f64),
+    pub is_log: bool,
+    /// What crosses the threshold; at least one.
+    pub by: Vec<Statistic>,
+    /// The statistic is the share of the intervals that are nearest to this number of periods.
+    pub periods: Option<u64>,
+    pub threshold: f64,
+    /// Largest width of the interval of an edge: on a logarithmic axis as a share of the value.
+    pub to: f64,
+    /// Most jobs of the sweep, controls left out.
+    pub max_jobs: u64,
 }
 
 /// A round: the points that it runs, and how things stood when it began.
@@ -77,7 +68,7 @@ pub struct Round {
     pub standing: Standing,
 }
 
-/// How the sets and cells of a sweep stand.
+/// How the sets and edges of a sweep stand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Standing {
     /// Sets that need no more jobs.
@@ -86,8 +77,8 @@ pub struct Standing {
     pub sets_open: u64,
     /// Sets that have the most seeds and miss the target.
     pub sets_capped: u64,
-    /// Cells whose sets differ and that are coarser than wanted, but may not be divided: the sweep has the most sets.
-    pub cells_capped: u64,
+    /// Edges that are less precise than wanted, but get no more jobs: their sets or the sweep have the most.
+    pub edges_capped: u64,
 }
 
 /// What all rounds of a sweep may add up to.
@@ -99,28 +90,10 @@ pub struct Bounds {
     pub predicted_cost: f64,
 }
 
-impl Refinement {
-    /// What makes a set lie on one side of the edge, as the table of cells says it.
-    pub fn condition(&self) -> String {
-        let key = self.by.key;
-        match &self.contrast {
-            Contrast::Class | Contrast::Step(_) => key.to_owned(),
-            Contrast::Value(value) => format!("{key} = {value}"),
-            Contrast::Threshold(threshold) => format!("{key} > {}", Shortest(*threshold)),
-        }
-    }
-}
-
 impl Rounds {
-    /// Seeds that a set gets first, if the grid has this many.
-    pub fn seeds_at_first(&self, all: u64) -> u64 {
-        self.precision.as_ref().map_or(all, |precision| *precision.seeds.start())
-    }
-
     /// How many rows of the grid lie between two of the first round, on this axis.
     pub(super) fn spacing(&self, axis: usize) -> u64 {
-        let refined = self.refinement.iter().flat_map(|refinement| &refinement.axes);
-        refined.filter(|refined| refined.axis == axis).map(|refined| 1 << refined.levels).next().unwrap_or(1)
+        self.refinement.as_ref().filter(|refined| refined.axis == axis).map_or(1, |refined| 1 << refined.levels)
     }
 }
 

@@ -57,6 +57,7 @@ columns! {
     pub struct SetRow {
         set_id: String = "", "hash of all that defines a job but the seed";
         parameters: Selected<AllButSeed>;
+        frequency: Option<f64> = "Hz", "1/T; null without modulation";
         eta: f64 = "", "2 pi Delta / (T V0); 0 without modulation";
         finished_jobs as "jobs": u64 = "", "jobs run to an end, one per seed";
         failed_jobs: u64 = "", "jobs that failed";
@@ -155,7 +156,8 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
         // parameters, and what is expected whatever happens, tell nothing of a set.
         let Cow::Borrowed(key) = column.name else { return None };
         let is_measured = column.nullable || column.kind == Kind::Flag;
-        let is_given = Symbol::from_key(key).is_some() || key.starts_with("expected_") || key == "control";
+        let is_given =
+            Symbol::from_key(key).is_some() || key.starts_with("expected_") || ["control", "frequency"].contains(&key);
         let kind = match column.kind {
             Kind::Flag | Kind::Text | Kind::Count => StatisticKind::Class,
             Kind::Real if !has_interval(key) => StatisticKind::Number,
@@ -170,6 +172,16 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
 impl Statistic {
     pub const fn has_interval(self) -> bool {
         matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
+    }
+
+    /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
+    /// values, bounds and p-values change with their number, and angles have no order.
+    pub fn can_cross(self) -> bool {
+        const OTHERS: &[&str] = &["share_below", "tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
+        let is_of_sample =
+            ["effective_", "tau_mean_", "rayleigh_", "load_"].iter().any(|begin| self.key.starts_with(begin));
+        let is_number = matches!(self.kind, StatisticKind::Estimate | StatisticKind::Number);
+        is_number && !is_of_sample && !OTHERS.contains(&self.key)
     }
 
     /// Whether it says what the drive alone explains, or what it does not.

@@ -108,7 +108,11 @@ pub trait Storage: Sync {
 
     /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
-        Ok(self.open(file)?.metadata().map_err(StorageError::at("read", file))?.len())
+        let metadata = self
+            .open(file)?
+            .metadata()
+            .and_then(|metadata| if metadata.is_file() { Ok(metadata) } else { Err(NoFile::Irregular.into()) });
+        Ok(metadata.map_err(StorageError::at("read", file))?.len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.

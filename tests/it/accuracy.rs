@@ -40,12 +40,31 @@ fn a_study_takes_the_sets_and_the_solver_of_a_sweep_file() {
 fn a_set_of_flags_is_studied_as_text() {
     let folder = Folder::new();
     let flags = "--set N=9 --set Ns=5 --set M=0.006 --set K=7e7 --set Kd=1e8 --set Delta=1e-6 --set frequency=58";
-    let text = folder.ends(0, &format!("accuracy --quick --seeds 1 --slips 3 --threads 1 --out mine {flags}")).stdout;
-    assert!(text.contains("\nV0 = 1e-4 m/s, Delta = 1e-6 m, 1/T = 58 Hz, N = 9, Ns = 5"), "{text}");
+    let text =
+        folder.ends(0, &format!("accuracy --quick --seeds 1 --slips 3 --threads 1 --out mine {flags} --all")).stdout;
     assert!(
-        text.contains("phase (rad)") && text.contains("front_speed (%)") && text.contains(" show a bias of the mean"),
+        text.starts_with("The solver (grid, tolerance 1e-3): ") && text.contains("\n-> grid, tolerance 1e-3 "),
         "{text}"
     );
+    assert!(text.contains("\nV0 = 1e-4 m/s, Delta = 1e-6 m, 1/T = 58 Hz, N = 9, Ns = 5"), "{text}");
+    assert!(text.contains("phase (rad)") && text.contains("front_speed (%)") && text.contains("together"), "{text}");
+}
+
+#[test]
+fn a_sweep_gets_its_verdict_in_the_first_lines_and_the_result_beside_its_own() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("mine.toml"), SWEEP).unwrap();
+    let ended = folder.ends(0, "accuracy mine.toml --quick --seeds 1 --slips 3 --set V0=1e-4");
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    let found = ["no bias found; 3 slips a side could have shown", "too few slips to tell: 3 a side"];
+    assert!(lines[0].starts_with("Your sweep (grid, tolerance 2e-5): "), "{}", lines[0]);
+    assert!(found.iter().any(|text| lines[0].contains(text)), "{}", lines[0]);
+    assert!(lines[1].contains("breaks are off by") && lines[2].contains("Statistical error"), "{}", ended.stdout);
+    assert!(lines.len() < 25 && ended.stdout.contains("\n-> grid, tolerance 2e-5 "), "{}", ended.stdout);
+    assert!(ended.stderr.contains("the seeds of the sweep are not used"), "{}", ended.stderr);
+    let report = std::fs::read_to_string(folder.path("results/mine-accuracy/accuracy.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["verdict"][0], lines[0]);
 }
 
 #[test]
@@ -60,9 +79,6 @@ fn what_cannot_be_studied_is_refused() {
         ("--set Foo=3", "unknown key"),
         ("--set V0", "must be KEY=VALUE"),
         ("--set seed=77", "--seeds says how many"),
-        ("many.toml --set V0=1e-5", "cannot be used with"),
-        ("--set V0=1e-5 --hard-cases", "cannot be used with"),
-        ("--preset fig4b --set V0=1e-5", "cannot be used with"),
         ("--preset fig4b -o many.toml", "--out many.toml: must be a folder"),
     ] {
         let ended = folder.ends(2, &format!("accuracy {arguments}"));

@@ -33,6 +33,50 @@ fn a_sweep_of_the_paper_runs_without_a_file_and_can_be_changed() {
 }
 
 #[test]
+fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
+    let folder = Folder::new();
+    let text =
+        "# Mine.\nname = \"mine\"\n[model]\nN = 3\nNs = 4\n[axes]\nV0 = [1e-4, 2e-4]  # two\n[record]\nslips = 2\n";
+    fs::write(folder.path("mine.toml"), text).unwrap();
+    folder.ends(0, "run mine.toml --no-reduce");
+    let flags = "--set V0=3e-4 --axis seed=count:3 --set slips=1";
+    let planned = folder.ends(0, &format!("plan mine.toml {flags}")).stdout;
+    assert!(planned.contains("3 after conditions") && planned.contains("none yet"), "{planned}");
+    let refused = folder.ends(2, &format!("run mine.toml {flags}")).stderr;
+    assert!(refused.contains("another sweep than that of results/mine") && refused.contains("--out"), "{refused}");
+    folder.ends(0, &format!("run mine.toml {flags} -o other --no-reduce"));
+    let jobs = folder.table("other", "jobs");
+    assert_eq!(jobs.reals("V0"), [3e-4; 3]);
+    // That text is the directory's own, so the same command resumes, and so does its name alone.
+    for again in
+        [format!("run mine.toml {flags} -o other"), "run other".to_owned(), "run other --set V0=3e-4".to_owned()]
+    {
+        let ended = folder.ends(0, &format!("{again} --no-reduce"));
+        assert!(
+            ended.stdout.contains("jobs run") && ended.stdout.contains(" 0, 0 failed"),
+            "{again}: {}",
+            ended.stdout
+        );
+    }
+    assert_eq!(folder.table("results/mine", "jobs").reals("V0"), [1e-4, 2e-4]);
+    folder.ends(0, &format!("init other.toml --preset velocity {flags}"));
+    assert!(folder.ends(0, "plan other.toml").stdout.contains("3 after conditions"));
+    folder.ends(0, "simulate mine.toml --set V0=1e-4");
+}
+
+#[test]
+fn each_question_is_a_sweep_that_plans() {
+    let folder = Folder::new();
+    for (question, jobs) in [("friction", 296), ("interval", 65), ("locking", 558), ("sliding", 200)] {
+        folder.ends(0, &format!("init {question}.toml --question {question}"));
+        let text = fs::read_to_string(folder.path(&format!("{question}.toml"))).unwrap();
+        assert!(text.lines().next().unwrap().ends_with('?'), "{text}");
+        let planned = folder.ends(0, &format!("plan {question}.toml")).stdout;
+        assert!(planned.contains(&format!("{jobs} after conditions")), "{planned}");
+    }
+}
+
+#[test]
 fn a_file_name_that_suits_no_sweep_is_rejected_and_leaves_nothing() {
     let folder = Folder::new();
     let said = folder.ends(2, "init my.sweep.toml").stderr;

@@ -156,27 +156,24 @@ discard = 0
 precursors = true
 ";
 
-/// One of two sets gets more seeds, and the cells between them are divided.
+/// An edge between sets of few seeds.
 const ROUNDS: &str = "\
 name = \"rounds\"
 [model]
 N = 2
 Ns = 1
 [axes]
-V0 = { log = [1e-4, 2e-4], points = 2 }
+V0 = { log = [1e-4, 1e-2], points = 3 }
 [record]
 slips = 2
 discard = 0
-[precision]
-of = \"tau_mean\"
-relative = 0.5
-seeds = { from = 2, to = 3 }
 [refine]
-axes = \"V0\"
-by = \"tau_mean\"
-step = 1e-9
-to = { V0 = 0.3 }
-sets = 5
+axis = \"V0\"
+by = \"slip_share\"
+threshold = 0.5
+to = 0.5
+seeds = { from = 2, to = 6 }
+jobs = 60
 ";
 
 /// A folder with results directories: as they are run, and of a sweep in rounds.

@@ -7,11 +7,11 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Some seconds of CPU time, in a dozen of rounds: seeds to a precision, then finer cells.
-const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = { linear = [10, 60], points = 3 }\n\
-                   Delta = { log = [1e-7, 4e-6], points = 3 }\n[record]\nslips = 10\n\
-                   [precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 4, to = 30 }\n\
-                   [refine]\naxes = [\"frequency\", \"Delta\"]\nby = \"has_phase\"\nto = { frequency = 7, Delta = 1 }\nsets = 60\n";
+/// Some seconds of CPU time, in a dozen of rounds: the edges of two statistics at two frequencies.
+const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = [29, 58]\n\
+                   Delta = { log = [5e-8, 1.6e-6], points = 3 }\n[record]\nslips = 10\ncontrol = true\n\
+                   [refine]\naxis = \"Delta\"\nby = [\"resultant_length\", \"resultant_drive\"]\nthreshold = 0.5\n\
+                   to = 0.1\nseeds = { first = 5, from = 8, to = 200 }\njobs = 3000\n";
 
 /// The files that say which rounds a directory has had.
 fn extensions(folder: &Folder, out: &str) -> Vec<Vec<u8>> {
@@ -99,9 +99,9 @@ fn a_directory_that_has_had_other_sweeps_goes_through_the_same_rounds_and_runs_w
     let folder = Folder::new();
     folder.write("map.toml", MAP);
     // Other seeds of some of its sets, and sets of its own.
-    let (axes, _) = MAP.split_once("[precision]").unwrap();
+    let (axes, _) = MAP.split_once("[refine]").unwrap();
     folder.write("plain.toml", &axes.replace("[record]", "seed = { count = 9 }\n[record]"));
-    folder.write("coarse.toml", &MAP.replace("relative = 0.1", "relative = 0.2"));
+    folder.write("coarse.toml", &MAP.replace("to = 0.1", "to = 0.2"));
     let whole = json(&folder.ends(0, "run map.toml --out whole --no-reduce --json").stdout);
     for sweep in ["plain.toml", "coarse.toml"] {
         folder.ends(0, &format!("run {sweep} --out r --no-reduce"));
@@ -126,18 +126,41 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
     let text = "name = \"hard\"\n[model]\nN = 10\nNs = 5\n[axes]\nV0 = [5e-5, 1e-4]\n[record]\nslips = 3\n\
                 [precision]\nof = [\"tau_mean\", \"mean_friction\"]\nrelative = 1e-9\nseeds = { from = 3, to = 11 }\n";
     folder.write("hard.toml", text);
-    let planned = folder.ends(0, "plan hard.toml").stdout;
-    assert!(planned.contains("jobs                 6 ") && planned.contains("at most 2 sets, 22 jobs"), "{planned}");
+    let planned = folder.ends(0, "plan hard.toml");
+    assert!(planned.stderr.contains("warning: seeds: from = 3 is raised to 11"), "{}", planned.stderr);
+    let planned = planned.stdout;
+    assert!(planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs"), "{planned}");
     let ended = folder.ends(0, "run hard.toml --out r");
     assert!(ended.stdout.contains("2 sets with all seeds allowed, above the target"), "{}", ended.stdout);
-    assert!(folder.ends(0, "status r").stdout.contains("round         3 (the last): 0 sets done, 0 open; 2 sets"));
+    assert!(folder.ends(0, "status r").stdout.contains("round         1 (the last): 0 sets done, 0 open; 2 sets"));
     let sets = folder.file("r/reduced/sets.parquet");
     assert_eq!(
         (sets.counts("jobs"), sets.counts("seeds"), sets.counts("last_round")),
-        (vec![11; 2], vec![11; 2], vec![3; 2])
+        (vec![11; 2], vec![11; 2], vec![1; 2])
     );
     let refused = folder.ends(2, "run hard.toml --out s --shard 1/2");
     assert!(refused.stderr.contains("has no shards"), "{}", refused.stderr);
+}
+
+#[test]
+fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
+    let folder = Folder::new();
+    folder.write("map.toml", MAP);
+    folder.write("few.toml", &MAP.replace("jobs = 3000", "jobs = 150").replace("threshold = 0.5", "threshold = 0.999"));
+    let ended = folder.ends(0, "run map.toml --out r");
+    assert!(ended.stderr.contains("warning: seeds: from = 8 is raised to 24"), "{}", ended.stderr);
+    let edges = folder.file("r/reduced/edges.parquet");
+    let (place, low, high) = (edges.reals("edge"), edges.reals("edge_low"), edges.reals("edge_high"));
+    assert_eq!(edges.texts("statistic").len(), 4, "two frequencies, two statistics");
+    for ((place, low), (high, ended)) in place.iter().zip(&low).zip(high.iter().zip(edges.texts("ended"))) {
+        assert!(5e-8 < *low && low < place && place < high && *high < 1.6e-6, "{low} {place} {high}");
+        assert_eq!(ended == "width", high / low < 1.1 * (1.0 + 1e-9), "{ended}: {low} to {high}");
+    }
+    assert!(folder.path("r/figures/edges.svg").exists());
+    assert!(folder.table("r", "jobs").counts("seed").into_iter().min() == Some(5));
+    folder.ends(0, "run few.toml --out few");
+    let none = folder.file("few/reduced/edges.parquet");
+    assert!(none.texts("ended").iter().all(|ended| *ended == "no crossing"));
 }
 
 #[test]

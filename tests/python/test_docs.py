@@ -100,6 +100,22 @@ def test_commands_in_the_documentation_can_be_given(program, page):
         assert os.access(ROOT / script, os.X_OK), f"{name(page)} names {script}"
 
 
+RECIPES = re.findall(r"`stickslip (run [^`]*-o [^`]*)`", (ROOT / "docs" / "guide.md").read_text())
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.rpartition("/")[2])
+def test_recipes_end_with_a_figure(program, tmp_path, recipe):
+    assert len(RECIPES) == 10
+    # As it stands, but with few contacts and slips.
+    small = ["--set", "Ns=3", "--set", "slips=4"]
+    small += [] if "N=" in recipe.replace("Kd=", "") else ["--set", "N=5"]
+    small += [] if "-edge" in recipe or "-precise" in recipe else ["--axis", "seed=count:2"]
+    done = subprocess.run([program, *recipe.split(), *small], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "⟨τ⟩" in done.stdout
+    assert list((tmp_path / "results").glob("*/figures/*.png")), done.stdout
+
+
 def test_the_readme_has_the_commands_for_the_figure_and_the_tests():
     text = (ROOT / "README.md").read_text()
     assert "scripts/fig3" in text

@@ -373,21 +373,20 @@ def test_the_stubs_are_those_of_the_module(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_sweeps_in_rounds_have_cells_and_say_whether_targets_are_met(tmp_path, opened):
-    rounds = module.run(
-        {
-            "name": "rounds",
-            "model": {"N": 3, "Ns": 4},
-            "axes": {"V0": {"log": [1e-4, 2e-4], "points": 2}},
-            "record": {"slips": 2},
-            "precision": {"of": "mean_friction", "relative": 0.5, "seeds": {"from": 2, "to": 3}},
-            "refine": {"axes": "V0", "by": "mean_friction", "step": 1e-9, "to": {"V0": 0.5}, "sets": 3},
-        },
-        tmp_path / "rounds",
-        progress=False,
-    )
-    cells, sets = pa.table(rounds.cells()), pa.table(rounds.sets())
-    assert cells["x"].to_pylist() == ["V0", "V0"] and "differs" in cells.column_names
+def test_sweeps_in_rounds_have_edges_and_say_whether_targets_are_met(tmp_path, opened):
+    def run(name, section):
+        axes = {"V0": {"log": [1e-4, 1e-3], "points": 3}}
+        sweep = {"name": name, "model": {"N": 3, "Ns": 4}, "axes": axes, "record": {"slips": 2}, **section}
+        return module.run(sweep, tmp_path / name, progress=False)
+
+    precise = run("precise", {"precision": {"of": "mean_friction", "relative": 0.5, "seeds": {"from": 2, "to": 3}}})
+    sets = pa.table(precise.sets())
     assert len(sets) == 3 and {"first_round", "seeds", "target_met"} <= set(sets.column_names)
+    seeds = {"first": 7, "from": 24, "to": 48}
+    refine = {"axis": "V0", "by": "slip_share", "threshold": 0.5, "to": 0.3, "seeds": seeds, "jobs": 200}
+    refined = run("refined", {"refine": refine})
+    edges = pa.table(refined.edges())
+    assert set(edges["axis"].to_pylist()) == {"V0"} and {"edge", "edge_low", "ended"} <= set(edges.column_names)
+    assert min(pa.table(refined.jobs())["seed"].to_pylist()) == 7
     with pytest.raises(module.ResultsError, match="refine"):
-        opened.cells()
+        opened.edges()

@@ -19,7 +19,7 @@ GOOD = [
     'name = "a"\n[solver]\nresolve = "taylor"\ntolerance = 1e-9\n',
     'name = "a"\n[precision]\nof = ["tau_mean", "drop_mean"]\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n'
-    '[refine]\naxes = "V0"\nby = "tau_mean"\nthreshold = 0.1\nto = { V0 = 0.1 }\nsets = 9\n',
+    '[refine]\naxis = "V0"\nby = ["tau_mean", "tau_sd"]\nthreshold = 0.1\nto = 0.1\nseeds = { first = 3, from = 24, to = 48 }\njobs = 99\n',
 ]
 BAD = [
     "[model]\nN = 3",
@@ -45,7 +45,7 @@ BAD = [
     'name = "a"\n[precision]\nof = "tau_25"\nrelative = 0.01\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nseeds = { from = 4, to = 64 }\n',
     'name = "a"\n[precision]\nof = "tau_mean"\nrelative = 0.1\nabsolute = 1\nseeds = { from = 4, to = 64 }\n',
-    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxes = "V0"\nby = "has_phase"\nto = { V0 = 0.1 }\n',
+    'name = "a"\n[axes]\nV0 = { log = [1e-5, 1e-4], points = 3 }\n[refine]\naxis = "V0"\nby = "rayleigh_p"\nthreshold = 0.1\nto = 0.1\nseeds = { from = 24, to = 48 }\njobs = 99\n',
 ]
 
 

@@ -267,14 +267,8 @@ fn every_column_of_a_zip_or_a_sample_and_every_axis_is_read() {
 }
 
 #[test]
-fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
-    const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
-                          Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
+fn targets_that_cannot_be_are_refused_with_what_is_allowed() {
     let precision = |text: &str| format!("name = \"a\"\n[precision]\n{text}");
-    let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
-    let good = "axes = [\"frequency\"]\nby = \"has_phase\"\nto = { frequency = 0.1 }\nsets = 50\n";
-    Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
-    let instead = |from: &str, to: &str| refine(&good.replace(from, to));
     let seeds = "seeds = { from = 4, to = 8 }";
     let precise = |of: &str| precision(&format!("of = {of}\nrelative = 0.01\n{seeds}"));
     let table: Vec<(String, usize, &[&str])> = vec![
@@ -319,44 +313,69 @@ fn targets_and_refinements_that_cannot_be_are_refused_with_what_is_allowed() {
             5,
             &["seed", "is set in [axes], too (line 7)"],
         ),
-        (instead("[\"frequency\"]", "[\"frequenzy\"]"), 7, &["axes = \"frequenzy\"", "did you mean frequency?"]),
-        (instead("[\"frequency\"]", "[\"break_on\"]"), 7, &["axes = \"break_on\"", "is a word"]),
-        (instead("[\"frequency\"]", "[\"N\"]"), 7, &["axes = \"N\"", "whole numbers"]),
-        (instead("[\"frequency\"]", "[\"frequency\", \"frequency\"]"), 7, &["named twice"]),
-        (instead("[\"frequency\"]", "[]"), 7, &["names no axis"]),
-        (instead("frequency", "T"), 7, &["axes = \"T\"", "T follows from the axis frequency", "refine frequency"]),
-        (instead("frequency", "K"), 7, &["axes = \"K\"", "is no axis of [axes]"]),
-        (instead("frequency", "V0"), 7, &["axes = \"V0\"", "no values in between", "linear"]),
+    ];
+    for (text, line, words) in &table {
+        assert_refused(&[(text, *line, words)]);
+    }
+}
+
+#[test]
+fn refinements_that_cannot_be_are_refused_with_what_is_allowed() {
+    const RANGES: &str = "name = \"a\"\n[axes]\nfrequency = { linear = [5, 75], points = 8 }\n\
+                          Delta = { log = [1e-7, 4e-6], points = 5 }\nV0 = [1e-4]\n";
+    let refine = |text: &str| format!("{RANGES}[refine]\n{text}");
+    let good = "axis = \"frequency\"\nby = \"resultant_length\"\nthreshold = 0.5\nto = 0.1\n\
+                seeds = { first = 7, from = 4, to = 48 }\njobs = 960\n";
+    Sweep::parse(&refine(good), Path::new("good.toml")).unwrap();
+    let instead = |from: &str, to: &str| refine(&good.replace(from, to));
+    let table: Vec<(String, usize, &[&str])> = vec![
+        (instead("frequency", "frequenzy"), 7, &["axis = \"frequenzy\"", "did you mean frequency?"]),
+        (instead("\"frequency\"", "[\"frequency\"]"), 7, &["axis = [\"frequency\"]", "the name of one axis"]),
+        (instead("frequency", "break_on"), 7, &["axis = \"break_on\"", "is a word"]),
+        (instead("frequency", "N"), 7, &["axis = \"N\"", "whole numbers"]),
+        (instead("frequency", "T"), 7, &["axis = \"T\"", "T follows from the axis frequency", "refine frequency"]),
+        (instead("frequency", "K"), 7, &["axis = \"K\"", "is no axis of [axes]"]),
+        (instead("frequency", "V0"), 7, &["axis = \"V0\"", "no values in between", "linear"]),
         (
             format!(
                 "name = \"a\"\n[axes.zip]\nK = [1e8, 2e8]\nV0 = [1e-4, 2e-4]\n[refine]\n{}",
                 good.replace("frequency", "K")
             ),
             6,
-            &["axes = \"K\"", "zip or a sample"],
+            &["axis = \"K\"", "zip or a sample"],
         ),
-        (instead("\"has_phase\"", "\"has_phas\""), 8, &["by = \"has_phas\"", "did you mean has_phase?"]),
-        (instead("\"has_phase\"", "\"has_phase\"\nthreshold = 1"), 9, &["threshold = 1", "has_phase is no number"]),
-        (instead("\"has_phase\"", "\"tau_mean\""), 8, &["by = \"tau_mean\"", "threshold", "step"]),
-        (instead("\"has_phase\"", "\"has_phase\"\nvalue = 1"), 9, &["value = 1", "true or false"]),
+        (instead("\"resultant_length\"", "\"resultant\""), 8, &["by = \"resultant\"", "no statistic of a set"]),
+        (instead("\"resultant_length\"", "\"tau_meen\""), 8, &["did you mean tau_mean?"]),
         (
-            instead("\"has_phase\"", "\"regime\"\nvalue = \"slides\""),
-            9,
-            &["value = \"slides\"", "stick-slip, mixed, sliding"],
+            instead("\"resultant_length\"", "[\"tau_mean\", \"tau_50\"]"),
+            8,
+            &["by = \"tau_50\"", "crosses no threshold"],
         ),
-        (instead("\"has_phase\"", "\"periods\"\nvalue = 3.5"), 9, &["value = 3.5", "whole"]),
-        (instead("\"has_phase\"", "\"periods\"\nthreshold = 3"), 9, &["threshold = 3", "periods is no number"]),
-        (instead("\"has_phase\"", "\"tau_mean\"\nvalue = 1"), 9, &["value = 1", "threshold or step"]),
-        (instead("\"has_phase\"", "\"tau_mean\"\nstep = 0"), 9, &["step = 0", "> 0"]),
-        (instead("\"has_phase\"", "\"tau_mean\"\nthreshold = 1\nstep = 1"), 10, &["step = 1", "keep one"]),
-        (instead("frequency = 0.1", "frequency = 10"), 9, &["frequency = 10", "finer than 10"]),
-        (instead("frequency = 0.1", "frequency = 0"), 9, &["frequency = 0", "> 0"]),
-        (instead("frequency = 0.1", "frequency = 1e-9"), 9, &["frequency = 1e-9", "1000000 values"]),
-        (instead("frequency = 0.1", "Delta = 0.1"), 9, &["Delta = 0.1", "allowed are frequency"]),
-        (instead("frequency = 0.1", ""), 9, &["frequency is missing"]),
-        (instead("sets = 50", "sets = 39"), 10, &["sets = 39", "at least the 40 sets"]),
-        (instead("sets = 50", "sets = 0"), 10, &["sets = 0", "from 1 to 100000"]),
-        (instead("sets = 50", "sets = 50\nfiner = 3"), 11, &["finer = 3", "[refine]", "allowed are axes, by"]),
+        (instead("\"resultant_length\"", "\"phase_mean\""), 8, &["by = \"phase_mean\"", "crosses no threshold"]),
+        (instead("\"resultant_length\"", "\"regime\""), 8, &["by = \"regime\"", "allowed are periods, slip_share"]),
+        (instead("\"resultant_length\"", "[]"), 8, &["at least one statistic"]),
+        (instead("\"resultant_length\"", "3"), 8, &["by = 3", "in quotes"]),
+        (instead("resultant_length", "resultant_drive"), 6, &["resultant_drive needs controls", "control = true"]),
+        (instead("threshold = 0.5", "value = 4\nthreshold = 0.5"), 9, &["value = 4", "by = \"periods\""]),
+        (instead("threshold = 0.5\n", ""), 6, &["threshold is missing"]),
+        (instead("threshold = 0.5", "threshold = true"), 9, &["threshold = true", "a finite number"]),
+        (instead("resultant_length", "periods"), 6, &["value is missing", "n of tau = n T"]),
+        (instead("\"resultant_length\"", "\"periods\"\nvalue = 3.5"), 9, &["value = 3.5", "whole"]),
+        (instead("to = 0.1", "to = 10"), 10, &["to = 10", "finer than 10"]),
+        (instead("to = 0.1", "to = 0"), 10, &["to = 0", "> 0"]),
+        (instead("to = 0.1", "to = 1e-9"), 10, &["to = 1e-9", "1000000 values"]),
+        (instead("from = 4, to = 48", "from = 4"), 11, &["to is missing in seeds"]),
+        (instead("first = 7", "first = -7"), 11, &["first = -7", "from 0"]),
+        (instead("jobs = 960", "jobs = 959"), 12, &["jobs = 959", "at least the 960 of the first round"]),
+        (instead("jobs = 960", "jobs = 0"), 12, &["jobs = 0", "from 1 to 1000000"]),
+        (instead("jobs = 960\n", ""), 6, &["jobs is missing"]),
+        (instead("jobs = 960", "jobs = 960\nfiner = 3"), 13, &["finer = 3", "[refine]", "allowed are axis, by"]),
+        (
+            format!("{}[precision]\nof = \"tau_mean\"\nrelative = 0.1\n", refine(good)),
+            13,
+            &["[precision]: [refine] gives sets the seeds", "keep one of them"],
+        ),
+        (refine(good).replace("V0 = [1e-4]", "seed = { count = 3 }"), 11, &["seed", "is set in [axes], too (line 5)"]),
     ];
     for (text, line, words) in &table {
         assert_refused(&[(text, *line, words)]);

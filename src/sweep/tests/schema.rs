@@ -1,10 +1,10 @@
 //! The JSON Schema of sweep files against what the parser knows: keys, kinds and ranges of values, words.
 
 use super::super::quantity::Quantity;
-use super::super::rounds::MAX_SETS;
+use super::super::rounds::MAX_JOBS;
 use super::super::{SCHEMA, STATISTICS, Sweep};
 use crate::model::{BreakOn, Description, Parameters, Value};
-use crate::observe::{Recording, RecordingKey, Regime};
+use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, TOLERANCES};
 use crate::table::value::Kind;
 use serde_json::{Value as Json, json};
@@ -54,7 +54,7 @@ fn every_table_of_the_schema_has_the_keys_that_the_parser_allows() {
         ("/properties/record", &["[record]\n???"], ""),
         ("/properties/solver", &["[solver]\n???", "[solver]\nmethod = \"fixed-step\"\n???"], ""),
         ("/properties/precision", &["[precision]\n???"], ""),
-        ("/properties/precision/properties/seeds", &["[precision]\nseeds = { ??? }"], ""),
+        ("/definitions/seeds", &["[precision]\nseeds = { ??? }"], ""),
         ("/properties/refine", &["[refine]\n???"], ""),
     ] {
         let mut known: BTreeSet<String> = texts.iter().flat_map(|text| allowed(text)).collect();
@@ -160,10 +160,9 @@ fn the_schema_names_what_rounds_can_be_told_as_the_documentation_does() {
     let estimates: Vec<&str> = STATISTICS.iter().filter(|known| known.has_interval()).map(|known| known.key).collect();
     let between = |quantity: &Quantity| *quantity != Quantity::BREAK_ON && !quantity.is_count();
     let refinable: Vec<&str> = Quantity::all().filter(between).map(Quantity::key).collect();
-    let refine = &schema["properties"]["refine"]["properties"];
+    let crossing: Vec<&str> = STATISTICS.iter().filter(|known| known.can_cross()).map(|known| known.key).collect();
     assert_eq!(schema["definitions"]["estimate"]["enum"], json!(estimates));
     assert_eq!(schema["definitions"]["refinable"]["enum"], json!(refinable));
-    assert_eq!(refine["by"]["enum"], json!(STATISTICS.iter().map(|known| known.key).collect::<Vec<_>>()));
-    assert_eq!(refine["value"]["anyOf"][0]["enum"], json!(Regime::ALL.map(Regime::word)));
-    assert_eq!(refine["sets"]["maximum"], json!(MAX_SETS));
+    assert_eq!(schema["definitions"]["crossing"]["enum"], json!(crossing));
+    assert_eq!(schema["properties"]["refine"]["properties"]["jobs"]["maximum"], json!(MAX_JOBS));
 }

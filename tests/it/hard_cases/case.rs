@@ -5,15 +5,12 @@
 //! balances, bad values are refused by name, or it stops and gives the cause. A run as a job must break about as many
 //! contacts as the audited one; where single runs say nothing, the means over many seeds must agree.
 
-use super::Method;
-use crate::model::{ParameterError, Parameters, Symbol, Value};
-use crate::observe::{Recording, SlipObserver};
-use crate::run::cpu;
-use crate::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
-use crate::table::columns::{columns, tables};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
+use stickslip::model::{ParameterError, Parameters, Symbol, Value};
+use stickslip::observe::{Recording, SlipObserver};
+use stickslip::solver::{Limits, Resolve, SimulationError, Solver, Summary, simulate, simulate_audited};
 
 /// Contact events after which a case is given up.
 const EVENT_BUDGET: u64 = 5_000_000;
@@ -48,30 +45,19 @@ pub struct HardCase {
     failure: Option<(&'static str, &'static str)>,
 }
 
-columns! {
-    /// How a hard case went.
-    #[derive(Clone, Debug, Default, PartialEq)]
-    pub struct Stability {
-        threat: String = "", "what breaks a naive code";
-        case: String = "", "what differs from the defaults";
-        solver: String = "", "method and setting";
-        passed: bool = "", "whether it ended as it must";
-        outcome: String = "", "how it ended";
-        simulated_seconds as "simulated_time": Option<f64> = "s", "model time";
-        slips: u64 = "", "slips";
-        steps: u64 = "", "steps of the solver";
-        leaps: u64 = "", "of these, leaps";
-        grid_steps: u64 = "", "of these, steps of the grid";
-        breaks: u64 = "", "contacts broken";
-        ledger_residual: Option<f64> = "",
-            "residual of the energy ledger, relative to the work of the drive; null without an audit";
-        cpu_seconds as "cpu_time": f64 = "s", "CPU time, with the audit if there is one";
-    }
-}
-
-tables! {
-    Stability = "hard-cases",
-        "One row per hard case that is refused or takes fixed steps, else two: in Taylor steps with an audit, and as a job";
+/// How a hard case went.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    pub case: String,
+    pub solver: Solver,
+    /// Whether it ended as it must.
+    pub passed: bool,
+    /// How it ended.
+    pub how: String,
+    /// Contacts broken.
+    breaks: u64,
+    /// Residual of the energy ledger, relative to the work of the drive; `None` without an audit.
+    pub residual: Option<f64>,
 }
 
 impl HardCase {
@@ -117,7 +103,7 @@ impl HardCase {
     }
 
     /// Runs it within its budgets: with an audit, and, if it is event-driven and not refused, as a job.
-    pub fn run(&self) -> Vec<Stability> {
+    pub fn run(&self) -> Vec<Outcome> {
         let Solver::EventDriven { tolerance, .. } = self.solver else { return vec![self.row(self.solver, None)] };
         let audited = self.row(Solver::EventDriven { tolerance, resolve: Resolve::Taylor }, None);
         if self.failure.is_some_and(|(how, _)| how == REFUSED) {
@@ -128,43 +114,32 @@ impl HardCase {
     }
 
     /// Runs it with this solver: with an audit, or held against the run that had one.
-    fn row(&self, solver: Solver, audited: Option<&Stability>) -> Stability {
-        let (cpu_seconds, ended) = cpu::timed(|| self.simulate(solver, self.parameters(), audited.is_none()));
-        let row = Stability {
-            threat: self.threat.to_owned(),
+    fn row(&self, solver: Solver, audited: Option<&Outcome>) -> Outcome {
+        let outcome = |passed, how: &str, breaks, residual| Outcome {
             case: self.name(),
-            solver: Method::from(solver).to_string(),
-            cpu_seconds,
-            ..Stability::default()
+            solver,
+            passed,
+            how: how.to_owned(),
+            breaks,
+            residual,
         };
-        match ended {
-            Ok((summary, slips, residual)) => {
+        match self.simulate(solver, self.parameters(), audited.is_none()) {
+            Ok((summary, residual)) => {
                 let is_balanced = residual.is_none_or(|residual| residual.abs() <= self.max_residual());
                 let is_alike = audited.is_none_or(|audited| {
                     if self.is_chaotic { self.means_are_alike() } else { are_alike(audited.breaks, summary.breaks) }
                 });
-                let outcome = match (is_balanced, is_alike) {
+                let how = match (is_balanced, is_alike) {
                     (true, true) => "done",
                     (false, _) => "done, but energy does not balance",
                     (_, false) => "done, but with too many or too few breaks",
                 };
-                Stability {
-                    passed: self.failure.is_none() && is_balanced && is_alike,
-                    outcome: outcome.to_owned(),
-                    simulated_seconds: Some(summary.end_time),
-                    ledger_residual: residual,
-                    slips,
-                    steps: summary.steps,
-                    leaps: summary.leaps,
-                    grid_steps: summary.grid_steps,
-                    breaks: summary.breaks,
-                    ..row
-                }
+                outcome(self.failure.is_none() && is_balanced && is_alike, how, summary.breaks, residual)
             }
-            Err(outcome) => {
+            Err(how) => {
                 let is_as_expected =
-                    |(how, words): (&str, &str)| outcome.starts_with(how) && outcome.contains(&words.replace('-', " "));
-                Stability { passed: self.failure.is_some_and(is_as_expected), outcome, ..row }
+                    |(begin, words): (&str, &str)| how.starts_with(begin) && how.contains(&words.replace('-', " "));
+                outcome(self.failure.is_some_and(is_as_expected), &how, 0, None)
             }
         }
     }
@@ -176,7 +151,7 @@ impl HardCase {
             let solver = Solver::EventDriven { tolerance, resolve };
             let runs = (1..=SEEDS).map(|seed| {
                 let parameters = self.parameters().map(|parameters| Parameters { seed, ..parameters });
-                self.simulate(solver, parameters, false).map(|(summary, ..)| summary.breaks as f64)
+                self.simulate(solver, parameters, false).map(|(summary, _)| summary.breaks as f64)
             });
             runs.collect::<Result<Vec<f64>, _>>()
         });
@@ -205,17 +180,17 @@ impl HardCase {
         parameters.validated()
     }
 
-    /// Summary, slips and, with an audit, residual of the ledger; or how it failed, in words.
+    /// Summary and, with an audit, residual of the ledger; or how it failed, in words.
     fn simulate(
         &self,
         solver: Solver,
         parameters: Result<Parameters, ParameterError>,
         has_audit: bool,
-    ) -> Result<(Summary, u64, Option<f64>), String> {
+    ) -> Result<(Summary, Option<f64>), String> {
         let parameters = parameters.map_err(|error| format!("{REFUSED}: {error}"))?;
         let recording = Recording { slips: self.slips, discard: 0, ..Recording::default() };
         let mut observer = SlipObserver::new(&parameters, &recording);
-        let (summary, residual) = interrupted_after(TIME_BUDGET, |interrupt| {
+        interrupted_after(TIME_BUDGET, |interrupt| {
             let limits = Limits { end_time: self.end_time, events: EVENT_BUDGET, interrupt: Some(interrupt) };
             if has_audit {
                 let audited = simulate_audited(&parameters, solver, limits, &mut observer);
@@ -229,8 +204,7 @@ impl HardCase {
                 format!("{REFUSED}: {error}")
             }
             _ => format!("stopped {error}"),
-        })?;
-        Ok((summary, observer.into_rows().0.len() as u64, residual))
+        })
     }
 }
 
@@ -257,10 +231,9 @@ fn interrupted_after<T>(time: Duration, body: impl FnOnce(&AtomicBool) -> T) -> 
     })
 }
 
-const TABLE: &str = include_str!("hard_cases.txt");
+const TABLE: &str = include_str!("table.txt");
 
 /// Every case, group by group.
-#[expect(clippy::missing_panics_doc, reason = "the table is a part of the program")]
 pub fn hard_cases() -> Vec<HardCase> {
     let (mut cases, mut threat) = (Vec::new(), "");
     for line in TABLE.lines().filter(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#')) {

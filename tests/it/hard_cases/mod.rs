@@ -1,6 +1,8 @@
 //! Hard cases: every one ends as it must, and says so.
 
-use stickslip::accuracy::{HardCase, hard_cases};
+mod case;
+
+use case::{HardCase, hard_cases};
 use stickslip::model::{Change, Parameters};
 use stickslip::observe::{ContactLog, Observers, Profile, Recording, SlipObserver};
 use stickslip::solver::{Limits, Resolve, SimulationError, Solver, simulate};
@@ -11,7 +13,7 @@ fn all_pass(threat: &str) {
     let rows: Vec<_> = cases.iter().filter(|case| case.threat.starts_with(threat)).flat_map(HardCase::run).collect();
     assert!(!rows.is_empty(), "no case {threat}");
     for row in rows {
-        assert!(row.passed, "{row:?}");
+        assert!(row.passed, "{} with {:?}: {}, residual {:?}", row.case, row.solver, row.how, row.residual);
     }
 }
 

@@ -1,0 +1,95 @@
+//! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
+
+use super::axis::{Axis, DECADES};
+use super::frame::Layout;
+use super::legend::{Mark, entry};
+use super::panel::{self, Layer, Panel};
+use super::picture::{Dot, Picture, Stroke};
+use super::sets::axis_of;
+use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
+use crate::model::Symbol;
+use crate::reduce::{EdgeRow, FREQUENCY, ascending};
+use crate::sweep::label;
+use crate::table::value::Shortest;
+use std::collections::BTreeSet;
+
+/// A parameter of a row, or the frequency.
+fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
+    match Symbol::from_key(key) {
+        Some(symbol) => edge.parameters.get(symbol).number(),
+        None => edge.parameters.modulation_period.map(|period| 1.0 / period),
+    }
+}
+
+/// `None` if nothing else differs, or more than one quantity.
+pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
+    let refined = edges.first()?.axis.as_str();
+    let is_refined = |key: &str| key == refined || (key == FREQUENCY && ["T", "eta"].contains(&refined));
+    let differs = |key: &str| ascending(edges.iter().filter_map(|edge| value(key, edge))).len() > 1;
+    let parameters = Symbol::ALL.into_iter().filter(|symbol| !matches!(symbol, Symbol::T | Symbol::Seed));
+    let keys = parameters.map(Symbol::key).chain([FREQUENCY]);
+    let [key] = keys.filter(|key| !is_refined(key) && differs(key)).collect::<Vec<_>>()[..] else { return None };
+    let (x_label, x_factor) = axis_of(key, edges.iter().filter_map(|edge| value(key, edge)));
+    let (y_label, y_factor) = axis_of(refined, edges.iter().filter_map(|edge| edge.edge));
+    let place = |edge: &EdgeRow| Some((x_factor * value(key, edge)?, y_factor * edge.edge?));
+    let bar = |edge: &EdgeRow| {
+        let interval = edge.edge_interval?;
+        Some((place(edge)?.0, (y_factor * interval.low, y_factor * interval.high)))
+    };
+    let places = || edges.iter().filter_map(place);
+    let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
+    let x = Axis::of_data(&x_label, places().map(|place| place.0), DECADES, f64::INFINITY)?;
+    let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends), DECADES, f64::INFINITY)?;
+    let statistics: BTreeSet<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
+    let (mut legend, mut layers) = (Vec::new(), Vec::new());
+    for (statistic, ink) in statistics.into_iter().zip(INKS) {
+        let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
+        let threshold = Shortest(of_it().next()?.threshold);
+        let what = match statistic.split_once(" = ") {
+            Some((_, n)) => format!("share of n = {n} is"),
+            None => format!("{} =", label(statistic).symbol),
+        };
+        legend.push(entry(Mark::Bar(dot(ink)), format!("{what} {threshold}, 95 %")));
+        layers.push(Layer::Bars(of_it().filter_map(bar).collect(), Stroke::solid(ink, BAR_WIDTH)));
+        layers.push(Layer::Dots(of_it().filter_map(place).collect(), Dot::solid(ink, 0.7 * RADIUS)));
+    }
+    Some(panel::draw("edges", look, Layout::column(490.0), &legend, vec![Panel::new(300.0, x, y, layers)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Parameters;
+    use crate::model::selected::Selected;
+    use crate::reduce::Interval;
+
+    fn edge(drive_velocity: f64, statistic: &str, edge: Option<f64>) -> EdgeRow {
+        EdgeRow {
+            parameters: Selected::new(Parameters { drive_velocity, ..Parameters::default() }),
+            axis: "Delta".to_owned(),
+            statistic: statistic.to_owned(),
+            threshold: 0.5,
+            edge,
+            edge_interval: edge.map(|edge| Interval { low: 0.9 * edge, high: 1.1 * edge }),
+            ..EdgeRow::default()
+        }
+    }
+
+    #[test]
+    fn edges_are_drawn_against_the_other_quantity_in_a_colour_for_each_statistic() {
+        let [seen, drive] = ["resultant_length", "resultant_drive"];
+        let rows = [
+            edge(1e-5, seen, Some(1e-6)),
+            edge(1e-5, drive, Some(2e-6)),
+            edge(2e-5, seen, Some(2e-6)),
+            edge(2e-5, drive, None),
+        ];
+        let svg = edges(&rows, &Look::default()).unwrap().svg();
+        assert!(svg.contains("Drive velocity") && svg.contains("Amplitude Δ"));
+        assert!(svg.contains(">R = 0.5, 95 %<") && svg.contains(">R, drive = 0.5, 95 %<"));
+        assert!([INKS[0], INKS[1]].iter().all(|ink| svg.matches(ink).count() > 2));
+        assert!(edges(&rows[..2], &Look::default()).is_none(), "nothing to draw it against");
+        assert!(edges(&rows[3..], &Look::default()).is_none(), "no edge");
+        assert!(edges(&[], &Look::default()).is_none());
+    }
+}

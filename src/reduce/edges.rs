@@ -1,0 +1,352 @@
+//! Edges: where a statistic of the population crosses a threshold along an axis, each with its 95 % interval.
+//!
+//! A set is clear if its interval lies on one side of the threshold. Between two clear neighbours of opposite sides, unclear
+//! ones left out, lies an edge; up and down are edges of their own. Of the sets in between, two neighbours count between
+//! which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the response there.
+//! If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval (E. C. Fieller,
+//! J. R. Stat. Soc. B 16, 175 (1954)).
+//!
+//! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one realisation
+//! of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
+//! Places on the axis are rows of the grid and fractions of them.
+
+use super::confidence::student;
+use super::drive_alone::Explained;
+use super::gather::{Gathered, each_chosen};
+use crate::model::Parameters;
+use crate::model::selected::Selected;
+use crate::results::Results;
+use crate::sweep::{AllButSeed, Interval, Refinement, Statistic, Sweep};
+use crate::table::columns::{columns, tables};
+use crate::table::file::DatasetError;
+use crate::table::value::words;
+use std::collections::BTreeMap;
+
+/// Groups of seeds, so that the cost of leaving them out is bounded.
+pub const GROUPS: usize = 30;
+/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width.
+const WINDOW: u64 = 3;
+/// What the interval of a line is widened by, as windows that are steep by chance end first: measured, docs/rounds.md.
+const LOOKS: f64 = 1.2;
+/// How often the window is moved to where its line crosses.
+const MOVES: usize = 3;
+
+words! {
+    /// Why an edge is as precise as it is.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Ended {
+        Width = "width",
+        Seeds = "seeds",
+        Jobs = "jobs",
+        #[default]
+        NoCrossing = "no crossing",
+    }
+}
+
+columns! {
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct EdgeRow {
+        set_id: String = "", "set at bracket_low, of which the parameters are";
+        parameters: Selected<AllButSeed>;
+        axis: String = "", "the refined axis; its values follow in the unit of that parameter";
+        statistic: String = "", "what crosses the threshold, such as `resultant_length`, or `periods = 4`: the share of intervals nearest 4 T";
+        threshold: f64 = "", "the threshold, in the unit of the statistic";
+        edge: Option<f64> = "", "where it is crossed; null if it is not";
+        edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval; null if there is no end on one side";
+        rises: Option<bool> = "", "whether the statistic is above the threshold above the edge";
+        jobs: u64 = "", "jobs of the sets that say where the edge is; of all of the row if it has none";
+        bracket_low: f64 = "", "the nearest value clearly on one side; the least of the row if it has no edge";
+        bracket_high: f64 = "", "the nearest clearly on the other; the largest of the row if it has no edge";
+        ended: Ended = "",
+            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run, or the run is not over; `no crossing` between the values of the row";
+    }
+}
+
+tables! { EdgeRow = "edges", "One row per edge, and per row of sets without one, if the sweep has `[refine]`"; }
+
+/// A statistic less its threshold, and what each group of seeds adds to it.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    pub(crate) excess: f64,
+    /// Of the mean of independent values: the sums of their deviations from it, over their number.
+    influences: [f64; GROUPS],
+    /// Sum of the squared shares of the groups in all jobs.
+    concentration: f64,
+}
+
+impl Sample {
+    /// From the jobs of each group, and the value of all jobs but those of a group; `None` if one of these has none.
+    pub fn new(counts: &[u64; GROUPS], threshold: f64, less: impl Fn(Option<usize>) -> Option<f64>) -> Option<Self> {
+        let (jobs, value) = (counts.iter().sum::<u64>() as f64, less(None)?);
+        let mut sample = Self { excess: value - threshold, influences: [0.0; GROUPS], concentration: 0.0 };
+        for (group, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let share = count as f64 / jobs;
+            sample.influences[group] = (1.0 - share) * (value - less(Some(group))?);
+            sample.concentration += share * share;
+        }
+        Some(sample)
+    }
+
+    /// Below the threshold, above it, or equal if that is not clear.
+    pub(crate) fn side(&self) -> f64 {
+        let half = (quantile(self.concentration) * product(&self.influences, &self.influences)).sqrt();
+        if self.excess.abs() > half { self.excess.signum() } else { 0.0 }
+    }
+}
+
+/// The square of Student's t with the degrees of freedom of these groups, over what makes a variance a sum of squares.
+fn quantile(concentration: f64) -> f64 {
+    let t = student(1.0 / concentration - 1.0);
+    t * t / (1.0 - concentration)
+}
+
+fn product(left: &[f64; GROUPS], right: &[f64; GROUPS]) -> f64 {
+    left.iter().zip(right).map(|(left, right)| left * right).sum()
+}
+
+/// What the rounds know of a set.
+#[derive(Clone, Debug, Default)]
+pub struct SetOfEdges {
+    pub set_id: String,
+    pub parameters: Parameters,
+    /// Seeds that it was given.
+    pub seeds: u64,
+    /// For each statistic; `None` if it has no value.
+    pub samples: Vec<Option<Sample>>,
+}
+
+/// A set on the refined axis, and on which side of the threshold it lies.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    pub row: u64,
+    side: f64,
+    sample: &'a Sample,
+    pub set: &'a SetOfEdges,
+}
+
+/// Sets that differ in the refined axis alone, and the edges of one statistic.
+#[derive(Clone, Debug)]
+pub struct Line<'a> {
+    /// Rows of all axes, that of the refined one being 0.
+    pub rows: Vec<u64>,
+    statistic: Statistic,
+    sets: Vec<(u64, &'a SetOfEdges)>,
+    pub edges: Vec<Edge<'a>>,
+}
+
+#[derive(Clone, Debug)]
+pub struct Edge<'a> {
+    /// The sets that say where it is: two neighbours that are clear, or those of the window.
+    pub sets: Vec<Placed<'a>>,
+    bracket: [Placed<'a>; 2],
+    /// Where it is, and the ends of its interval, which may have none.
+    pub(crate) place: f64,
+    pub(crate) interval: Option<[f64; 2]>,
+    /// Width of the interval over that wanted.
+    pub error: f64,
+    /// The row between two neighbours that is wanted next, if these are too far from each other.
+    pub wanted_row: Option<u64>,
+    is_bracketed: bool,
+}
+
+impl<'a> Edge<'a> {
+    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted.
+    fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64) -> Option<Self> {
+        let bracket = [all[first], all[last]];
+        let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
+        let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
+        let crossings = all[first..=last].windows(2).filter(|pair| excess(&pair[0]) <= 0.0 && excess(&pair[1]) > 0.0);
+        let pair = crossings.max_by(|left, right| rise(left).total_cmp(&rise(right)))?;
+        let ends = [pair[0].row, pair[1].row].map(|row| row as f64);
+        if pair.iter().all(|set| set.side != 0.0) {
+            let gap = pair[1].row - pair[0].row;
+            let wanted_row = (gap > 1).then(|| pair[0].row + gap / 2);
+            let place = ends[0] - gap as f64 * excess(&pair[0]) / rise(&pair);
+            let (interval, error) = (Some(ends), gap as f64 / width);
+            return Some(Self { sets: pair.to_vec(), bracket, place, interval, error, wanted_row, is_bracketed: true });
+        }
+        let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= WINDOW as f64;
+        let mut place = fit(pair, ends[0])?.crossing;
+        for _ in 0..MOVES {
+            let window: Vec<Placed<'_>> = all.iter().filter(|set| near(set, place)).copied().collect();
+            let Some(line) = fit(&window, place).filter(|line| line.slope * bracket[1].side > 0.0) else { break };
+            place = line.crossing.clamp(bracket[0].row as f64, bracket[1].row as f64);
+        }
+        let above = all.partition_point(|set| set.row as f64 <= place).clamp(1, all.len() - 1);
+        let (low, high) = (all[above - 1].row, all[above].row);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two rows")]
+        let nearest = place.round() as u64;
+        let wanted_row = (high - low > WINDOW).then(|| nearest.clamp(low + WINDOW - 1, high - (WINDOW - 1)));
+        let sets: Vec<Placed<'_>> =
+            all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
+        let Fit { crossing, interval, .. } = fit(&sets, place)?;
+        let (place, error) = interval.map_or((place, f64::INFINITY), |[low, high]| (crossing, (high - low) / width));
+        Some(Self { sets, bracket, place, interval, error, wanted_row, is_bracketed: false })
+    }
+
+    /// Fewest and most seeds of its sets.
+    pub fn seeds(&self) -> [u64; 2] {
+        let seeds = self.sets.iter().map(|set| set.set.seeds);
+        seeds.fold([u64::MAX, 0], |[fewest, most], seeds| [fewest.min(seeds), most.max(seeds)])
+    }
+
+    /// Whether its interval is as narrow as is wanted.
+    pub fn is_done(&self) -> bool {
+        let [fewest, most] = self.seeds();
+        self.wanted_row.is_none() && (self.is_bracketed || (self.error <= 1.0 && fewest == most))
+    }
+}
+
+/// A line through the samples of sets.
+struct Fit {
+    slope: f64,
+    /// Where it crosses zero, and the ends of the interval of that: none if the slope may be zero.
+    crossing: f64,
+    interval: Option<[f64; 2]>,
+}
+
+/// By least squares, sets weighted by their seeds; `None` for less than two rows.
+fn fit(sets: &[Placed<'_>], origin: f64) -> Option<Fit> {
+    let points = || sets.iter().map(|set| (set.row as f64 - origin, set.set.seeds as f64, set.sample));
+    let total: f64 = points().map(|(_, weight, _)| weight).sum();
+    let mean = points().map(|(x, weight, _)| weight * x).sum::<f64>() / total;
+    let moment: f64 = points().map(|(x, weight, _)| weight * (x - mean) * (x - mean)).sum();
+    let (mut begin, mut slope) = ((0.0, [0.0; GROUPS]), (0.0, [0.0; GROUPS]));
+    let mut concentration: f64 = 0.0;
+    for (x, weight, sample) in points() {
+        let of_slope = weight * (x - mean) / moment;
+        for (sum, factor) in [(&mut begin, weight / total - mean * of_slope), (&mut slope, of_slope)] {
+            sum.0 += factor * sample.excess;
+            sum.1.iter_mut().zip(sample.influences).for_each(|(sum, influence)| *sum += factor * influence);
+        }
+        concentration = concentration.max(sample.concentration);
+    }
+    let factor = LOOKS * LOOKS * quantile(concentration);
+    // All x at which the line is no more than so many standard deviations away: a + 2 b x + c x² <= 0.
+    let a = begin.0 * begin.0 - factor * product(&begin.1, &begin.1);
+    let b = begin.0 * slope.0 - factor * product(&begin.1, &slope.1);
+    let c = slope.0 * slope.0 - factor * product(&slope.1, &slope.1);
+    let root = (b * b - a * c).max(0.0).sqrt();
+    let interval = (c > 0.0).then(|| [origin - (b + root) / c, origin + (root - b) / c]);
+    (moment > 0.0).then(|| Fit { slope: slope.0, crossing: origin - begin.0 / slope.0, interval })
+}
+
+/// The rows of sets, in the order of the grid, for each statistic.
+pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64, SetOfEdges>) -> Vec<Line<'a>> {
+    let mut rows_of: BTreeMap<Vec<u64>, Vec<(u64, &SetOfEdges)>> = BTreeMap::new();
+    for (&number, set) in sets {
+        let mut rows = sweep.rows(number);
+        let row = std::mem::take(&mut rows[refinement.axis]);
+        rows_of.entry(rows).or_default().push((row, set));
+    }
+    let to = if refinement.is_log { libm::log1p(refinement.to) } else { refinement.to };
+    let width = scale(sweep, refinement).map_or(f64::NAN, |(_, step)| to / step);
+    let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
+        // Without a value, a set says nothing.
+        let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
+            let sample = set.samples.get(statistic)?.as_ref()?;
+            Some(Placed { row, side: sample.side(), sample, set })
+        };
+        let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
+        let clear: Vec<usize> = (0..known.len()).filter(|&index| known[index].side != 0.0).collect();
+        let opposite = clear.windows(2).filter(|pair| known[pair[0]].side != known[pair[1]].side);
+        let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width)).collect();
+        Line { rows: rows.clone(), statistic: refinement.by[statistic], sets: sets.clone(), edges }
+    };
+    let statistics = 0..refinement.by.len();
+    rows_of.iter().flat_map(|(rows, sets)| statistics.clone().map(move |number| line(rows, sets, number))).collect()
+}
+
+/// The value at the first row of the refined axis, and the step of rows; of their logarithms on a logarithmic axis.
+fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
+    let last = sweep.row_counts()[refinement.axis] - 1;
+    let [first, end] = [0, last].map(|row| {
+        let (_, value) = sweep.value_at(refinement.axis, row)?;
+        Some(if refinement.is_log { libm::log(value) } else { value })
+    });
+    Some((first?, (end? - first?) / last as f64))
+}
+
+/// The table of edges of a directory.
+pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, DatasetError> {
+    let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
+    let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
+    let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
+    let mut found = Vec::new();
+    for Line { statistic: Statistic { key, .. }, sets, edges, .. } in lines(sweep, refinement, &sets) {
+        let row = |bracket: [(u64, &SetOfEdges); 2], used: Vec<&SetOfEdges>, edge: Option<&Edge<'_>>| {
+            let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
+            let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
+            let SetOfEdges { set_id, parameters, .. } = bracket[0].1.clone();
+            let interval = edge.and_then(|edge| edge.interval);
+            Some(EdgeRow {
+                set_id,
+                parameters: Selected::new(parameters),
+                axis: axis.to_owned(),
+                statistic: refinement.periods.map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
+                threshold: refinement.threshold,
+                edge: edge.map(|edge| value(edge.place)),
+                edge_interval: interval.map(|[low, high]| Interval { low: value(low), high: value(high) }),
+                rises: edge.map(|edge| edge.bracket[1].side > 0.0),
+                jobs: used.into_iter().map(|set| set.seeds).sum(),
+                bracket_low,
+                bracket_high,
+                ended: match edge {
+                    None => Ended::NoCrossing,
+                    Some(edge) if edge.is_done() => Ended::Width,
+                    Some(edge) if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() => Ended::Seeds,
+                    Some(_) => Ended::Jobs,
+                },
+            })
+        };
+        for edge in &edges {
+            let used = edge.sets.iter().map(|set| set.set).collect();
+            found.extend(row(edge.bracket.map(|set| (set.row, set.set)), used, Some(edge)));
+        }
+        if let (true, Some(&first), Some(&last)) = (edges.is_empty(), sets.first(), sets.last()) {
+            found.extend(row([first, last], sets.iter().map(|(_, set)| *set).collect(), None));
+        }
+    }
+    Ok(found)
+}
+
+/// The sets that the rounds of a directory have chosen, by their numbers.
+pub fn sets_of_edges(
+    results: &Results<'_>,
+    refinement: &Refinement,
+) -> Result<BTreeMap<u64, SetOfEdges>, DatasetError> {
+    let mut sets = BTreeMap::new();
+    each_chosen(results, |number, set, explained| drop(sets.insert(number, of_set(&set, explained, refinement))))?;
+    Ok(sets)
+}
+
+fn of_set(set: &Gathered, explained: &Explained, refinement: &Refinement) -> SetOfEdges {
+    let group = |seed: u64| usize::try_from(seed % GROUPS as u64).unwrap_or_default();
+    let mut counts = [0; GROUPS];
+    set.jobs.averages.keys().for_each(|&seed| counts[group(seed)] += 1);
+    let without = |left_out: Option<usize>| {
+        let part = set.only(|seed| Some(group(seed)) != left_out);
+        if let Some(periods) = refinement.periods {
+            return vec![part.slips.share_of_periods(periods as f64)];
+        }
+        let row = part.finish_with(explained).0.row;
+        refinement.by.iter().map(|by| row.number(by.key)).collect()
+    };
+    let all = without(None);
+    let each: Vec<Vec<Option<f64>>> = counts
+        .iter()
+        .enumerate()
+        .map(|(group, count)| if *count > 0 { without(Some(group)) } else { Vec::new() })
+        .collect();
+    let sample = |statistic: usize| {
+        Sample::new(&counts, refinement.threshold, |group| {
+            group.map_or(&all, |group| &each[group]).get(statistic).copied()?
+        })
+    };
+    SetOfEdges {
+        set_id: set.jobs.set_id.clone(),
+        parameters: set.jobs.parameters.clone(),
+        seeds: set.jobs.finished + set.jobs.failed,
+        samples: (0..refinement.by.len()).map(sample).collect(),
+    }
+}

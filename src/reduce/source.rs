@@ -1,0 +1,48 @@
+//! What reduced data follow from, so that those of other tables are known as such: by content, as a copied folder has other
+//! times.
+
+use super::{BackboneBin, HistogramBin, Point, SetRow, reduce};
+use crate::results::Results;
+use crate::results::tables::JOBS;
+use crate::table::columns::Table;
+use crate::table::file::footer;
+use crate::table::storage::StorageError;
+use anyhow::{Context, Result};
+use sha2::{Digest, Sha256};
+
+/// The footer's key of the source.
+pub(super) const SOURCE: &str = "reduced_from";
+
+/// A checksum of the sweep that was asked for last, and of names and sizes of the committed files of jobs.
+pub(super) fn source(results: &Results<'_>) -> Result<String, StorageError> {
+    let (storage, folder) = (results.layout().storage, results.layout().table(JOBS));
+    let mut digest = Sha256::new_with_prefix(results.sweep().text());
+    for name in storage.list(&folder)? {
+        digest.update(name.as_encoded_bytes());
+        digest.update(storage.length(&folder.join(&name))?.to_le_bytes());
+    }
+    Ok(digest.finalize().iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")))
+}
+
+/// Reduces the tables unless the reduced data are of the tables as they are, or there are no tables any more.
+pub fn renew(results: &Results<'_>) -> Result<()> {
+    let layout = results.layout();
+    let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
+    if is_there && !layout.storage.exists(&layout.table(JOBS))? {
+        return Ok(());
+    }
+    let source = source(results)?;
+    let is_of_it = |table: &&str| {
+        let footer = footer(layout.storage, &layout.reduced_file(table)).ok();
+        footer.is_some_and(|footer| footer.get(SOURCE) == Some(&source))
+    };
+    if [SetRow::NAME, HistogramBin::NAME, BackboneBin::NAME, Point::NAME].iter().all(is_of_it) {
+        return Ok(());
+    }
+    let reduced = reduce(results).map(drop);
+    if is_there {
+        reduced.context("the reduced data are not of the tables as they are, and must be made again")
+    } else {
+        reduced
+    }
+}

@@ -1,0 +1,158 @@
+//! A sweep file with other values, as text. What is not changed stands as it was, with its comments.
+
+use super::quantity::Quantity;
+use super::source::nearest;
+use crate::observe::RecordingKey;
+use crate::simulate::Written;
+use toml_edit::{DocumentMut, Item, Value};
+
+/// A key of a sweep file with its new value as TOML, and the section that it belongs to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Change {
+    pub section: &'static str,
+    pub key: String,
+    pub value: String,
+}
+
+const AXES: &str = "axes";
+const SECTIONS: [&str; 4] = ["model", AXES, "record", "solver"];
+const SOLVER: [&str; 4] = ["method", "tolerance", "resolve", "dt"];
+
+impl Change {
+    /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
+    pub fn setting(key: &str, value: &str) -> Self {
+        let recording = RecordingKey::ALL.map(RecordingKey::key);
+        let known: Vec<&str> = Quantity::all().map(Quantity::key).chain(recording).chain(SOLVER).collect();
+        let section = match nearest(key, &known) {
+            Some(known) if recording.contains(&known) => "record",
+            Some(known) if SOLVER.contains(&known) => "solver",
+            _ => "model",
+        };
+        Self { section, key: key.to_owned(), value: scalar(value) }
+    }
+
+    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them;
+    /// `None` for what is no TOML.
+    pub fn axis(key: &str, values: &str) -> Option<Self> {
+        let value = match values.split(':').map(str::trim).collect::<Vec<_>>()[..] {
+            _ if values.starts_with(['[', '{']) => values.to_owned(),
+            [form @ ("log" | "linear"), low, high, points] => {
+                let [low, high, points] = [low, high, points].map(scalar);
+                format!("{{ {form} = [{low}, {high}], points = {points} }}")
+            }
+            ["count", count] => format!("{{ count = {} }}", scalar(count)),
+            _ => format!("[{}]", values.split(',').map(str::trim).map(scalar).collect::<Vec<_>>().join(", ")),
+        };
+        value.parse::<Value>().ok()?;
+        Some(Self { section: AXES, key: key.to_owned(), value })
+    }
+}
+
+/// One value as TOML: a number, true or false; anything else is a word.
+fn scalar(text: &str) -> String {
+    match (text.parse::<i128>(), text.parse::<f64>()) {
+        (Ok(whole), _) => whole.to_string(),
+        (_, Ok(real)) if real.is_nan() => "nan".to_owned(),
+        (_, Ok(real)) => format!("{real:?}"),
+        _ if matches!(text, "true" | "false") => text.to_owned(),
+        _ => format!("{text:?}"),
+    }
+}
+
+/// The changes of a section, as keys and values.
+pub fn written(changes: &[Change], section: &str) -> Written {
+    let own = changes.iter().filter(|change| change.section == section);
+    own.map(|change| (change.key.clone(), change.value.clone())).collect()
+}
+
+/// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter, or the
+/// other way round; what fixes the period takes the place of what else does. A text that is no TOML stays as it is.
+pub fn varied(text: &str, changes: &[Change]) -> String {
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
+    let is_period = |key: &str| Quantity::from_key(key).is_some_and(Quantity::is_period);
+    for section in SECTIONS {
+        let Some(table) = document.get_mut(section).and_then(Item::as_table_like_mut) else { continue };
+        let stays = |key: &str| changes.iter().any(|change| change.section == section && change.key == key);
+        let goes =
+            |key: &str| changes.iter().any(|change| change.key == key || is_period(&change.key) && is_period(key));
+        let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
+        for key in keys.iter().filter(|key| goes(key) && !stays(key)) {
+            table.remove(key);
+        }
+    }
+    for Change { section, key, value } in changes {
+        let table = document.entry(section).or_insert_with(toml_edit::table);
+        let Ok(mut value) = value.parse::<Value>() else { continue };
+        // The old comment may be about the old value.
+        if table.is_table() {
+            value.decor_mut().set_suffix(if *section == AXES { "  # --axis" } else { "  # --set" });
+        }
+        let Some(table) = table.as_table_like_mut() else { continue };
+        if let Some(place) = table.get_mut(key) {
+            *place = Item::Value(value);
+        } else {
+            table.insert(key, Item::Value(value));
+        }
+    }
+    document.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::Sweep;
+    use std::path::Path;
+
+    const TEXT: &str = "# About it.\nname = \"mine\"\n\n[model]\n# Stiff.\nKd = 1e8  # N/m\nNs = 4\n\n[axes]\n\
+                        # Slow and fast.\nV0    = [1e-5, 1e-4]  # two\nDelta = [1e-6]\nT     = [0.02]\n\
+                        [record] # short\nslips = 3\n";
+
+    fn axis(key: &str, values: &str) -> Change {
+        Change::axis(key, values).unwrap()
+    }
+
+    #[test]
+    fn what_is_not_changed_stands_as_it_was() {
+        assert_eq!(varied(TEXT, &[]), TEXT);
+        let changes = [
+            Change::setting("V0", "2e-4"),
+            axis("Kd", "1e7, 1e8"),
+            axis("frequency", "log:20:80:5"),
+            Change::setting("slips", "7"),
+        ];
+        let text = varied(TEXT, &changes);
+        assert_eq!(
+            text,
+            "# About it.\nname = \"mine\"\n\n[model]\nNs = 4\nV0 = 0.0002  # --set\n\n[axes]\nDelta = [1e-6]\n\
+             Kd = [10000000.0, 100000000.0]  # --axis\nfrequency = { log = [20, 80], points = 5 }  # --axis\n\
+             [record] # short\nslips = 7  # --set\n"
+        );
+        assert_eq!(varied(&text, &changes), text);
+        assert_eq!(Sweep::parse(&text, Path::new("mine.toml")).unwrap().jobs().count(), 2 * 5);
+    }
+
+    #[test]
+    fn a_value_in_its_place_keeps_the_comment_above_it_and_no_other() {
+        let text =
+            varied(TEXT, &[Change::setting("Kd", "2e7"), axis("V0", "linear:1e-5:2e-5:3"), axis("seed", "count:4")]);
+        assert!(text.contains("# Stiff.\nKd = 20000000.0  # --set\nNs"), "{text}");
+        assert!(
+            text.contains("# Slow and fast.\nV0    = { linear = [1e-5, 2e-5], points = 3 }  # --axis\nDelta"),
+            "{text}"
+        );
+        assert_eq!(Sweep::parse(&text, Path::new("mine.toml")).unwrap().jobs().count(), 3 * 4);
+    }
+
+    #[test]
+    fn every_form_of_an_axis_and_a_file_without_sections_are_read() {
+        let text = "name = \"mine\"\nmodel = { Ns = 4, V0 = 1e-5 }\n";
+        for (values, count) in [("1e-5", 1), ("[1e-5, 1e-4]", 2), ("{ log = [1e-5, 1e-3], points = 3 }", 3)] {
+            let text =
+                varied(text, &[axis("V0", values), Change::setting("Ns", "9"), Change::setting("tolerance", "1e-5")]);
+            let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
+            assert_eq!((sweep.jobs().count(), sweep.jobs().next().unwrap().parameters.contacts_per_block), (count, 9));
+        }
+        assert_eq!(Change::axis("V0", "[1e-5"), None);
+        assert_eq!(Change::setting("break_on", "tension").value, "\"tension\"");
+    }
+}
