@@ -47,10 +47,12 @@ fn a_run_ends_with_tables_reduced_data_and_figures_and_a_second_one_changes_noth
     assert_eq!(folder.contents("").len(), 1, "a plan writes nothing");
 
     let first = folder.ends(0, "run tiny.toml");
-    let expected = ["jobs run", "parts committed", "CPU time", "wall time", "jobs", "parameter sets", "slips"];
-    assert_eq!(labels(&first.stdout)[..7], expected);
-    let after = &labels(&first.stdout)[7..];
-    assert!(after.iter().all(|label| ["reduced data", "figure"].contains(label)), "{}", first.stdout);
+    let (lines, rest) = first.stdout.split_once("\n\n").unwrap();
+    let expected = ["jobs run", "parts committed", "CPU time", "wall time", "jobs reduced", "parameter sets", "slips"];
+    assert_eq!(labels(lines), [&expected[..], &["reduced data"]].concat());
+    let (result, figures) = rest.split_once("\n\n").unwrap();
+    assert_eq!(result, folder.ends(0, "show results/tiny").stdout.trim_end());
+    assert!(labels(figures).iter().all(|label| *label == "figure"), "{}", first.stdout);
     assert!(first.stdout.contains("jobs run         12, 0 failed\n"), "{}", first.stdout);
     assert!(!first.stderr.contains('\u{1b}'), "no terminal, no colours: {:?}", first.stderr);
 
@@ -319,7 +321,7 @@ fn a_pipe_gets_the_report_and_nothing_else() {
     ] {
         let format = match command.split(' ').next() {
             Some("verify") => 4,
-            Some("status") => 2,
+            Some("status" | "reduce") => 2,
             _ => 1,
         };
         assert_eq!(json(&folder.ends(0, command).stdout)["format"].as_u64(), Some(format), "{command}");
