@@ -11,7 +11,7 @@ use std::time::Duration;
 const MAP: &str = "name = \"map\"\n[model]\nN = 20\nNs = 5\n[axes]\nfrequency = { linear = [10, 60], points = 3 }\n\
                    Delta = { log = [1e-7, 4e-6], points = 3 }\n[record]\nslips = 10\n\
                    [precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 4, to = 30 }\n\
-                   [refine]\naxes = [\"frequency\", \"Delta\"]\nby = \"has_phase\"\nto = { frequency = 7, Delta = 1 }\nsets = 60\n";
+                   [refine]\naxes = [\"frequency\", \"Delta\"]\nby = \"resultant_length\"\nthreshold = 0.5\nto = { frequency = 7, Delta = 1 }\nsets = 60\n";
 
 /// The files that say which rounds a directory has had.
 fn extensions(folder: &Folder, out: &str) -> Vec<Vec<u8>> {
