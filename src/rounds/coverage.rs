@@ -211,8 +211,8 @@ fn cells(pools: &[Pool; 2], set: usize, statistic: Statistic) -> Vec<f64> {
     SIZES.into_iter().map(fixed).chain(BY_RULE.into_iter().map(by_rule)).collect()
 }
 
-/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each other, with two
-/// seeds in common.
+/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each
+/// other, with two seeds in common.
 fn of_backbone(pool: &Pool) -> [f64; 2] {
     let sets = |seeds: Range<usize>| -> Vec<_> {
         pool.jobs.iter().map(|(set, jobs)| (set.clone(), jobs[seeds.clone()].iter().collect())).collect()
