@@ -17,7 +17,7 @@ const OTHER: Dot = Dot { ink: LIGHT_GREY, radius: RADIUS, opacity: 0.6 };
 const LINES: u32 = 12;
 
 /// Draws intervals in periods against the period, all of them, and under them those of few periods with the lines
-/// τ = nT; `None` without any interval under modulation. Slips of sets that have a phase have the colour of their drive velocity.
+/// τ = nT; `None` without any interval under modulation. Slips of sets with a phase have the colour of their V0.
 pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let place = |point: &Point| {
         let (period, interval) = (point.period?, point.interval?);

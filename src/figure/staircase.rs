@@ -1,5 +1,5 @@
-//! The staircase: the interval in periods over the period of the modulation, on whole numbers where slips keep to it, and the
-//! locking index under it, with its part by the drive alone.
+//! The staircase: the interval in periods over the period of the modulation, on whole numbers where slips keep to it,
+//! and the locking index under it, with its part by the drive alone.
 
 use super::axis::Axis;
 use super::frame::Layout;

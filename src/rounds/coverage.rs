@@ -189,8 +189,8 @@ fn cells(pools: &[Pool; 2], truths: &[SetRow; 2], set: usize, statistic: Statist
     SIZES.into_iter().map(fixed).chain(BY_RULE.into_iter().map(by_rule)).collect()
 }
 
-/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each other, with two
-/// seeds in common.
+/// The coverage of the mean phase of all slips of a bin, and of the mean over its sets that have one: sets close to each
+/// other, with two seeds in common.
 fn of_backbone(pool: &Pool) -> [f64; 2] {
     let seeds = pool.sets[0].1.len();
     let truth = pool.bin(0..seeds);
