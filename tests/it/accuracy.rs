@@ -60,7 +60,7 @@ fn a_sweep_gets_its_verdict_in_the_first_lines_and_the_result_beside_its_own() {
     assert!(lines[0].starts_with("Your sweep (grid, tolerance 2e-5): "), "{}", lines[0]);
     assert!(found.iter().any(|text| lines[0].contains(text)), "{}", lines[0]);
     assert!(lines[1].contains("breaks are off by") && lines[2].contains("Statistical error"), "{}", ended.stdout);
-    assert!(lines.len() < 25 && ended.stdout.contains("\n-> grid, tolerance 2e-5 "), "{}", ended.stdout);
+    assert!(lines.len() < 30 && ended.stdout.contains("\n-> grid, tolerance 2e-5 "), "{}", ended.stdout);
     assert!(ended.stderr.contains("the seeds of the sweep are not used"), "{}", ended.stderr);
     let report = std::fs::read_to_string(folder.path("results/mine-accuracy/accuracy.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
