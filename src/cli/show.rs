@@ -142,7 +142,7 @@ fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
 /// The parameters in which sets differ, and what was found of them.
 fn usual_columns(rows: &[SetRow]) -> Vec<String> {
     let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() }.to_owned();
-    let mut columns: Vec<String> = differing(rows.iter()).into_iter().map(key).collect();
+    let mut columns: Vec<String> = differing(&rows.iter()).into_iter().map(key).collect();
     if columns.iter().any(|column| column == FREQUENCY) {
         columns.push("eta".to_owned());
     }
@@ -228,7 +228,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     let rows: Vec<SetRow> =
         edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let others = differing(rows.iter()).into_iter().filter(|symbol| *symbol != axis);
+    let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
     let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
     let mut columns: Vec<(bool, Vec<String>)> =
         others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();

@@ -683,11 +683,15 @@ pub(super) mod tests {
         }
         assert!(svg.contains("Δfₛ (N)<") && !svg.contains("Share of time") && !svg.contains("by the drive alone"));
         let mut larger = sets.clone();
-        larger.iter_mut().for_each(|set| set.parameters.parameters.blocks = 9);
+        for set in &mut larger {
+            set.parameters.parameters.blocks = 9;
+        }
         sets.extend(larger);
         let svg = overview_of(&sets);
         assert!(svg.contains(">N = 9<") && svg.contains(">N = 70<") && svg.contains(">Δ = 1 µm<"));
-        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.6));
+        for set in &mut sets {
+            set.resultant_drive = Some(0.6);
+        }
         let with = overview_of(&sets);
         assert!(with.contains(">by the drive alone<"));
         // A mark of few dashes, and curves of many.
