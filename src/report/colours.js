@@ -55,7 +55,7 @@ function colouring(report, name) {
     values.forEach((value, set) => (group[set] = value === null ? distinct.length : distinct.indexOf(value)));
     const shades = distinct.map((value, k) => [
       gradient(k / Math.max(1, distinct.length - 1)),
-      `${name} = ${number(value)} ${column.unit}`,
+      `${column.short} = ${number(column.factor * value)}`,
     ]);
     return { group, groups: [...shades, none] };
   }
@@ -66,7 +66,7 @@ function colouring(report, name) {
   );
   const legend = (k) =>
     k % 6 === 0 || k === steps - 1
-      ? `${k ? "" : `${name}: `}${number(axis.value(k === steps - 1 ? 1 : k / steps), 3)} ${column.unit}`
+      ? `${k ? "" : `${column.short}: `}${number(column.factor * axis.value(k === steps - 1 ? 1 : k / steps), 3)}`
       : "";
   return { group, groups: [...Array.from({ length: steps }, (_, k) => [gradient(k / (steps - 1)), legend(k)]), none] };
 }

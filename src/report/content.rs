@@ -7,6 +7,7 @@ use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::model::{Description, MODEL_VERSION, RNG_SCHEME, Symbol};
 use crate::reduce::advise;
 use crate::results::Results;
+use crate::results::layout::Layout;
 use crate::run::{RunEvent, status_with};
 use crate::sweep::PLAN_VERSION;
 use crate::table::file::PROGRAM;
@@ -22,6 +23,9 @@ const MAX_FAILURES: usize = 200;
 const MAX_PARTS: usize = 4_000;
 /// Runs that are listed: the last ones.
 const MAX_RUNS: usize = 50;
+/// Names of figures that are shown, in order.
+const STANDING: [&str; 8] =
+    ["overview", "locking-map", "staircase", "regime-map", "edges", "phi-eta", "tau-T", "tau-histograms"];
 /// η of the curves of the back-bone: from 1, in steps of 1/30 of a decade, over five decades.
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
@@ -59,12 +63,27 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "sets_every": sets_every,
         "sets": sets,
         "slips": slips,
+        "figures": figures(layout)?,
         "backbone": backbone(layout).map_err(&damaged)?,
         "curves": curves(),
         "cost": cost,
         "runs": runs,
     });
     Ok((content, slips.bytes()))
+}
+
+/// The standing figures as SVG, by name: those that are small.
+fn figures(layout: &Layout<'_>) -> Result<Vec<(String, String)>, StorageError> {
+    const LARGEST: usize = 500_000;
+    let mut figures = Vec::new();
+    for name in STANDING {
+        let file = layout.figures().join(format!("{name}.svg"));
+        if layout.storage.exists(&file)? {
+            let text = String::from_utf8(layout.storage.read(&file)?).unwrap_or_default();
+            figures.extend(Some((name.to_owned(), text)).filter(|(_, text)| (1..LARGEST).contains(&text.len())));
+        }
+    }
+    Ok(figures)
 }
 
 /// η, φ_min and its asymptote.

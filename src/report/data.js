@@ -35,7 +35,18 @@ function duration(seconds) {
   return `${number(seconds / 86400, 3)} days`;
 }
 
-const titled = (column) => (column.unit ? `${column.name} (${column.unit})` : column.name);
+const titled = (column) => column.label ?? (column.unit ? `${column.name} (${column.unit})` : column.name);
+
+/** The values of a column in the unit of its label. */
+const scaled = ({ values, factor }) =>
+  (factor ?? 1) === 1 ? values : Array.from(values, (value) => (value === null ? null : factor * value));
+
+/** Saves a file of this page. */
+function save(name, blob) {
+  const link = make("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
 const isNumeric = (column) => column.kind === "real" || column.kind === "count";
 
 /** The columns of a table by name, each with its values. */

@@ -14,7 +14,7 @@ class Explorer {
       this.phase = new Chart(element("phi-eta"), "φ against η");
       this.ratio = new Chart(element("tau-T"), "τ / T");
     }
-    this.free = new Chart(element("free"), "Any against any");
+    this.free = new Chart(element("free"), "Sets");
     this.setView = new SetView(report, this);
     this.defaults();
     this.fillTools();
@@ -23,13 +23,10 @@ class Explorer {
   /** What the free chart and the colours show at first. */
   defaults() {
     const { report } = this;
-    const regimes = new Set(report.values("regime"));
-    // In the order of the sweep file.
-    const keys = report.axes
-      .flatMap(([keys]) => keys.split(", "))
-      .filter((key) => report.swept.some((swept) => swept.key === key));
-    const [first, second] = keys.filter((key) => isNumeric(report.columns.get(key)));
-    const colour = report.isModulated ? "has_phase" : regimes.size > 1 ? "regime" : (second ?? "");
+    // As in the figure: the most values make the axis, the next the colours.
+    const numeric = report.sets.swept.filter(([key]) => isNumeric(report.columns.get(key)));
+    const [first] = numeric.map(([key]) => key);
+    const colour = report.sets.swept.map(([key]) => key).find((key) => key !== first) ?? "";
     this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? "tau_mean" : "mean_friction" };
   }
 
@@ -108,12 +105,26 @@ class Explorer {
     ]);
     const focused = document.activeElement?.closest?.("#free label")?.firstChild?.textContent;
     this.free.controls.className = "tools controls";
-    this.free.controls.replaceChildren(of, choice("y", "y", columns), choice("x", "x", columns), log("x"), log("y"));
+    this.free.controls.replaceChildren(of, choice("y", "y", columns), choice("x", "x", columns), log("x"), log("y"), this.saves());
     if (focused)
       [...this.free.controls.children]
         .find((label) => label.firstChild.textContent === focused)
         ?.querySelector("select")
         ?.focus();
+  }
+
+  /** Saves the chart as it is seen. */
+  saves() {
+    const picture = () => {
+      const { base } = this.free;
+      const copy = Object.assign(document.createElement("canvas"), { width: base.width, height: base.height });
+      const ctx = copy.getContext("2d");
+      ctx.fillStyle = getComputedStyle(document.body).backgroundColor;
+      ctx.fillRect(0, 0, copy.width, copy.height);
+      ctx.drawImage(base, 0, 0);
+      copy.toBlob((blob) => save(`${this.report.status.name}.png`, blob));
+    };
+    return make("button", { type: "button", onclick: picture }, "Save as PNG");
   }
 
   /** The column of an axis of the free chart. */
@@ -127,6 +138,8 @@ class Explorer {
   isLog(key) {
     const choice = state[`log${key}`];
     if (choice) return choice === "yes";
+    const swept = this.report.sets.swept.find(([name]) => name === this.axisName(key));
+    if (swept) return swept[1];
     const { values } = this.table().get(this.axisName(key));
     let [low, high] = [Infinity, 0];
     for (const value of values) {
@@ -287,6 +300,27 @@ class Explorer {
     });
   }
 
+  /** Lines between sets that differ in a swept parameter alone, if that is x. */
+  lines(x, { x: at, y: up }) {
+    const { swept } = this.report.sets;
+    if (!swept.some(([name]) => name === x.name)) return [];
+    const others = swept.filter(([name]) => name !== x.name).map(([name]) => this.report.values(name));
+    const lines = new Map();
+    for (let set = 0; set < at.length; set++) {
+      if (this.setGroup[set] === HIDDEN || at[set] === null || up[set] === null) continue;
+      // Numbers that were computed from others differ by rounding.
+      const key = others.map((values) => number(values[set], 6)).join();
+      lines.set(key, [...(lines.get(key) ?? []), set]);
+    }
+    const many = [...lines.values()].filter((line) => line.length > 1);
+    if (many.length > 24) return [];
+    return many.map((line) => {
+      const sets = line.sort((a, b) => at[a] - at[b]);
+      const colour = this.colours[this.setGroup[sets[0]]];
+      return { type: "line", x: sets.map((set) => at[set]), y: sets.map((set) => up[set]), colour, width: 1 };
+    });
+  }
+
   drawFree() {
     const { report } = this;
     const [x, y] = ["x", "y"].map((key) => this.table().get(this.axisName(key)));
@@ -304,10 +338,12 @@ class Explorer {
     }
     const pick = (set) => this.select(set);
     const tip = (set) => this.setTip(set, [...new Set([x.name, y.name])]);
+    const at = scaled(x);
+    const up = (values) => scaled({ values, factor: y.factor });
     const points = {
       type: "points",
-      x: x.values,
-      y: y.values,
+      x: at,
+      y: up(y.values),
       group: this.setGroup,
       colours: this.colours,
       size: 4,
@@ -320,7 +356,7 @@ class Explorer {
       ? [
           {
             ...points,
-            y: drive.values,
+            y: up(drive.values),
             group: this.setGroup.map((group) => (group === HIDDEN ? group : 0)),
             colours: [cssColour("muted")],
             size: 2.5,
@@ -334,9 +370,9 @@ class Explorer {
       ? [
           {
             type: "intervals",
-            x: x.values,
-            low: ends[0],
-            high: ends[1],
+            x: at,
+            low: up(ends[0]),
+            high: up(ends[1]),
             group: this.setGroup,
             colour: cssColour("muted"),
           },
@@ -356,7 +392,7 @@ class Explorer {
             },
           ];
     if (bars.length) key.push(["transparent", "vertical bars: 95 % confidence interval"]);
-    this.free.show({ ...axes, layers: [...bars, ...alone, points, ...own], key });
+    this.free.show({ ...axes, layers: [...this.lines(x, points), ...bars, ...alone, points, ...own], key });
   }
 }
 

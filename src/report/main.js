@@ -83,6 +83,7 @@ async function start() {
   writeSamples(report);
   writeSweep(report);
   writeFailures(report);
+  writeFigures(report);
   writeProvenance(report);
   const redraw = () => {
     writeRegimes(report, filterBy);

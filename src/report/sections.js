@@ -154,6 +154,23 @@ function writeCost(report) {
   });
 }
 
+/** The standing figures, with ids of their own, and a button that saves each. */
+function writeFigures(report) {
+  element("figures").hidden = report.figures.length === 0;
+  document.querySelector("nav a[href='#figures']").hidden = report.figures.length === 0;
+  const shown = report.figures.map(([name, text]) => {
+    const parsed = new DOMParser().parseFromString(text.replaceAll("frame-", `${name}-frame-`), "image/svg+xml");
+    const svg = document.importNode(parsed.documentElement, true);
+    // With its size alone it would be cut where there is little room.
+    const sides = ["width", "height"].map((side) => Number.parseFloat(svg.getAttribute(side)));
+    if (!svg.hasAttribute("viewBox")) svg.setAttribute("viewBox", `0 0 ${sides.join(" ")}`);
+    const file = new Blob([text], { type: "image/svg+xml" });
+    const button = make("button", { type: "button", onclick: () => save(`${name}.svg`, file) }, "Save as SVG");
+    return make("figure", {}, make("figcaption", {}, make("strong", {}, name), " ", button), svg);
+  });
+  element("figure-list").replaceChildren(...shown);
+}
+
 function writeProvenance(report) {
   const versions = [
     ["program", report.program],

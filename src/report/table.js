@@ -70,6 +70,7 @@ class SetTable {
     element("column-list").replaceChildren(...names.filter((name) => name !== "set_id").map((name) => this.box(name)));
     element("earlier").addEventListener("click", () => this.turn(-1));
     element("later").addEventListener("click", () => this.turn(1));
+    element("save-table").addEventListener("click", () => this.save());
     this.table.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -89,6 +90,13 @@ class SetTable {
   turn(step) {
     keep({ page: String(Number(state.page) + step) });
     this.draw();
+  }
+
+  /** Saves the sets that are shown as CSV, in SI. */
+  save() {
+    const columns = [...this.report.columns.values()].filter(({ name }) => name === "set_id" || this.chosen.has(name));
+    const lines = this.order().map((set) => columns.map(({ values }) => values[set] ?? "").join());
+    save("sets.csv", new Blob([[columns.map(({ name }) => name).join(), ...lines, ""].join("\n")], { type: "text/csv" }));
   }
 
   /** Up and down go from set to set. */

@@ -2,9 +2,9 @@
 
 use crate::model::Parameters;
 use crate::observe::Regime;
-use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced};
+use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
 use crate::results::layout::Layout;
-use crate::sweep::{Job, Sweep};
+use crate::sweep::{Job, Sweep, label};
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::{Dataset, DatasetError};
 use serde::Serialize;
@@ -32,6 +32,19 @@ impl Columns {
         let columns: Vec<Json> = R::columns().iter().map(described).collect();
         let values = columns.iter().map(|_| Vec::new()).collect();
         Self { columns, values }
+    }
+
+    /// With the label of each column, in the unit in which its values are read best, and the factor to that.
+    fn labelled(mut self) -> Self {
+        for (column, values) in self.columns.iter_mut().zip(&self.values) {
+            let label = label(column["name"].as_str().unwrap_or_default());
+            let largest = values.iter().filter_map(Json::as_f64).fold(0.0, |most, value| value.abs().max(most));
+            let (factor, unit) = label.scale(largest);
+            column["label"] = label.axis(unit).into();
+            column["short"] = label.short(unit).into();
+            column["factor"] = factor.into();
+        }
+        self
     }
 
     fn push<R: Row>(&mut self, row: &R) {
@@ -107,6 +120,8 @@ pub(super) struct Sets {
     command_end: String,
     /// Histogram of τ of each set: numbers of bins of a width of the mean / 60, each followed by its count.
     histograms: Vec<Vec<u64>>,
+    /// What was swept, that of most values first, and whether logarithmically.
+    swept: Vec<(String, bool)>,
     /// Places of the sets by their ids.
     #[serde(skip)]
     pub places: HashMap<String, usize>,
@@ -120,15 +135,19 @@ impl Sets {
             commands: Vec::new(),
             command_end: String::new(),
             histograms: Vec::new(),
+            swept: Vec::new(),
             places: HashMap::new(),
         };
-        let mut number = 0_u64..;
+        let (mut number, mut shown) = (0_u64.., Vec::new());
         for batch in sets_file(layout).rows::<SetRow>() {
             let rows = batch?.into_iter().filter(|row| !row.is_control);
             for (row, _) in rows.zip(&mut number).filter(|(_, number)| number.is_multiple_of(spacing)) {
-                sets.push(sweep, row);
+                sets.push(sweep, &row);
+                shown.push(row);
             }
         }
+        sets.columns = std::mem::replace(&mut sets.columns, Columns::new::<SetRow>()).labelled();
+        sets.swept = swept(&shown).iter().map(|swept| (swept.name().to_owned(), swept.is_logarithmic())).collect();
         let bins = Dataset::new(layout.storage, vec![layout.reduced_file(HistogramBin::NAME)]);
         for batch in bins.rows::<HistogramBin>() {
             for bin in batch? {
@@ -142,13 +161,13 @@ impl Sets {
         Ok(sets)
     }
 
-    fn push(&mut self, sweep: &Sweep, row: SetRow) {
+    fn push(&mut self, sweep: &Sweep, row: &SetRow) {
         let [begin, end] = command(sweep, &row.parameters.parameters);
         self.commands.push(begin);
         self.command_end = end;
         self.histograms.push(Vec::new());
-        self.columns.push(&row);
-        self.places.insert(row.set_id, self.places.len());
+        self.columns.push(row);
+        self.places.insert(row.set_id.clone(), self.places.len());
     }
 }
 

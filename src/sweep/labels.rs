@@ -55,8 +55,9 @@ pub struct Label {
     pub unit: &'static str,
 }
 
-/// What ends the names of columns of a comparison.
-const COMPARED: [(&str, &str); 3] = [("_a", ", A"), ("_b", ", B"), ("_difference", ", B − A")];
+/// What ends the names of columns of intervals and of a comparison.
+const COMPARED: [(&str, &str); 5] =
+    [("_low", ", lower end"), ("_high", ", upper end"), ("_a", ", A"), ("_b", ", B"), ("_difference", ", B − A")];
 
 /// The label of a column of the sets, or of a comparison of such; that of a formula has symbols in place of columns.
 pub fn label(column: &str) -> Label {

@@ -54,6 +54,27 @@ def test_a_sweep_under_modulation_has_all_its_charts(browser, report):
     assert "stickslip 0" in browser.text("#versions")
 
 
+def test_the_page_opens_with_the_result_and_its_table_and_shows_the_figures(browser, report):
+    browser.open(report(MODULATED))
+    assert [section.get_property("id") for section in browser.all("main > section")][:4] == ["explore", "sets", "slips", "figures"]
+    content = "const { content } = charts.find(({ name }) => name === 'free'); return "
+    assert browser.run(content + "[content.x.label, content.y.label]") == ["Drive velocity V₀ (m/s)", "Mean interval ⟨τ⟩ (ms)"]
+    # A line of three velocities for each frequency and amplitude.
+    lengths = browser.run(content + "content.layers.filter(({ type }) => type === 'line').map(({ x }) => x.length)")
+    assert lengths == [3] * 6
+    names = [name.text for name in browser.all("#figure-list figcaption strong")]
+    assert names == ["overview", "phi-eta", "tau-T"] and len(browser.all("#figure-list svg")) == 3
+    assert [button.text for button in browser.all("#figure-list button")] == ["Save as SVG"] * 3
+    saved = """const blobs = []; const known = URL.createObjectURL;
+    URL.createObjectURL = (blob) => { blobs.push(blob); return known(blob); };
+    element("save-table").click(); URL.createObjectURL = known;
+    window.saved = null; blobs[0].text().then((text) => (window.saved = text));"""
+    browser.run(saved)
+    browser.wait("window.saved")
+    lines = browser.run("return window.saved").splitlines()
+    assert len(lines) == 1 + SETS and lines[0].startswith("set_id,V0,Delta") and "tau_mean" in lines[0]
+
+
 def test_hostile_texts_are_shown_as_they_are(browser, report):
     browser.open(report(MODULATED))
     browser.find("#sweep details:last-of-type summary").click()
@@ -79,13 +100,13 @@ def test_pointing_at_a_slip_names_its_job_and_the_command_that_runs_it(browser, 
 def test_what_the_drive_alone_explains_stands_beside_what_is_seen(browser, report):
     layers = "return charts.find(({ name }) => name === 'free').places.map(({ layer }) => layer.y)"
     browser.open(report(MODULATED), "#y=resultant_length")
-    assert len(browser.run(layers)) == 1 and "drive alone" not in browser.text("#free")
+    assert len(browser.run(layers)) == 1 and "drive alone" not in browser.text("#free figcaption")
     browser.open(report(MODULATED + "control = true\n"), "#y=resultant_length")
     # Controls are no sets.
     assert len(rows(browser)) == SETS and "18 parameter sets" in browser.text("#summary")
     alone, seen = browser.run(layers)
     assert len(alone) == len(seen) == SETS and alone != seen
-    assert "by the drive alone" in browser.text("#free")
+    assert "by the drive alone" in browser.text("#free figcaption")
     # A slider without slips explains nothing.
     cells = [float(cell) for cell in column(browser, "resultant_drive") if cell != "–"]
     assert cells and cells == pytest.approx([share for share in alone if share is not None], rel=1e-4)
