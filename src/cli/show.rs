@@ -142,7 +142,7 @@ fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
 /// The parameters in which sets differ, and what was found of them.
 fn usual_columns(rows: &[SetRow]) -> Vec<String> {
     let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() }.to_owned();
-    let mut columns: Vec<String> = differing(rows).into_iter().map(key).collect();
+    let mut columns: Vec<String> = differing(&rows.iter()).into_iter().map(key).collect();
     if columns.iter().any(|column| column == FREQUENCY) {
         columns.push("eta".to_owned());
     }
@@ -200,12 +200,12 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let cells = columns.iter().map(|values| (values.is_worded(), column(values, rows, most))).collect();
-    side_by_side(cells)
+    let cells = columns.iter().map(|values| (values.is_worded(), column(values, rows, most))).collect::<Vec<_>>();
+    side_by_side(&cells)
 }
 
 /// Columns of cells side by side, those of words to the left.
-fn side_by_side(columns: Vec<(bool, Vec<String>)>) -> String {
+fn side_by_side(columns: &[(bool, Vec<String>)]) -> String {
     let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
     let lines = columns.first().map_or(0, |(_, cells)| cells.len());
     let line = |line: usize| {
@@ -228,7 +228,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     let rows: Vec<SetRow> =
         edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
-    let others = differing(&rows).into_iter().filter(|symbol| *symbol != axis);
+    let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
     let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
     let mut columns: Vec<(bool, Vec<String>)> =
         others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();
@@ -256,7 +256,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
-    Ok(side_by_side(columns) + "\n")
+    Ok(side_by_side(&columns) + "\n")
 }
 
 /// The head of a column and its first cells.

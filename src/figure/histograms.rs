@@ -104,7 +104,7 @@ fn panels<'a>(sets: &[SetRow], bins: &'a [HistogramBin]) -> Vec<Panel<'a>> {
     shown.sort_by(|left, right| {
         left.parameters.modulation_frequency().total_cmp(&right.parameters.modulation_frequency())
     });
-    let mut others = differing(shown.iter().copied());
+    let mut others = differing(&shown.iter().copied());
     others.retain(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T));
     let panel = |set: &SetRow| {
         let settings = others.iter().map(|&symbol| setting(&set.parameters, symbol));

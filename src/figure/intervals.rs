@@ -25,7 +25,9 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     };
     let mut slips: Vec<(&Point, Place)> = points.iter().filter_map(|point| Some((point, place(point)?))).collect();
     let (x_label, factor) = axis_of("T", slips.iter().map(|slip| slip.1.0));
-    slips.iter_mut().for_each(|slip| slip.1.0 *= factor);
+    for slip in &mut slips {
+        slip.1.0 *= factor;
+    }
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.0))?;
     let x = Axis::logarithmic(&x_label, low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;

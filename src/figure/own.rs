@@ -217,7 +217,7 @@ impl<'a> Chart<'a> {
                 let layers = self.layers(y, &x_axis, hues.as_ref(), radius, [members, &free], &lines);
                 let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
                 if groups.len() > 1 {
-                    if cells.len() % columns > 0 {
+                    if !cells.len().is_multiple_of(columns) {
                         panel.y.label.clear();
                     }
                     panel.heading = Some((title.clone(), String::new()));
@@ -252,7 +252,9 @@ impl<'a> Chart<'a> {
         }
         let mut lines: Vec<Vec<usize>> = lines.into_values().filter(|line| line.len() > 1).collect();
         let number = |set| self.x.number(set).unwrap_or(f64::NAN);
-        lines.iter_mut().for_each(|line| line.sort_by(|&left, &right| number(left).total_cmp(&number(right))));
+        for line in &mut lines {
+            line.sort_by(|&left, &right| number(left).total_cmp(&number(right)));
+        }
         if lines.len() > MAX_LINES { Vec::new() } else { lines }
     }
 
@@ -681,11 +683,15 @@ pub(super) mod tests {
         }
         assert!(svg.contains("Δfₛ (N)<") && !svg.contains("Share of time") && !svg.contains("by the drive alone"));
         let mut larger = sets.clone();
-        larger.iter_mut().for_each(|set| set.parameters.parameters.blocks = 9);
+        for set in &mut larger {
+            set.parameters.parameters.blocks = 9;
+        }
         sets.extend(larger);
         let svg = overview_of(&sets);
         assert!(svg.contains(">N = 9<") && svg.contains(">N = 70<") && svg.contains(">Δ = 1 µm<"));
-        sets.iter_mut().for_each(|set| set.resultant_drive = Some(0.6));
+        for set in &mut sets {
+            set.resultant_drive = Some(0.6);
+        }
         let with = overview_of(&sets);
         assert!(with.contains(">by the drive alone<"));
         // A mark of few dashes, and curves of many.

@@ -30,7 +30,7 @@ const QUANTITIES: [(&str, Getter); 3] = [
 /// 4 values or more; `None` for others.
 pub(super) fn regime_map(sets: &[SetRow], look: &Look) -> Option<Picture> {
     // The drive velocity is the x axis wherever it is one.
-    let [horizontal, vertical] = match differing(sets)[..] {
+    let [horizontal, vertical] = match differing(&sets.iter())[..] {
         [first, Symbol::V0] => [Symbol::V0, first],
         [first, second] if ![first, second].contains(&Symbol::T) => [first, second],
         _ => return None,

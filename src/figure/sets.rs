@@ -19,7 +19,7 @@ pub(super) struct Modulations<'a> {
 impl<'a> Modulations<'a> {
     /// `None` if another parameter differs.
     pub(super) fn of(sets: impl Iterator<Item = &'a SetRow> + Clone) -> Option<Self> {
-        if differing(sets.clone()).iter().any(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T)) {
+        if differing(&sets).iter().any(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T)) {
             return None;
         }
         let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) =

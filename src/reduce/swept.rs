@@ -57,9 +57,9 @@ impl Swept {
 }
 
 /// The parameters in which sets differ, the seed left out.
-pub fn differing<'a>(rows: impl IntoIterator<Item = &'a SetRow> + Clone) -> Vec<Symbol> {
+pub fn differing<'a>(rows: &(impl Iterator<Item = &'a SetRow> + Clone)) -> Vec<Symbol> {
     let differs = |symbol: &Symbol| {
-        let mut values = rows.clone().into_iter().map(|row| row.parameters.get(*symbol));
+        let mut values = rows.clone().map(|row| row.parameters.get(*symbol));
         let first = values.next();
         *symbol != Symbol::Seed && values.any(|value| Some(value) != first)
     };
@@ -74,7 +74,7 @@ pub fn swept(rows: &[SetRow]) -> Vec<Swept> {
         let columns = names.iter().filter_map(|name| Swept::of(rows, name).ok());
         columns.min_by_key(|swept| (swept.distinct.len(), !has_even_steps(&swept.distinct)))
     };
-    let mut all: Vec<Swept> = differing(rows).into_iter().filter_map(column).collect();
+    let mut all: Vec<Swept> = differing(&rows.iter()).into_iter().filter_map(column).collect();
     // To be without a period is a value, too.
     let count = |swept: &Swept| swept.distinct.len() + usize::from(swept.values.numbers.contains(&None));
     all.sort_by_key(|swept| std::cmp::Reverse(count(swept)));
