@@ -46,7 +46,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
 
 /// Draws a figure of one's own from the sets of a results directory; writes nothing.
 pub fn draw_own(layout: &Layout<'_>, figure: &OwnFigure, look: &Look) -> Result<Picture> {
-    let rows: Vec<SetRow> = read(layout)?;
+    let mut rows: Vec<SetRow> = read(layout)?;
+    rows.retain(|row| !row.is_control);
     let look = &look.with_note(&sets::common(rows.iter().map(|row| &*row.parameters)));
     let picture = own::own(&rows, figure, look)?;
     check_size(&picture, look)?;

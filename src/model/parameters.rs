@@ -157,6 +157,12 @@ impl Parameters {
         self.turning_period.map_or(0.0, |period| TAU / period).max(self.modulation_frequency())
     }
 
+    /// The frequency of the modulation in Hz as people write it: its period is the reciprocal to the last bit, and the
+    /// reciprocal of that to twelve digits is what they wrote. `None` without modulation.
+    pub fn frequency(&self) -> Option<f64> {
+        self.modulation_period.map(|period| format!("{:.11e}", 1.0 / period).parse().unwrap_or(1.0 / period))
+    }
+
     /// η of the modulation, see [`eta`](super::theory::eta).
     pub fn eta(&self) -> f64 {
         eta(self.modulation_frequency(), self.modulation_amplitude, self.drive_velocity)

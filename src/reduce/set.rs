@@ -178,7 +178,7 @@ impl SetSlips {
         let whole = |periods: f64| periods.round() as u64;
         let row = SetRow {
             set_id: jobs.set_id,
-            frequency: jobs.parameters.modulation_period.map(|period| 1.0 / period),
+            frequency: jobs.parameters.frequency(),
             parameters: Selected::new(jobs.parameters),
             eta,
             finished_jobs: jobs.finished,

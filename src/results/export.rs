@@ -1,22 +1,21 @@
 //! Export: the tables of a directory as one file each, elsewhere, for other tools.
 //!
 //! Rows stand in the order of the plan, extensions one after another, so the bytes depend on what is done alone and not on
-//! how it came to that. Every row has all swept parameters and the frequency 1/T, so that no table need be joined. Nothing
-//! of the directory is changed. Memory: one part, and one row group.
+//! how it came to that. Every row has all swept parameters, so that no table need be joined. Nothing of the directory is
+//! changed. Memory: one part, and one row group.
 
 use crate::results::directory::Results;
 use crate::results::error::ResultsError;
 use crate::results::parts::row_count;
 use crate::results::tables::{self, JobRow};
 use crate::sweep::Outline;
-use crate::table::arrow::{DESCRIPTION, UNIT, schema, schema_of};
+use crate::table::arrow::{schema, schema_of};
 use crate::table::file::{Batch, Dataset, DatasetError, RowCount};
 use crate::table::formats::{Format, RowWriter};
 use crate::table::storage::Storage;
 use arrow_array::cast::AsArray;
-use arrow_array::types::Float64Type;
-use arrow_array::{ArrayRef, Float64Array, RecordBatch, UInt32Array};
-use arrow_schema::{ArrowError, DataType, Field, SchemaRef};
+use arrow_array::{ArrayRef, RecordBatch, UInt32Array};
+use arrow_schema::{ArrowError, Field, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use serde::Serialize;
@@ -26,9 +25,6 @@ use std::sync::Arc;
 
 /// Column by which rows are joined with those of the jobs.
 const JOB_ID: &str = "job_id";
-/// Column of the period, and of the frequency that is added.
-const PERIOD: &str = "T";
-const FREQUENCY: &str = "frequency";
 /// What the name of the folder begins with in which an export is prepared, within the one that it is for.
 const UNFINISHED: &str = ".unfinished-";
 
@@ -119,10 +115,6 @@ impl Results<'_> {
         let is_new = |field: &&Arc<Field>| columns.field_with_name(field.name()).is_err();
         let swept = of_jobs.fields().iter().filter(is_new).filter(|field| swept.contains(field.name()));
         fields.extend(swept.map(|field| Field::clone(field)));
-        fields.push(Field::new(FREQUENCY, DataType::Float64, true).with_metadata(HashMap::from([
-            (UNIT.to_owned(), "Hz".to_owned()),
-            (DESCRIPTION.to_owned(), "1/T of the modulation; null without".to_owned()),
-        ])));
         fields
     }
 
@@ -188,7 +180,7 @@ impl Jobs {
         Ok(Self { rows, by_id })
     }
 
-    /// Rows with the columns of a schema: their own, those of their jobs, and the frequency.
+    /// Rows with the columns of a schema: their own, and those of their jobs.
     fn join(&self, rows: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
         let missing = |name: &str| ArrowError::SchemaError(format!("there is no column {name}"));
         let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
@@ -201,20 +193,9 @@ impl Jobs {
         };
         let column_of = |name: &str| match rows.column_by_name(name) {
             Some(column) => Ok(Arc::clone(column)),
-            None if name == FREQUENCY => {
-                let periods = of_jobs(PERIOD)?;
-                let periods = periods.as_primitive_opt::<Float64Type>().ok_or_else(|| missing(PERIOD))?;
-                let frequencies = periods.iter().map(|period| Some(rounded(1.0 / period?)));
-                Ok(Arc::new(frequencies.collect::<Float64Array>()) as ArrayRef)
-            }
             None => of_jobs(name),
         };
         let columns = schema.fields().iter().map(|field| column_of(field.name())).collect::<Result<Vec<_>, _>>()?;
         RecordBatch::try_new(Arc::clone(schema), columns)
     }
-}
-
-/// A number as people wrote it, before its reciprocal was taken: to twelve significant digits, as axes are.
-fn rounded(number: f64) -> f64 {
-    format!("{number:.11e}").parse().unwrap_or(number)
 }

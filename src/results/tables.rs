@@ -55,7 +55,7 @@ columns! {
 
 impl Loading {
     pub fn of(parameters: &Parameters) -> Self {
-        Self { frequency: parameters.modulation_period.map(|period| 1.0 / period), eta: parameters.eta() }
+        Self { frequency: parameters.frequency(), eta: parameters.eta() }
     }
 }
 

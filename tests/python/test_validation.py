@@ -112,7 +112,7 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path):
 #: The sweeps whose results the document needs.
 SWEEPS = (
     "fig2 fig3 friction friction-drives fronts drag drag-strong locking-map staircase size contacts disorder stiff-drive"
-    " choices startup stochasticity energies"
+    " choices startup stochasticity energies drive-alone"
 ).split()
 
 
