@@ -28,7 +28,7 @@ from sharing import (
 TASKS = 6
 
 # Some 12 s of CPU time.
-SLIPS = 60
+SLIPS = 150
 
 
 @pytest.fixture

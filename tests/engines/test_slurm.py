@@ -25,7 +25,7 @@ ELEMENTS = range(1, 9)
 COMPLETED = {element: ["COMPLETED"] for element in ELEMENTS}
 
 # Some 12 s of CPU time.
-SLIPS = 60
+SLIPS = 150
 
 # Before the worker in a script: stops its process but for 2 % of the time, so that some work is left on any machine.
 SLOWLY = "(trap '' TERM USR1; while kill -STOP $$; do sleep 0.98; kill -CONT $$; sleep 0.02; done) 2>/dev/null &\n"
