@@ -17,7 +17,10 @@ CHEAP = ("choices", "contacts", "drag", "drag-strong", "velocity")
 #: Pictures of a single simulation, which test_redraw.py draws, and of timings, which differ each time.
 OTHERS = {"fig1d.png", "fig4b.png", "fig4d.png", "speed-against-error.png"}
 #: Figures of one's own: what `stickslip plot` is given, as by scripts/reproduce.
-OWN = {"fig3-precise": "--x eta --y phase_mean --colour V0 --log x"}
+OWN = {
+    "fig3-precise": "--x eta --y phase_mean --colour V0 --log x",
+    "drive-alone": "--x eta --y resultant_excess --colour V0 --log x",
+}
 
 
 @dataclass(frozen=True)
