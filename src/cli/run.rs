@@ -223,7 +223,7 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
     let mut lines = reduce::summary_lines(&summary, layout);
     lines.extend(status::no_slips(&results));
-    Ok(Some(Reduced { lines, result: show::summary(&results)?, figures }))
+    Ok(Some(Reduced { lines, result: show::summary(&results, summary.sets)?, figures }))
 }
 
 /// What to do after a run that stopped early.

@@ -9,6 +9,8 @@ use crate::reduce::{
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{Sweep, label, three_digits};
+use crate::table::columns::Table;
+use crate::table::file::Dataset;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -55,8 +57,9 @@ Columns are those of stickslip plot --list.";
 /// Version of the JSON.
 const FORMAT: u32 = 1;
 
-/// Sets that the end of a run shows.
+/// Sets that the end of a run shows, and reads for its columns and for what ended otherwise.
 const FIRST: usize = 12;
+const MAX_READ: usize = 10_000;
 
 /// What is found of a set, where there is anything.
 const FOUND: [&str; 9] = [
@@ -82,18 +85,17 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         }
         return print(arguments, &columns, &[]);
     }
-    let mut rows = sets(&results)?;
+    let mut rows = sets(&results, usize::MAX)?;
     if let Some(condition) = &arguments.condition {
         rows = sets_where(rows, condition).map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
     }
     if let Some(column) = &arguments.sort {
         sort(&mut rows, column)?;
     }
-    let columns = if arguments.columns.is_empty() { usual_columns(&rows) } else { arguments.columns.clone() };
-    let columns: Vec<Values> = columns
-        .iter()
-        .map(|name| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}"))))
-        .collect::<Result<_, _>>()?;
+    let asked =
+        |name: &String| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}")));
+    let asked: Vec<Values> = arguments.columns.iter().map(asked).collect::<Result<_, _>>()?;
+    let columns = if asked.is_empty() { usual_columns(&rows) } else { asked };
     if !arguments.json && !arguments.csv {
         output::print(&edges(&results)?)?;
     }
@@ -120,35 +122,40 @@ fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<E
     Ok(Exit::Done)
 }
 
-/// The first sets of a directory that has just been reduced, and what ended otherwise.
-pub fn summary(results: &Results<'_>) -> Result<String> {
-    let rows = sets(results)?;
-    let columns: Vec<Values> = usual_columns(&rows).iter().filter_map(|name| Values::of(&rows, name).ok()).collect();
+/// The first sets of a directory that has just been reduced to so many, and what ended otherwise. Memory: [`MAX_READ`] sets.
+pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
+    let rows = sets(results, MAX_READ)?;
+    let columns = usual_columns(&rows);
     let mut notes = notes(results, &rows);
-    if rows.len() > FIRST {
+    if let Some(more) = count.checked_sub(FIRST as u64).filter(|more| *more > 0) {
         let root = output::quoted_path(results.layout().root());
-        notes.insert(0, format!("… {} more: stickslip show {root}", rows.len() - FIRST));
+        notes.insert(0, format!("… {more} more: stickslip show {root}"));
     }
     let text = edges(results)? + &aligned(&columns, &rows, FIRST);
     Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
 }
 
-/// The reduced sets, controls left out.
-fn sets(results: &Results<'_>) -> Result<Vec<SetRow>> {
+/// The first of the reduced sets, controls left out.
+fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     renew(results)?;
-    Ok(read_reduced::<SetRow>(results.layout())?.into_iter().filter(|row| !row.is_control).collect())
+    let file = results.layout().reduced_file(SetRow::NAME);
+    let mut sets = Vec::new();
+    for batch in Dataset::new(results.layout().storage, vec![file]).rows::<SetRow>() {
+        sets.extend(batch?.into_iter().filter(|row| !row.is_control).take(most - sets.len()));
+        if sets.len() == most {
+            break;
+        }
+    }
+    Ok(sets)
 }
 
 /// The parameters in which sets differ, and what was found of them.
-fn usual_columns(rows: &[SetRow]) -> Vec<String> {
-    let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() }.to_owned();
-    let mut columns: Vec<String> = differing(&rows.iter()).into_iter().map(key).collect();
-    if columns.iter().any(|column| column == FREQUENCY) {
-        columns.push("eta".to_owned());
-    }
-    let is_there = |name: &str| Values::of(rows, name).is_ok_and(|values| values.numbers.iter().any(Option::is_some));
-    columns.extend(FOUND.into_iter().filter(|name| is_there(name)).map(str::to_owned));
-    columns
+fn usual_columns(rows: &[SetRow]) -> Vec<Values> {
+    let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() };
+    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key).collect();
+    names.extend(names.contains(&FREQUENCY).then_some("eta"));
+    let columns = names.into_iter().chain(FOUND).filter_map(|name| Values::of(rows, name).ok());
+    columns.filter(|values| values.numbers.iter().any(Option::is_some)).collect()
 }
 
 fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
@@ -232,8 +239,8 @@ fn edges(results: &Results<'_>) -> Result<String> {
     let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
     let mut columns: Vec<(bool, Vec<String>)> =
         others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();
-    let label = label(&first.axis);
-    let (factor, unit) = label.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
+    let of_axis = label(&first.axis);
+    let (factor, unit) = of_axis.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
     let number = |value: f64| {
         let digits: f64 = format!("{:.3e}", factor * value).parse().unwrap_or(value);
         digits.to_string()
@@ -243,11 +250,10 @@ fn edges(results: &Results<'_>) -> Result<String> {
     };
     add("edge of".to_owned(), &|edge| {
         let statistic = edge.statistic.split(' ').next().unwrap_or_default();
-        let symbol =
-            if statistic == edge.statistic { crate::sweep::label(statistic).symbol } else { edge.statistic.clone() };
+        let symbol = if statistic == edge.statistic { label(statistic).symbol } else { edge.statistic.clone() };
         format!("{symbol} = {}", three_digits(edge.threshold))
     });
-    add(format!("{} ({unit})", label.symbol), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
+    add(of_axis.short(unit), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
     add("95 %".to_owned(), &|edge| match edge.edge_interval {
         Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),
         None if edge.edge.is_none() => format!("from {} to {}", number(edge.bracket_low), number(edge.bracket_high)),
@@ -286,7 +292,10 @@ fn with_error(value: f64, half: f64) -> String {
     let digits = if half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
     let digits = digits.clamp(0.0, 18.0) as usize;
-    format!("{value:.digits$} ± {half:.digits$}")
+    let rounded = format!("{value:.digits$}");
+    // Not -0.00.
+    let is_zero = rounded.trim_start_matches('-').bytes().all(|digit| b"0.".contains(&digit));
+    format!("{} ± {half:.digits$}", if is_zero { rounded.trim_start_matches('-') } else { &rounded })
 }
 
 /// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
@@ -324,10 +333,11 @@ mod tests {
 
     #[test]
     fn values_have_the_digits_that_their_errors_leave() {
-        let shown = [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06)];
+        let shown =
+            [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06), (-3e-4, 2e-3)];
         assert_eq!(
             shown.map(|(value, half)| with_error(value, half)),
-            ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06"]
+            ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06", "0.000 ± 0.002"]
         );
     }
 }

@@ -6,7 +6,7 @@
 //! the parts: raise [`PLAN_VERSION`](super::PLAN_VERSION) with it.
 //!
 //! Of 301 jobs with 1 to 560 blocks at 1e-6 to 1e-2 m/s, half of them at the edge of sliding or under strong modulation, and
-//! with all methods, 273 cost half to twice the prediction, and 287 a third to three times. What it cannot know is when
+//! with all methods, some nine of ten cost half to twice the prediction. What it cannot know is when
 //! chance ends a job: with few contacts, and where the slider hardly slips.
 
 use crate::model::Parameters;
@@ -39,8 +39,8 @@ const RESOLVED_REATTACHMENTS: f64 = 3.0;
 const RESOLVED_DAMPINGS: f64 = 100.0;
 /// Steps of the grid in a period of the modulation, if its amplitude were the way that the drive makes between slips.
 const STEPS_OF_A_PERIOD: f64 = 250.0;
-/// From this share of that way on, modulation breaks contacts in each period, so many of each, and motion is never quiet;
-/// from the second on the slider slips to and fro with it.
+/// If the amplitude is more than the first share of that way, each period breaks the second share of the contacts, and motion
+/// is never quiet; if it is more than the third, the slider slips to and fro with the modulation.
 const SHAKEN: f64 = 0.4;
 const BREAKS_OF_A_PERIOD: f64 = 0.2;
 const FOLLOWS: f64 = 0.6;

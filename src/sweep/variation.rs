@@ -3,7 +3,6 @@
 use super::quantity::Quantity;
 use super::source::nearest;
 use crate::observe::RecordingKey;
-use crate::simulate::Written;
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A key of a sweep file with its new value as TOML, and the section that it belongs to.
@@ -60,7 +59,7 @@ fn scalar(text: &str) -> String {
 }
 
 /// The changes of a section, as keys and values.
-pub fn written(changes: &[Change], section: &str) -> Written {
+pub fn written(changes: &[Change], section: &str) -> Vec<(String, String)> {
     let own = changes.iter().filter(|change| change.section == section);
     own.map(|change| (change.key.clone(), change.value.clone())).collect()
 }

@@ -38,6 +38,7 @@ def test_every_field_of_json_output_is_documented(stickslip, results, tmp_path):
         "run": ("run", sweep, "--out", results, "--no-reduce"),
         "status": ("status", results),
         "reduce": ("reduce", results),
+        "show": ("show", results),
         "verify": ("verify", results),
         "export": ("export", results, "--out", tmp_path / "exported"),
         "simulate": ("simulate", "--set", "N=9", "--time", 0.01),
