@@ -91,5 +91,5 @@ def test_the_parts_of_a_killed_process_are_taken_over_by_another_host(guest, loc
         run.wait(300, expected=137 if host == "h2" else 0)
     for name in names.values():
         results = guest.fetch(name)
-        assert_each_part_ran_once(results, workers=len(HOSTS))
+        assert_each_part_ran_once(results, workers=len(HOSTS), killed=1)
         assert_same(results, local_run(SLIPS, TRIVIAL))
