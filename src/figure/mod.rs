@@ -39,7 +39,7 @@ pub use draw::{draw_all, draw_own, write_own};
 pub use own::OwnFigure;
 pub use picture::{Format, Picture};
 pub use simulation::simulation;
-pub use style::{Look, Size, Style};
+pub use style::{INKS, Look, SCALE, Size, Style};
 pub use work_precision::{ErrorPanel, WorkPrecision, work_precision};
 
 /// What was asked of a figure that cannot be drawn so: the flag, and what to do.

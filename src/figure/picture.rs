@@ -130,7 +130,7 @@ pub(super) fn snapped(place: f64) -> f64 {
 }
 
 /// An opaque colour, `#rrggbb`.
-pub(super) type Ink = &'static str;
+pub type Ink = &'static str;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke {

@@ -148,10 +148,10 @@ pub(super) const WHITE: Ink = "#ffffff";
 pub(super) const RED: Ink = "#d62020";
 pub(super) const BLUE: Ink = "#1f55c4";
 /// For lines side by side: colours that colour-blind readers can distinguish (Okabe and Ito).
-pub(super) const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+pub const INKS: [Ink; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 /// For dots on a scale: the darker of the shades, which are seen on white.
-pub(super) const SCALE: [Ink; 10] =
+pub const SCALE: [Ink; 10] =
     ["#abd4ce", "#8fc7c7", "#74b9c1", "#5ba9ba", "#4598b2", "#3586a8", "#2a749c", "#22618e", "#1e4e7c", "#1b3a68"];
 
 /// Border and ticks of a frame.

@@ -1,37 +1,21 @@
 // Colours of sets: by a column, in light and dark.
 
-const DISTINCT = 8;
-const CATEGORIES = {
-  light: ["#0072b2", "#d55e00", "#009e73", "#b0408f", "#b07d00", "#3a9bd9", "#6b4ea0", "#8a4b2d"],
-  dark: ["#5eb5f0", "#ff9a5c", "#3fd0a4", "#f08fd0", "#f0c04a", "#9ad5ff", "#b79cf0", "#e0a98a"],
-};
-const GRADIENT = {
-  light: [
-    [62, 38, 130],
-    [49, 104, 142],
-    [33, 145, 140],
-    [74, 180, 90],
-    [176, 190, 20],
-  ],
-  dark: [
-    [120, 110, 220],
-    [70, 140, 190],
-    [50, 175, 165],
-    [110, 205, 100],
-    [240, 225, 60],
-  ],
-};
+/** Inks and scale of the figures; on a dark ground with more white. */
+const CATEGORIES = { light: [], dark: [] };
+const GRADIENT = { light: [], dark: [] };
 const PALE = { light: "#aeb8c2", dark: "#5a6672" };
 const REGIMES = ["stick-slip", "mixed", "sliding"];
 const ink = (colours) => colours[isDark() ? "dark" : "light"];
 
-/** A colour of the gradient, at a place from 0 to 1. */
-function gradient(place) {
-  const stops = ink(GRADIENT);
-  const at = Math.min(0.9999, Math.max(0, place)) * (stops.length - 1);
-  const [low, high] = [stops[Math.floor(at)], stops[Math.floor(at) + 1]];
-  return `rgb(${low.map((value, k) => Math.round(value + (at % 1) * (high[k] - value))).join(" ")})`;
+function useInks({ inks, scale }) {
+  const lighter = (colour) => `rgb(${components(colour).map((part) => Math.round(part + 0.35 * (255 - part))).join(" ")})`;
+  Object.assign(CATEGORIES, { light: inks, dark: inks.map(lighter) });
+  // What is near the ground is pale in either.
+  Object.assign(GRADIENT, { light: scale, dark: scale.map(lighter).reverse() });
 }
+
+/** A colour of the scale, at a place from 0 to 1. */
+const gradient = (place) => ink(GRADIENT)[Math.min(ink(GRADIENT).length - 1, Math.floor(place * ink(GRADIENT).length))];
 
 /** Colours of the sets by a column: of each set its group, and of each group its colour and its words. */
 function colouring(report, name) {
@@ -45,17 +29,19 @@ function colouring(report, name) {
     const words = name === "regime" ? REGIMES : distinct.sort();
     values.forEach((value, set) => (group[set] = value === null ? words.length : words.indexOf(value)));
     const shade = (value, k) =>
-      value === false ? ink(PALE) : ink(CATEGORIES)[column.kind === "flag" ? 0 : k % DISTINCT];
+      value === false ? ink(PALE) : ink(CATEGORIES)[column.kind === "flag" ? 0 : k % CATEGORIES.light.length];
     const word = (value) => (column.kind === "flag" ? (value ? name : `not ${name}`) : value);
     return { group, groups: [...words.map((value, k) => [shade(value, k), word(value)]), none] };
   }
   distinct.sort((a, b) => a - b);
   const [low, high] = [distinct[0], distinct[distinct.length - 1]];
-  if (distinct.length <= DISTINCT) {
+  if (distinct.length <= CATEGORIES.light.length) {
     values.forEach((value, set) => (group[set] = value === null ? distinct.length : distinct.indexOf(value)));
+    // What is off is black, as in figures.
+    const first = low === 0 ? 1 : 0;
     const shades = distinct.map((value, k) => [
-      gradient(k / Math.max(1, distinct.length - 1)),
-      `${column.short} = ${number(column.factor * value)}`,
+      k < first ? cssColour("ink") : ink(CATEGORIES)[k - first],
+      setting(column, values.indexOf(value)),
     ]);
     return { group, groups: [...shades, none] };
   }
@@ -66,7 +52,7 @@ function colouring(report, name) {
   );
   const legend = (k) =>
     k % 6 === 0 || k === steps - 1
-      ? `${k ? "" : `${column.short}: `}${number(column.factor * axis.value(k === steps - 1 ? 1 : k / steps), 3)}`
+      ? `${k ? "" : `${short(column)}: `}${number(column.factor * axis.value(k === steps - 1 ? 1 : k / steps), 3)}`
       : "";
   return { group, groups: [...Array.from({ length: steps }, (_, k) => [gradient(k / (steps - 1)), legend(k)]), none] };
 }

@@ -3,8 +3,9 @@
 use super::ADVICE;
 use super::slips::Slips;
 use super::tables::{Census, Sets, backbone};
+use crate::figure::{INKS, SCALE};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
-use crate::model::{Description, MODEL_VERSION, RNG_SCHEME, Symbol};
+use crate::model::{MODEL_VERSION, RNG_SCHEME, Symbol};
 use crate::reduce::advise;
 use crate::results::Results;
 use crate::results::layout::Layout;
@@ -30,9 +31,9 @@ const STANDING: [&str; 8] =
 const CURVE_STEPS: u32 = 150;
 const CURVE_STEPS_PER_DECADE: f64 = 30.0;
 
-/// What the scripts of the page read of a directory with reduced data, and the bytes of its slips. With `refresh`, the
-/// page is loaded again after about this time.
-pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<(Json, Vec<u8>)> {
+/// What the scripts of the page read of a directory with reduced data. With `refresh`, the page is loaded again after about
+/// this time.
+pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Result<Json> {
     let layout = results.layout();
     let sweep = results.sweep();
     let (cost, runs) = logs(results)?;
@@ -42,11 +43,8 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
     let sets = Sets::read(layout, sweep, sets_every).map_err(&damaged)?;
     let slips = Slips::read(results, &sets.places, census.slips.div_ceil(sets_every)).map_err(&damaged)?;
     let written = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64());
-    let parameters = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed).map(|symbol| {
-        let Description { key, symbol, unit, meaning, .. } = symbol.description();
-        json!({ "key": key, "symbol": symbol, "unit": unit, "meaning": meaning })
-    });
-    let content = json!({
+    let parameters = Symbol::ALL.into_iter().filter(|&symbol| symbol != Symbol::Seed).map(Symbol::key);
+    Ok(json!({
         "program": PROGRAM,
         "model_version": MODEL_VERSION,
         "rng_scheme": RNG_SCHEME,
@@ -66,10 +64,12 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "figures": figures(layout)?,
         "backbone": backbone(layout).map_err(&damaged)?,
         "curves": curves(),
+        // Colours of the figures.
+        "inks": INKS,
+        "scale": SCALE,
         "cost": cost,
         "runs": runs,
-    });
-    Ok((content, slips.bytes()))
+    }))
 }
 
 /// The standing figures as SVG, by name: those that are small.

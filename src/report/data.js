@@ -35,11 +35,22 @@ function duration(seconds) {
   return `${number(seconds / 86400, 3)} days`;
 }
 
-const titled = (column) => column.label ?? (column.unit ? `${column.name} (${column.unit})` : column.name);
+/** Symbol and unit of a column, as figures name it in short. */
+const short = ({ symbol, unit }) => (unit ? `${symbol} (${unit})` : symbol);
+
+/** A value of a column in the unit of its label, without that unit. */
+function shownValue({ values, factor = 1, kind }, place, digits = 4) {
+  const value = values[place];
+  if (kind === "flag") return value ? "yes" : "no";
+  return typeof value === "number" ? number(factor * value, digits) : number(value);
+}
+
+const withUnit = (column, place) => `${shownValue(column, place)} ${column.unit}`.trim();
+const setting = (column, place) => `${column.symbol} = ${withUnit(column, place)}`;
 
 /** The values of a column in the unit of its label. */
 const scaled = ({ values, factor }) =>
-  (factor ?? 1) === 1 ? values : Array.from(values, (value) => (value === null ? null : factor * value));
+  (factor ?? 1) === 1 ? values : values.map((value) => (value === null ? null : factor * value));
 
 /** Saves a file of this page. */
 function save(name, blob) {
@@ -59,23 +70,22 @@ async function unpack() {
   const packed = new Uint8Array(text.length);
   for (let k = 0; k < text.length; k++) packed[k] = text.charCodeAt(k);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const buffer = await new Response(stream).arrayBuffer();
-  const length = Number(new DataView(buffer).getBigUint64(0, true));
-  const content = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
-  return new Report(content, new Uint8Array(buffer, 8 + length));
+  return new Report(await new Response(stream).json());
 }
 
 class Report {
-  constructor(content, bytes) {
+  constructor(content) {
     Object.assign(this, content);
     this.columns = byName(content.sets);
     this.setIds = this.columns.get("set_id").values;
     this.setCount = this.setIds.length;
     this.placeOf = new Map(this.setIds.map((id, place) => [id, place]));
-    this.readSlips(bytes);
-    const isSwept = ({ key }) => new Set(this.values(key)).size > 1;
-    this.swept = this.parameters.filter(isSwept);
-    this.fixed = this.parameters.filter((parameter) => !isSwept(parameter));
+    this.readSlips();
+    useInks(content);
+    const parameters = this.parameters.map((key) => this.columns.get(key));
+    const isSwept = ({ values }) => new Set(values).size > 1;
+    this.swept = parameters.filter(isSwept);
+    this.fixed = parameters.filter((parameter) => !isSwept(parameter));
     this.hasControls = this.values("resultant_drive").some((value) => value !== null);
     this.isModulated = this.slip.get("phase").values.some((phase) => !Number.isNaN(phase));
   }
@@ -85,30 +95,21 @@ class Report {
     return this.columns.get(name).values;
   }
 
-  /** Columns of numbers as they were written: of each the four bytes of all rows, highest first. */
-  readSlips(bytes) {
-    const { rows, columns, jobs } = this.slips;
-    const words = (place) => {
-      const column = new Uint32Array(rows);
-      for (let k = 0; k < 4; k++) {
-        const plane = bytes.subarray((4 * place + k) * rows, (4 * place + k + 1) * rows);
-        for (let row = 0; row < rows; row++) column[row] |= plane[row] << (24 - 8 * k);
-      }
-      return column;
-    };
-    this.slipJob = words(0);
-    this.slipSet = Uint32Array.from(this.slipJob, (job) => jobs[job][0]);
-    this.slip = new Map(
-      columns.map((column, k) => [column.name, { ...column, values: new Float32Array(words(k + 1).buffer) }]),
-    );
-    const derive = (name, unit, meaning, of) =>
-      this.slip.set(name, { name, unit, meaning, kind: "real", values: Float32Array.from(this.slipSet, of) });
+  /** Columns of slips as numbers, NaN where there is none, and two that follow from them. */
+  readSlips() {
+    const { columns, values, job, jobs } = this.slips;
+    const numbers = (column) => Float32Array.from(column, (value) => value ?? NaN);
+    this.slipJob = Uint32Array.from(job);
+    this.slipSet = Uint32Array.from(job, (number) => jobs[number][0]);
+    this.slip = byName({ columns, values: values.map(numbers) });
+    const derive = (name, label, symbol, meaning, of) =>
+      this.slip.set(name, { name, label, symbol, unit: "", meaning, kind: "real", values: Float32Array.from(this.slipSet, of) });
     const [velocity, period] = [this.values("V0"), this.slip.get("T_onset").values];
     const [amplitude, interval] = [this.slip.get("Delta_onset").values, this.slip.get("interval").values];
-    derive("eta", "", "2 pi Delta / (T V0) at the onset; 0 without modulation", (set, slip) =>
+    derive("eta", "η = 2πΔ / (T V₀)", "η", "2 pi Delta / (T V0) at the onset; 0 without modulation", (set, slip) =>
       Number.isNaN(period[slip]) ? 0 : (2 * Math.PI * amplitude[slip]) / (period[slip] * velocity[set]),
     );
-    derive("tau / T", "", "interval in periods at the onset", (_, slip) => interval[slip] / period[slip]);
+    derive("tau / T", "τ / T", "τ / T", "interval in periods at the onset", (_, slip) => interval[slip] / period[slip]);
   }
 
   /** The command that runs one job of a set alone. */
@@ -123,9 +124,8 @@ class Report {
 
   /** The swept parameters of a set, as a line. */
   settings(set) {
-    const shown = this.swept.map(({ key, unit }) => [key, this.values(key)[set], unit]);
-    const given = shown.filter(([, value]) => value !== null);
-    return given.map(([key, value, unit]) => `${key} = ${number(value)} ${unit}`.trim()).join(", ");
+    const given = this.swept.filter(({ values }) => values[set] !== null);
+    return given.map((column) => setting(column, set)).join(", ");
   }
 
   name(set) {

@@ -42,11 +42,8 @@ class Explorer {
   slipColumns() {
     const { report } = this;
     const columns = new Map(report.slip);
-    for (const { key } of report.swept) {
-      const column = report.columns.get(key);
-      if (isNumeric(column)) {
-        columns.set(key, { ...column, values: Array.from(report.slipSet, (set) => column.values[set]) });
-      }
+    for (const column of report.swept.filter(isNumeric)) {
+      columns.set(column.name, { ...column, values: Array.from(report.slipSet, (set) => column.values[set]) });
     }
     return columns;
   }
@@ -60,7 +57,7 @@ class Explorer {
     );
     colour.replaceChildren(
       option("-", "one colour", this.chosen("colour")),
-      ...names.map((column) => option(column.name, titled(column), this.chosen("colour"))),
+      ...names.map((column) => option(column.name, column.label, this.chosen("colour"))),
     );
     colour.addEventListener("change", () => {
       keep({ colour: colour.value });
@@ -90,7 +87,7 @@ class Explorer {
       );
       return make("label", {}, label, select);
     };
-    const columns = [...this.table().values()].filter(isNumeric).map((column) => [column.name, titled(column)]);
+    const columns = [...this.table().values()].filter(isNumeric).map((column) => [column.name, column.label]);
     const log = (key) => {
       const box = make("input", {
         type: "checkbox",
@@ -165,7 +162,7 @@ class Explorer {
     this.slipGroup = Uint8Array.from(report.slipSet, (set) => this.setGroup[set]);
     const used = new Set(this.setGroup);
     const isSeen = ([, words], k) =>
-      words && (used.has(k) || groups.length > DISTINCT + 2) && (words !== "none" || used.has(k));
+      words && (used.has(k) || groups.length > CATEGORIES.light.length + 2) && (words !== "none" || used.has(k));
     element("legend").replaceChildren(
       ...groups.filter(isSeen).map(([colour, words]) => {
         const swatch = make("span", { class: "swatch" });
@@ -186,16 +183,12 @@ class Explorer {
     const { report } = this;
     const set = report.slipSet[slip];
     const seed = report.slips.jobs[report.slipJob[slip]][1];
-    const named = (name) => {
-      const { unit, values } = report.slip.get(name);
-      return `${name} = ${number(values[slip])} ${unit}`.trim();
-    };
     const names = ["phase", "eta", "interval", "tau / T", ...shown].filter((name) => report.slip.has(name));
     const given = [...new Set(names)].filter((name) => !Number.isNaN(report.slip.get(name).values[slip]));
     return [
       make("strong", {}, `${report.name(set)}, seed ${seed}, slip ${report.slip.get("slip").values[slip]}`),
       report.settings(set),
-      given.map(named).join(", "),
+      given.map((name) => setting(report.slip.get(name), slip)).join(", "),
       make("code", { class: "command" }, report.command(set, seed)),
     ];
   }
@@ -203,9 +196,7 @@ class Explorer {
   /** What is said of a set. */
   setTip(set, names) {
     const { report } = this;
-    const given = names
-      .map((name) => report.columns.get(name))
-      .map(({ name, unit, values }) => `${name} = ${number(values[set])} ${unit}`.trim());
+    const given = names.map((name) => setting(report.columns.get(name), set));
     return [
       make(
         "strong",
@@ -258,7 +249,7 @@ class Explorer {
       `mean φ = ${number(means[k])} rad, 95 %: ${number(low[k])} to ${number(high[k])} rad`,
     ];
     this.phase.show({
-      x: { label: "η = 2πΔ / (T V0)", log: true },
+      x: { label: report.slip.get("eta").label, log: true },
       y: { label: "φ (rad)" },
       layers: [
         ...this.slipLayers(eta, phase),
@@ -269,7 +260,7 @@ class Explorer {
       ],
       key: [
         [mean, "mean of sets with a phase, 95 %"],
-        [red, "−2√(π/η); dashed: φ_min, Eq. 2", "stroke"],
+        [red, "−2√(π/η); dashed: φₘᵢₙ of Eq. 2", "stroke"],
       ],
       empty: "no slip under modulation",
     });
@@ -277,7 +268,7 @@ class Explorer {
 
   drawRatio() {
     const { report } = this;
-    const [period, ratio] = ["T_onset", "tau / T"].map((name) => report.slip.get(name).values);
+    const [period, ratio] = ["T_onset", "tau / T"].map((name) => scaled(report.slip.get(name)));
     const [low, high] = extremes(ratio, this.slipGroup);
     const whole = [1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 70, 100, 200, 500, 1000].filter(
       (n) => n > 0.7 * low && n < 1.1 * high,
@@ -292,7 +283,7 @@ class Explorer {
       label: `n = ${n}`,
     });
     this.ratio.show({
-      x: { label: "T (s)", log: true },
+      x: { label: short(report.slip.get("T_onset")), log: true },
       y: { label: "τ / T", log: true },
       layers: [...whole.map(line), ...this.slipLayers(period, ratio)],
       key: [[cssColour("line"), "whole numbers of periods", "stroke"]],
@@ -324,13 +315,13 @@ class Explorer {
   drawFree() {
     const { report } = this;
     const [x, y] = ["x", "y"].map((key) => this.table().get(this.axisName(key)));
-    const axes = { x: { label: titled(x), log: this.isLog("x") }, y: { label: titled(y), log: this.isLog("y") } };
+    const axes = { x: { label: x.label, log: this.isLog("x") }, y: { label: y.label, log: this.isLog("y") } };
     const key = [
       ["transparent", `y: ${y.meaning}`],
       ["transparent", `x: ${x.meaning}`],
     ];
     if (this.chosen("of") === "slips") {
-      const layers = this.slipLayers(x.values, y.values).map((layer) =>
+      const layers = this.slipLayers(scaled(x), scaled(y)).map((layer) =>
         layer.tip ? { ...layer, tip: (slip) => this.slipTip(slip, [x.name, y.name]) } : layer,
       );
       this.free.show({ ...axes, layers, key });

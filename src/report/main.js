@@ -56,7 +56,7 @@ async function start() {
     const { shown, problems } = filtered(report, state.filter);
     const left = shown.reduce((sum, isShown) => sum + isShown, 0);
     const hint =
-      "Examples: V0>1e-5, regime=sliding, has_phase=true, or the first characters of a set. All conditions must hold.";
+      "Examples, in SI units: V0>1e-5, regime=sliding, has_phase=true, or the first characters of a set. All conditions must hold.";
     element("filter-note").textContent =
       problems.join(" ") || (state.filter ? `${counted(left, "set")} of ${many(report.setCount)} fit.` : hint);
     element("filter-note").classList.toggle("bad", problems.length > 0);
@@ -119,7 +119,7 @@ function writeSamples(report) {
     samples.push(`The page has one in ${sets} of ${counted(census.sets, "set")}, ${many(setCount)} in all.`);
   }
   if (slips.every > 1) {
-    samples.push(`The charts have one in ${slips.every} slips of these sets, ${many(slips.rows)} in all.`);
+    samples.push(`The charts have one in ${slips.every} slips of these sets, ${many(slips.job.length)} in all.`);
     samples.push("Histograms and statistics count every slip.");
   }
   element("sample-note").textContent = samples.join(" ");

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! tables.rs    reduced tables, column by column: the sets, their histograms
-//! slips.rs     slips, or a sample of them, in few bytes
+//! slips.rs     slips, or a sample of them
 //! content.rs   both, with the sweep, how far it is, its cost and its runs
 //! page.rs      content and page.html, style.css, *.js -> one file
 //! ```
@@ -30,8 +30,7 @@ const ADVICE: &str = "`stickslip verify` says what to do about damage";
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
 pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> {
     renew(results)?;
-    let (content, slips) = content::content(results, refresh)?;
-    page::html(&content, &slips).context("the report cannot be encoded")
+    page::html(&content::content(results, refresh)?).context("the report cannot be encoded")
 }
 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.

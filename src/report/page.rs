@@ -24,9 +24,9 @@ const SCRIPTS: [&str; 9] = [
     include_str!("main.js"),
 ];
 
-/// The page of this content and these bytes of its slips.
-pub(super) fn html(content: &Json, slips: &[u8]) -> Result<String> {
-    let data = data(&content.to_string().into_bytes(), slips)?;
+/// The page of this content.
+pub(super) fn html(content: &Json) -> Result<String> {
+    let data = data(content)?;
     let script = format!("\"use strict\";\n{}", SCRIPTS.concat());
     // Scripts and styles other than these do not count, and nothing is loaded.
     let policy = format!(
@@ -38,12 +38,10 @@ pub(super) fn html(content: &Json, slips: &[u8]) -> Result<String> {
     Ok(parts.into_iter().fold(PAGE.to_owned(), |page, (name, text)| page.replacen(&format!("{{{{{name}}}}}"), text, 1)))
 }
 
-/// Length of the JSON, the JSON, the slips: compressed, in characters that mean nothing in HTML.
-fn data(json: &[u8], slips: &[u8]) -> Result<String, io::Error> {
+/// The content, compressed, in characters that mean nothing in HTML.
+fn data(content: &Json) -> Result<String, io::Error> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(&(json.len() as u64).to_le_bytes())?;
-    encoder.write_all(json)?;
-    encoder.write_all(slips)?;
+    encoder.write_all(content.to_string().as_bytes())?;
     Ok(BASE64_STANDARD.encode(encoder.finish()?))
 }
 
@@ -58,7 +56,7 @@ mod tests {
 
     #[test]
     fn no_text_of_the_content_is_html() {
-        let data = data(b"{\"name\":\"</script><script>alert(1)</script>\\u2028<!--\"}", &[0, 255, 60]).unwrap();
+        let data = data(&"</script><script>alert(1)</script>\u{2028}<!--".into()).unwrap();
         assert!(data.chars().all(|c| c.is_ascii_alphanumeric() || "+/=".contains(c)), "{data}");
     }
 

@@ -14,23 +14,15 @@ function writeSweep(report) {
   const done = `${counted(census.sets, "parameter set")}, ${counted(status.jobs_done, "job")} done${failed}${missing}`;
   element("summary").textContent = `Report of stickslip: ${done}, ${counted(census.slips, "slip")}.`;
   const axis = new Map(report.axes.flatMap(([keys, count]) => keys.split(", ").map((key) => [key, count])));
-  const swept = report.swept.map(({ key, symbol, unit, meaning }) => {
-    const values = report.values(key).filter((value) => value !== null);
-    const distinct = [...new Set(values)];
-    const isNumber = typeof distinct[0] === "number";
-    const range = isNumber
-      ? [distinct.reduce((a, b) => Math.min(a, b)), distinct.reduce((a, b) => Math.max(a, b))]
-      : null;
-    const words =
-      distinct.length <= 6
-        ? distinct
-            .sort((a, b) => a - b)
-            .map((value) => number(value))
-            .join(", ")
-        : `${number(range[0])} to ${number(range[1])}`;
-    return [symbol && symbol !== key ? `${key} (${symbol})` : key, meaning, many(distinct.length), words, unit];
+  const named = ({ name, symbol }) => (symbol === name ? name : `${symbol} (${name})`);
+  const swept = report.swept.map((column) => {
+    const distinct = [...new Set(column.values)].filter((value) => value !== null);
+    if (isNumeric(column)) distinct.sort((a, b) => a - b);
+    const words = distinct.map((value) => shownValue(column, column.values.indexOf(value)));
+    const range = words.length <= 6 ? words.join(", ") : `${words[0]} to ${words[words.length - 1]}`;
+    return [named(column), column.meaning, many(distinct.length), range, column.unit];
   });
-  const derived = [...axis].filter(([key]) => !report.swept.some((parameter) => parameter.key === key));
+  const derived = [...axis].filter(([key]) => !report.swept.some(({ name }) => name === key));
   const others = derived.map(([key, count]) => [
     key,
     key === "seed" ? "realisations of the disorder" : "fixes the period T",
@@ -39,7 +31,7 @@ function writeSweep(report) {
     "",
   ]);
   element("swept").replaceChildren(...rows(["Parameter", "Meaning", "Values", "Range", "Unit"], [...swept, ...others]));
-  const fixed = report.fixed.map(({ key, unit, meaning }) => [key, meaning, number(report.values(key)[0], 6), unit]);
+  const fixed = report.fixed.map((column) => [named(column), column.meaning, shownValue(column, 0, 6), column.unit]);
   element("fixed").replaceChildren(...rows(["Parameter", "Meaning", "Value", "Unit"], fixed));
   const last = report.sweeps.length - 1;
   element("sweep-files").replaceChildren(

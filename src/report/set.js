@@ -23,17 +23,18 @@ class SetView {
     else add(selected);
     const total = [...counts.values()].reduce((sum, count) => sum + count, 0);
     const bins = [...counts.keys()].sort((a, b) => a - b);
-    const width = (selected < 0 ? 1 : (mean[selected] ?? 1)) / 60;
+    const { factor, unit } = report.columns.get("tau_mean");
+    const width = (selected < 0 ? 1 : factor * (mean[selected] ?? 1)) / 60;
     const y = bins.map((bin) => counts.get(bin));
     const tip = (k) => [
-      `${number(bins[k] * width)} to ${number((bins[k] + 1) * width)}${selected < 0 ? "" : " s"}: ${counted(y[k], "interval")}`,
+      `${number(bins[k] * width)} to ${number((bins[k] + 1) * width)}${selected < 0 ? "" : ` ${unit}`}: ${counted(y[k], "interval")}`,
     ];
     const period = selected < 0 ? null : report.values("T")[selected];
     const multiples =
-      period && report.values("ramp_time")[selected] === 0 ? this.multiples(period, bins, width, y) : [];
+      period && report.values("ramp_time")[selected] === 0 ? this.multiples(factor * period, bins, width, y) : [];
     this.histogram.title = selected < 0 ? "τ of all sets that are shown" : "τ of the set";
     this.histogram.show({
-      x: { label: selected < 0 ? "τ / mean τ of its set" : "interval τ (s)" },
+      x: { label: selected < 0 ? "τ / mean τ of its set" : `interval τ (${unit})` },
       y: { label: `intervals, of ${many(total)}`, whole: true },
       layers: [
         ...multiples,
@@ -76,17 +77,17 @@ class SetView {
     const { selected } = this.explorer;
     const name = report.isModulated ? "phase" : "interval";
     const slips = [...report.slipSet.keys()].filter((slip) => report.slipSet[slip] === selected);
-    const [x, y] = ["onset", name].map((column) => slips.map((slip) => report.slip.get(column).values[slip]));
-    const jobs = [...new Set(slips.map((slip) => report.slipJob[slip]))];
-    const group = Uint8Array.from(slips, (slip) => jobs.indexOf(report.slipJob[slip]) % DISTINCT);
-    const tip = (k) => this.explorer.slipTip(slips[k]);
+    const [x, y] = ["onset", name].map((column) => scaled(report.slip.get(column)));
     const shades = ink(CATEGORIES);
-    const seeds = jobs.slice(0, DISTINCT).map((job, k) => [shades[k], `seed ${report.slips.jobs[job][1]}`]);
+    const jobs = [...new Set(slips.map((slip) => report.slipJob[slip]))];
+    const group = Uint8Array.from(slips, (slip) => jobs.indexOf(report.slipJob[slip]) % shades.length);
+    const tip = (k) => this.explorer.slipTip(slips[k]);
+    const seeds = jobs.slice(0, shades.length).map((job, k) => [shades[k], `seed ${report.slips.jobs[job][1]}`]);
     this.sequence.show({
-      x: { label: "time t of the onset (s)" },
-      y: { label: name === "phase" ? "φ (rad)" : "τ (s)" },
-      layers: [{ type: "points", x, y, group, colours: shades, size: 3.5, tip }],
-      key: jobs.length > DISTINCT ? [["transparent", `${jobs.length} seeds`]] : seeds,
+      x: { label: short(report.slip.get("onset")) },
+      y: { label: short(report.slip.get(name)) },
+      layers: [{ type: "points", x: slips.map((slip) => x[slip]), y: slips.map((slip) => y[slip]), group, colours: shades, size: 3.5, tip }],
+      key: jobs.length > shades.length ? [["transparent", `${jobs.length} seeds`]] : seeds,
       empty: selected < 0 ? "select a set: click a point, or a row of the table" : "the set has no slips here",
     });
     this.facts();
@@ -100,18 +101,17 @@ class SetView {
       facts.replaceChildren(make("p", {}, "None is selected. Click a point of a chart, or a row of the table."));
       return;
     }
-    const value = (name) => {
-      const { values, unit } = report.columns.get(name);
-      return `${typeof values[selected] === "boolean" ? (values[selected] ? "yes" : "no") : number(values[selected])} ${unit}`.trim();
+    const value = (name) => withUnit(report.columns.get(name), selected);
+    const interval = (name) => {
+      const [low, high] = ["low", "high"].map((end) => report.columns.get(`${name}_${end}`));
+      const { factor } = report.columns.get(name);
+      const ends = [low, high].map((end) => number(factor * end.values[selected]));
+      return low.values[selected] === null ? value(name) : `${value(name)} (95 %: ${ends[0]} to ${ends[1]})`;
     };
-    const interval = (name) =>
-      report.values(`${name}_low`)[selected] === null
-        ? value(name)
-        : `${value(name)} (95 %: ${number(report.values(`${name}_low`)[selected])} to ${number(report.values(`${name}_high`)[selected])})`;
-    const swept = report.swept.map(({ key, meaning }) => [`${key}, ${meaning}`, value(key)]);
+    const swept = report.swept.map(({ name, symbol, meaning }) => [`${symbol}, ${meaning}`, value(name)]);
     const modulated = report.isModulated
       ? [
-          ["eta", value("eta")],
+          ["η", value("eta")],
           ["locking index", interval("locking_index")],
           ["mean phase", value("has_phase") === "yes" ? interval("phase_mean") : "none"],
           ["resultant length", interval("resultant_length")],

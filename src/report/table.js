@@ -55,7 +55,7 @@ class SetTable {
     this.table = element("sets-table");
     const names = [...report.columns.keys()];
     const usual = [
-      ...report.swept.map(({ key }) => key),
+      ...report.swept.map(({ name }) => name),
       ...(report.isModulated ? ["eta"] : []),
       "jobs",
       ...(report.status.jobs_failed ? ["failed_jobs"] : []),
@@ -82,9 +82,9 @@ class SetTable {
       keep({ columns: names.join(" ") === this.usual.join(" ") ? "" : names.join(" ") });
       this.draw();
     };
-    const { meaning } = this.report.columns.get(name);
+    const { label, meaning } = this.report.columns.get(name);
     const input = make("input", { type: "checkbox", checked: this.chosen.has(name), onchange: toggle });
-    return make("label", { title: meaning }, input, ` ${name}`);
+    return make("label", { title: `${name}: ${meaning}` }, input, ` ${label}`);
   }
 
   turn(step) {
@@ -142,13 +142,13 @@ class SetTable {
       scope: "col",
       "data-column": name,
       "aria-sort": order,
-      title: column.meaning,
+      title: `${name}: ${column.meaning}`,
       class: isNumeric(column) ? "number" : "text",
     };
     return make(
       "th",
       attributes,
-      make("button", { type: "button", onclick: sort }, name),
+      make("button", { type: "button", onclick: sort }, column.symbol),
       make("small", {}, column.unit || " "),
     );
   }
@@ -172,7 +172,7 @@ class SetTable {
     const rows = order.slice(page * ROWS, (page + 1) * ROWS).map((set) => this.row(set, names));
     this.table.replaceChildren(head, make("tbody", {}, ...rows));
     element("sets-note").textContent =
-      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together, units are SI.`;
+      `${counted(order.length, "set")} of ${many(this.report.setCount)}; all seeds of a set together. Filters and CSV have the names that heads show when pointed at, and SI units.`;
     element("page").textContent = `Page ${page + 1} of ${pages}`;
     element("earlier").disabled = page === 0;
     element("later").disabled = page === pages - 1;
@@ -181,8 +181,7 @@ class SetTable {
 }
 
 function cell(column, place) {
-  const value = column.values[place];
   const kind = isNumeric(column) ? "number" : "text";
-  if (value === null) return make("td", { class: `${kind} missing` }, "–");
-  return make("td", { class: kind }, column.kind === "flag" ? (value ? "yes" : "no") : number(value, 5));
+  if (column.values[place] === null) return make("td", { class: `${kind} missing` }, "–");
+  return make("td", { class: kind }, shownValue(column, place, 5));
 }

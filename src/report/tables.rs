@@ -4,7 +4,7 @@ use crate::model::Parameters;
 use crate::observe::Regime;
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
 use crate::results::layout::Layout;
-use crate::sweep::{Job, Sweep, label};
+use crate::sweep::{Job, Label, Sweep, label};
 use crate::table::columns::{Column, Row, Table, Value, columns};
 use crate::table::file::{Dataset, DatasetError};
 use serde::Serialize;
@@ -13,44 +13,49 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Sets up to which all are shown; of more, every k-th. Each takes some 300 bytes of the page.
 const MAX_SETS: u64 = 5_000;
-/// Decimals of a mantissa: six digits are more than any interval of confidence leaves.
-const DECIMALS: usize = 5;
-
-/// A column as the page describes it.
-pub(super) fn described(Column { name, unit, meaning, kind, .. }: &Column) -> Json {
-    json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
-}
+/// Decimals of a mantissa: five digits are more than any interval of confidence leaves.
+const DECIMALS: usize = 4;
 
 #[derive(Debug, Serialize)]
 pub(super) struct Columns {
     columns: Vec<Json>,
     values: Vec<Vec<Json>>,
+    /// Those of the rows, and whether the page has them.
+    #[serde(skip)]
+    all: Vec<(Column, bool)>,
 }
 
 impl Columns {
-    fn new<R: Row>() -> Self {
-        let columns: Vec<Json> = R::columns().iter().map(described).collect();
+    /// The columns of a row type with these names.
+    pub(super) fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
+        let all: Vec<(Column, bool)> =
+            R::columns().into_iter().map(|column| (column.clone(), is_shown(&column.name))).collect();
+        let columns: Vec<Json> = all.iter().filter(|column| column.1).map(|(Column { name, unit, meaning, kind, .. }, _)| {
+            json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
+        }).collect();
         let values = columns.iter().map(|_| Vec::new()).collect();
-        Self { columns, values }
+        Self { columns, values, all }
     }
 
-    /// With the label of each column, in the unit in which its values are read best, and the factor to that.
-    fn labelled(mut self) -> Self {
-        for (column, values) in self.columns.iter_mut().zip(&self.values) {
-            let label = label(column["name"].as_str().unwrap_or_default());
+    /// Gives each column its label in the unit in which its values are read best, and the factor to that.
+    pub(super) fn label(&mut self, label: impl Fn(&Column) -> Label) {
+        let labels = self.all.iter().filter(|column| column.1).map(|column| label(&column.0));
+        for ((column, values), label) in self.columns.iter_mut().zip(&self.values).zip(labels) {
             let largest = values.iter().filter_map(Json::as_f64).fold(0.0, |most, value| value.abs().max(most));
             let (factor, unit) = label.scale(largest);
             column["label"] = label.axis(unit).into();
-            column["short"] = label.short(unit).into();
+            column["symbol"] = label.symbol.into();
+            column["unit"] = unit.into();
             column["factor"] = factor.into();
         }
-        self
     }
 
-    fn push<R: Row>(&mut self, row: &R) {
-        let mut columns = self.values.iter_mut();
+    pub(super) fn push<R: Row>(&mut self, row: &R) {
+        let (mut all, mut values) = (self.all.iter(), self.values.iter_mut());
         row.cells(&mut |cell| {
-            if let Some(column) = columns.next() {
+            if all.next().is_some_and(|column| column.1)
+                && let Some(column) = values.next()
+            {
                 column.push(json(cell));
             }
         });
@@ -131,7 +136,7 @@ impl Sets {
     /// Every k-th of the sets in the reduced data.
     pub(super) fn read(layout: &Layout<'_>, sweep: &Sweep, spacing: u64) -> Result<Self, DatasetError> {
         let mut sets = Self {
-            columns: Columns::new::<SetRow>(),
+            columns: Columns::of::<SetRow>(|_| true),
             commands: Vec::new(),
             command_end: String::new(),
             histograms: Vec::new(),
@@ -146,7 +151,7 @@ impl Sets {
                 shown.push(row);
             }
         }
-        sets.columns = std::mem::replace(&mut sets.columns, Columns::new::<SetRow>()).labelled();
+        sets.columns.label(|column| label(&column.name));
         sets.swept = swept(&shown).iter().map(|swept| (swept.name().to_owned(), swept.is_logarithmic())).collect();
         let bins = Dataset::new(layout.storage, vec![layout.reduced_file(HistogramBin::NAME)]);
         for batch in bins.rows::<HistogramBin>() {
@@ -181,7 +186,7 @@ fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
 }
 
 pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, DatasetError> {
-    let mut columns = Columns::new::<BackboneBin>();
+    let mut columns = Columns::of::<BackboneBin>(|_| true);
     for bin in read_reduced::<BackboneBin>(layout)? {
         columns.push(&bin);
     }
@@ -194,8 +199,8 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn a_number_keeps_six_digits_and_a_value_that_is_none_is_null() {
-        assert_eq!(json(Value::Real(0.000_123_456_789)), 0.000_123_457);
+    fn a_number_keeps_five_digits_and_a_value_that_is_none_is_null() {
+        assert_eq!(json(Value::Real(0.000_123_456_789)), 0.000_123_46);
         assert_eq!(json(Value::Real(1e-300)), 1e-300);
         assert_eq!(json(Value::Real(f64::INFINITY)), Json::Null);
         assert_eq!(json(Value::Real(f64::NAN)), Json::Null);
