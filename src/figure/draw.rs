@@ -1,8 +1,7 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
 use super::{BadOption, Format, Look, OwnFigure, Picture};
-use super::{backbone, drag, edges, histograms, intervals, locking_map, regimes, staircase};
-use super::{own, sets};
+use super::{backbone, drag, edges, histograms, intervals, map, own, sets};
 use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
@@ -28,7 +27,7 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        let maps = [locking_map::locking_map, staircase::staircase, regimes::regime_map].map(|map| map(&sets, look));
+        let maps = [map::map, own::staircase].map(|map| map(&sets, look));
         // Where a map shows all, it would be a net of lines.
         if maps.iter().all(Option::is_none) {
             pictures.extend(own::overview(&sets, look));

@@ -1,42 +1,139 @@
-//! Maps: sets on a grid of two quantities, each a cell, with words in the middle of regions of equal cells.
+//! Maps: sets on a grid of two quantities, each a cell with the colour of what was found, and words in the middle of regions
+//! of equal cells. The locking map lies over period and amplitude of the modulation, a regime map over two other parameters.
 
-use super::axis::Axis;
-use super::frame::OVERLAP;
-use super::panel::{Cell, Layer};
-use super::picture::Stroke;
-use super::sets::Grid;
-use crate::reduce::{SetRow, ascending};
+use super::axis::{Axis, DECADES, bounds};
+use super::colour_bar::ColourBar;
+use super::frame::{Layout, OVERLAP};
+use super::legend::{Mark, entry};
+use super::own::Asked;
+use super::panel::{self, Cell, Layer, Panel, Place};
+use super::picture::{Fill, Ink, Picture, Stroke};
+use super::sets::{Grid, period_column};
+use super::style::{BLACK, Look, WHITE, diverging, shade};
+use crate::model::Symbol;
+use crate::observe::Regime;
+use crate::reduce::{SetRow, differing};
 use kuva::render::color::Color;
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 
+/// Numbers of periods that have a colour of their own; larger ones share one.
+const MAX_PERIODS: f64 = 12.0;
+/// Share of the scale at the least number of periods, which is not to be taken for the ground.
+const FIRST_SHADE: f64 = 0.22;
+/// Least end of the scale of the excess, so that chance is pale.
+const MIN_EXCESS: f64 = 0.2;
 /// Cells across a region that has its word in it.
 const MIN_ACROSS: usize = 3;
-
-type Quantity<'a> = dyn Fn(&SetRow) -> Option<f64> + 'a;
+const LINE: Stroke = Stroke::solid(BLACK, 1.8);
+/// Under the line, so that it is seen on dark cells.
+const CASING: Stroke = Stroke::solid(WHITE, 4.4);
+const BORDER: Stroke = Stroke::solid(BLACK, 1.6);
+/// Sets without a phase.
+const FREE: Ink = "#f2f2f0";
 
 /// A column and a row of a map.
 type Position = (usize, usize);
 
-pub(super) struct Map<'a> {
-    columns: Grid,
-    rows: Grid,
-    sets: Vec<(&'a SetRow, Position)>,
+/// Draws the map of sets in which two parameters alone differ and fill at least half of a grid: of 8 amplitudes and periods or
+/// more, or of 4 values or more of two other parameters; `None` for others. Sets without modulation do not count.
+pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
+    // The drive velocity is the x axis wherever it is one.
+    let [horizontal, vertical] = match differing(&sets.iter())[..] {
+        [first, Symbol::V0] => [Symbol::V0, first],
+        [first, second] if first == Symbol::Delta || ![first, second].contains(&Symbol::T) => [first, second],
+        _ => return None,
+    };
+    let is_locking = vertical == Symbol::T;
+    let columns = if is_locking { [period_column(sets), "Delta"] } else { [horizontal.key(), vertical.key()] };
+    let of = |column: &str| Asked::of(sets, "map", column).ok();
+    let [x, y] = [of(columns[0])?, of(columns[1])?];
+    let map = Map::of(&x, &y, if is_locking { 8 } else { 4 })?;
+    let (x_axis, y_axis) = (map.columns.axis(&x.axis_label()), map.rows.axis(&y.axis_label()));
+    let modulated = sets.iter().find(|set| set.parameters.modulation_period.is_some());
+    let lines = || match modulated.filter(|_| is_locking) {
+        Some(set) => {
+            let amplitude = |place| y.factor * set.parameters.drive_velocity * x.period(place) / TAU;
+            let places: Vec<Place> = x_axis.evenly_placed(200).map(|place| (place, amplitude(place))).collect();
+            [CASING, LINE].map(|stroke| Layer::Curve(places.clone(), stroke)).into()
+        }
+        None => map.borders(|set| sets[set].regime, BORDER),
+    };
+    let panel = |column: &str| {
+        let quantity = of(column)?;
+        let is_of_periods = column == "periods";
+        let is_known = |set: &usize| !is_of_periods || sets[*set].has_phase;
+        let number = |set: usize| quantity.number(set).filter(|_| is_known(&set));
+        let ends = || {
+            bounds((0..sets.len()).filter_map(number).map(|n| if is_of_periods { n.min(MAX_PERIODS + 1.0) } else { n }))
+        };
+        let label = quantity.axis_label();
+        let scale = match column {
+            "periods" => {
+                let (first, last) = ends().unwrap_or_default();
+                let steps = (last - first).max(1.0);
+                Axis::linear("n = τ / T", first - steps * FIRST_SHADE / (1.0 - FIRST_SHADE), first + steps)
+            }
+            "resultant_excess" => {
+                let (low, high) = ends()?;
+                let most = MIN_EXCESS.max(-low).max(high);
+                Axis::linear(&label, -most, most)
+            }
+            "slip_share" | "locking_index" => Axis::linear(&label, 0.0, 1.0),
+            _ => Axis::of_data(&label, (0..sets.len()).filter_map(number), DECADES, 0.0)?,
+        };
+        let colour = if column == "resultant_excess" { diverging } else { shade };
+        let mut bar = ColourBar::of_axis(&scale, colour);
+        if is_of_periods {
+            let (first, last) = ends().unwrap_or_default();
+            let all = || (0..=u32::MAX).map(|step| first + f64::from(step)).take_while(|&n| n <= last);
+            let text = |n: f64| if n > MAX_PERIODS { format!(">{MAX_PERIODS}") } else { n.to_string() };
+            bar.colours = all().map(|n| shade(scale.place(n))).collect();
+            bar.ticks = all().map(|n| ((n - first + 0.5) / (last - first + 1.0), text(n))).collect();
+        }
+        let none = is_of_periods.then(|| Color::from(FREE));
+        let cells = map.coloured(|set| number(set).map(|n| colour(scale.place(n))).or_else(|| none.clone()));
+        let word = |set: usize| match column {
+            "periods" => number(set).map(|n| (n.to_string(), scale.place(n))),
+            "slip_share" => sets[set]
+                .regime
+                .map(|regime| (regime.word().to_owned(), f64::from(u8::from(regime != Regime::StickSlip)))),
+            _ => None,
+        };
+        let layers = std::iter::once(Layer::Inside(std::iter::once(cells).chain(lines()).collect()));
+        let layers = layers.chain(map.words(word)).collect();
+        let height = if is_locking { 280.0 } else { 220.0 };
+        Some(Panel { bar: Some(bar), ..Panel::new(height, x_axis.clone(), y_axis.clone(), layers) })
+    };
+    let (name, width, legend, found) = if is_locking {
+        let free = entry(Mark::Patch(Fill { ink: FREE, opacity: 1.0 }), "no phase");
+        let legend = vec![entry(Mark::Line(LINE), "η = 1; above, the drive turns back"), free];
+        ("locking-map", 560.0, legend, ["periods", "locking_index", "resultant_excess"])
+    } else {
+        let borders = entry(Mark::Line(BORDER), "borders of stick-slip, mixed, sliding; no slips where white");
+        ("regime-map", 490.0, vec![borders], ["slip_share", "mean_friction", "tau_mean"])
+    };
+    let panels = found.into_iter().filter_map(panel).collect();
+    Some(panel::draw(name, look, Layout::column(width), &legend, panels))
 }
 
-impl<'a> Map<'a> {
-    /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
-    pub(super) fn of(sets: &[&'a SetRow], quantities: [&Quantity<'_>; 2], min_values: usize) -> Option<Self> {
-        let values = quantities.map(|quantity| ascending(sets.iter().filter_map(|set| quantity(set))));
-        let is_grid = values.iter().all(|values| values.len() >= min_values)
-            && 2 * sets.len() >= values[0].len() * values[1].len();
-        let [columns, rows] = is_grid.then(|| values.map(Grid::of))?;
-        let position = |set| Some((columns.index_of(quantities[0](set)?), rows.index_of(quantities[1](set)?)));
-        let sets = sets.iter().filter_map(|set| Some((*set, position(set)?))).collect();
-        Some(Self { columns, rows, sets })
-    }
+struct Map {
+    columns: Grid,
+    rows: Grid,
+    /// Those that lie on the grid, by their number.
+    sets: Vec<(usize, Position)>,
+}
 
-    pub(super) fn axes(&self, x_label: &str, y_label: &str) -> (Axis, Axis) {
-        (self.columns.axis(x_label), self.rows.axis(y_label))
+impl Map {
+    /// `None` for fewer values of either quantity than `min_values`, or if less than half of their grid is filled.
+    fn of(x: &Asked<'_>, y: &Asked<'_>, min_values: usize) -> Option<Self> {
+        let [columns, rows] = [x, y].map(|asked| Grid::of(asked.distinct().collect()));
+        let position = |set| Some((columns.index_of(x.number(set)?), rows.index_of(y.number(set)?)));
+        let sets: Vec<(usize, Position)> =
+            (0..x.column.values.numbers.len()).filter_map(|set| Some((set, position(set)?))).collect();
+        let counts = [columns.count(), rows.count()];
+        let is_grid = counts.iter().all(|count| *count >= min_values) && 2 * sets.len() >= counts[0] * counts[1];
+        is_grid.then_some(Self { columns, rows, sets })
     }
 
     fn cell(&self, (column, row): Position) -> Cell {
@@ -44,16 +141,16 @@ impl<'a> Map<'a> {
     }
 
     /// The sets that have a colour.
-    pub(super) fn coloured<'l>(&self, colour: impl Fn(&SetRow) -> Option<Color>) -> Layer<'l> {
+    fn coloured<'l>(&self, colour: impl Fn(usize) -> Option<Color>) -> Layer<'l> {
         let cells = self.sets.iter().filter_map(|&(set, position)| Some((self.cell(position), colour(set)?)));
         Layer::Cells(cells.collect(), OVERLAP)
     }
 
     /// Lines between neighbours that are of different kinds.
-    pub(super) fn borders<'l, K: PartialEq>(&self, kind: impl Fn(&SetRow) -> K, stroke: Stroke) -> Vec<Layer<'l>> {
+    fn borders<'l, K: PartialEq>(&self, kind: impl Fn(usize) -> K, stroke: Stroke) -> Vec<Layer<'l>> {
         let kinds: BTreeMap<Position, K> = self.sets.iter().map(|&(set, position)| (position, kind(set))).collect();
         let differs = |position, next| kinds.get(&next).is_some_and(|other| *other != kinds[&position]);
-        let border = |&(_, (column, row)): &(&SetRow, Position)| {
+        let border = |&(_, (column, row)): &(usize, Position)| {
             let ((left, right), (bottom, top)) = self.cell((column, row));
             let upright = differs((column, row), (column + 1, row)).then(|| vec![(right, bottom), (right, top)]);
             let level = differs((column, row), (column, row + 1)).then(|| vec![(left, top), (right, top)]);
@@ -62,33 +159,25 @@ impl<'a> Map<'a> {
         self.sets.iter().flat_map(border).map(|line| Layer::Curve(line, stroke)).collect()
     }
 
-    /// The words of regions with equal numbers, and their shades.
-    pub(super) fn words<'l>(
-        &self,
-        number: impl Fn(&SetRow) -> Option<usize>,
-        word: impl Fn(usize) -> (String, f64),
-    ) -> Vec<Layer<'l>> {
-        let numbers = self.sets.iter().filter_map(|&(set, position)| Some((position, number(set)?))).collect();
-        let word = |(position, number)| {
-            let (text, share) = word(number);
-            Layer::Word(self.cell(position), text, share)
-        };
-        middles(&numbers).into_iter().map(word).collect()
+    /// The words of regions with equal ones, each with its shade.
+    fn words<'l>(&self, word: impl Fn(usize) -> Option<(String, f64)>) -> impl Iterator<Item = Layer<'l>> {
+        let words = self.sets.iter().filter_map(|&(set, position)| Some((position, word(set)?))).collect();
+        middles(&words).into_iter().map(|(position, (text, share))| Layer::Word(self.cell(position), text, share))
     }
 }
 
-/// The innermost cell of each region that has room for its number. A region is what hangs together of equal numbers.
-fn middles(numbers: &BTreeMap<Position, usize>) -> Vec<(Position, usize)> {
+/// The innermost cell of each region that has room for its word. A region is what hangs together of equal words.
+fn middles<K: PartialEq + Clone>(words: &BTreeMap<Position, K>) -> Vec<(Position, K)> {
     let around = |(column, row): Position| {
         [(column + 1, row), (column.wrapping_sub(1), row), (column, row + 1), (column, row.wrapping_sub(1))]
     };
-    let mut left: BTreeSet<Position> = numbers.keys().copied().collect();
+    let mut left: BTreeSet<Position> = words.keys().copied().collect();
     let mut found = Vec::new();
     while let Some(start) = left.pop_first() {
-        let (n, mut region, mut edge) = (numbers[&start], BTreeSet::from([start]), vec![start]);
+        let (word, mut region, mut edge) = (&words[&start], BTreeSet::from([start]), vec![start]);
         while let Some(cell) = edge.pop() {
             for next in around(cell) {
-                if numbers.get(&next) == Some(&n) && left.remove(&next) {
+                if words.get(&next) == Some(word) && left.remove(&next) {
                     region.insert(next);
                     edge.push(next);
                 }
@@ -105,21 +194,112 @@ fn middles(numbers: &BTreeMap<Position, usize>) -> Vec<(Position, usize)> {
             (region, across) = (inner, across + 2);
         }
         let middle = region.iter().nth(region.len() / 2).copied();
-        found.extend(middle.filter(|_| across >= MIN_ACROSS).map(|cell| (cell, n)));
+        found.extend(middle.filter(|_| across >= MIN_ACROSS).map(|cell| (cell, word.clone())));
     }
     found
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::sets::tests::set;
     use super::*;
+    use crate::model::Parameters;
+    use crate::model::selected::Selected;
+
+    fn grid(amplitudes: u32, periods: u32) -> Vec<SetRow> {
+        let row = |row: u32| {
+            (1..=periods).map(move |column| set(1e-7 * f64::from(row), 0.01 * f64::from(column), f64::from(column)))
+        };
+        (1..=amplitudes).flat_map(row).collect()
+    }
+
+    #[test]
+    fn only_a_grid_of_modulations_becomes_a_map() {
+        let mut sets = grid(8, 9);
+        assert!(map(&sets, &Look::default()).is_some());
+        assert!(map(&sets[..30], &Look::default()).is_none(), "four amplitudes");
+        assert!(map(&grid(9, 7), &Look::default()).is_none());
+        sets.push(set(0.0, 1.0, 1.0));
+        assert!(map(&sets, &Look::default()).is_some(), "a set without modulation lies on no grid");
+        sets[3].parameters.parameters = Parameters { drive_velocity: 1e-5, ..sets[3].parameters.parameters.clone() };
+        assert!(map(&sets, &Look::default()).is_none(), "two velocities");
+    }
+
+    #[test]
+    fn a_diagonal_is_no_grid() {
+        let sets: Vec<SetRow> = (1..=20).map(|step| set(1e-7 * f64::from(step), 0.01 * f64::from(step), 3.0)).collect();
+        assert!(map(&sets, &Look::default()).is_none());
+    }
+
+    #[test]
+    fn large_numbers_of_periods_share_a_colour() {
+        let mut sets = grid(8, 8);
+        let bar = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().contains(">&gt;12<");
+        assert!(!bar(&sets));
+        sets[0].periods = Some(40);
+        assert!(bar(&sets));
+    }
+
+    #[test]
+    fn what_the_slider_adds_is_a_panel_where_there_are_controls_and_nothing_is_pale() {
+        let mut sets = grid(8, 8);
+        let drawn = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg();
+        assert!(!drawn(&sets).contains("Resultant length beyond"));
+        for (set, excess) in sets.iter_mut().zip([-0.5, 0.0, 0.5].into_iter().cycle()) {
+            set.resultant_excess = Some(excess);
+        }
+        let svg = drawn(&sets);
+        assert!(svg.contains("Resultant length beyond"));
+        for share in [0.0, 0.5, 1.0] {
+            assert!(svg.matches(&diverging(share).to_svg_string()).count() > 20, "{share}");
+        }
+    }
+
+    #[test]
+    fn sets_without_a_phase_are_as_pale_as_the_ground() {
+        let mut sets = grid(8, 8);
+        let free = |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().matches(FREE).count();
+        let none = free(&sets);
+        for set in &mut sets {
+            set.has_phase = false;
+        }
+        assert_eq!(free(&sets) - none, 64);
+    }
+
+    fn at(velocity: f64, delay: f64, share: f64) -> SetRow {
+        let plain = set(0.0, 1.0, 1e-5 / velocity);
+        let parameters =
+            Parameters { drive_velocity: velocity, reattachment_time: delay, ..plain.parameters.parameters.clone() };
+        let regime = Some(Regime::at(share));
+        let is_sliding = regime == Some(Regime::Sliding);
+        let tau_mean = plain.tau_mean.filter(|_| !is_sliding);
+        SetRow { parameters: Selected::new(parameters), slip_share: Some(share), regime, tau_mean, ..plain }
+    }
+
+    #[test]
+    fn two_parameters_make_a_map_with_lines_between_regimes() {
+        let grid = |shares: fn(u32, u32) -> f64| -> Vec<SetRow> {
+            (0..4)
+                .flat_map(|row| {
+                    (0..5).map(move |column| {
+                        at(1e-5 * f64::from(1 << column), 1e-3 * f64::from(1 << row), shares(row, column))
+                    })
+                })
+                .collect()
+        };
+        let drawn =
+            |sets: &[SetRow]| map(sets, &Look::default()).unwrap().svg().matches("stroke-width=\"1.6\"").count();
+        let without = drawn(&grid(|_, _| 0.05));
+        assert_eq!(drawn(&grid(|_, column| if column < 3 { 0.05 } else { 1.0 })), without + 3 * 4);
+        assert!(map(&grid(|_, _| 0.05)[..9], &Look::default()).is_none(), "two rows");
+    }
 
     #[test]
     fn the_innermost_cells_of_regions_are_found_and_thin_ones_left_out() {
         let block = |columns: std::ops::Range<usize>, n| {
             columns.flat_map(move |column| (0..5).map(move |row| ((column, row), n)))
         };
-        let mut numbers: BTreeMap<Position, usize> = block(0..5, 2).chain(block(5..12, 3)).collect();
+        let mut numbers: BTreeMap<Position, u32> = block(0..5, 2).chain(block(5..12, 3)).collect();
         numbers.insert((20, 20), 7);
         numbers.insert((21, 20), 7);
         assert_eq!(middles(&numbers), [((2, 2), 2), ((8, 2), 3)]);

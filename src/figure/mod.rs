@@ -2,9 +2,10 @@
 //!
 //! ```text
 //! draw.rs -> a file for each standing figure: its data, its panels; `None` where the data do not fit
-//! own.rs  -> sets against a column: the overview of a sweep, and any column against any other
+//! own.rs  -> sets against a column: the overview of a sweep, the staircase, and any column against any other
+//! map.rs  -> sets over two parameters
 //!            sets.rs                 in what sets differ, and the grid on which they lie
-//!            panel.rs                panels as data: axes, layers between them; map.rs makes layers of sets on a grid
+//!            panel.rs                panels as data: axes, layers between them
 //!            frame.rs, axis.rs       frames on a sheet, axes; legend.rs, colour_bar.rs, hues.rs explain colours
 //!            style.rs                sizes, strokes and colours of all figures
 //!            picture.rs, pdf.rs      lines, discs, text -> SVG, PNG, PDF
@@ -22,16 +23,13 @@ mod histograms;
 mod hues;
 mod intervals;
 mod legend;
-mod locking_map;
 mod map;
 mod own;
 mod panel;
 mod pdf;
 mod picture;
-mod regimes;
 mod sets;
 mod simulation;
-mod staircase;
 mod style;
 mod work_precision;
 

@@ -7,10 +7,11 @@ use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Ink, Picture, Stroke};
-use super::style::{BAR_WIDTH, BLACK, GREY, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone};
+use super::sets::period_column;
+use super::style::{BAR_WIDTH, BLACK, GREY, GRID, INKS, Look, RADIUS, REFERENCE, STRIPE, WHITE, dot, drive_alone};
 use crate::model::Symbol;
 use crate::observe::Regime;
-use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, is_same, swept};
+use crate::reduce::{FREQUENCY, SetRow, Swept, Values, ascending, differing, is_same, swept};
 use crate::sweep::Label;
 use clap::Args;
 use std::collections::BTreeMap;
@@ -19,6 +20,13 @@ use std::collections::BTreeMap;
 const QUANTITIES: [&str; 5] = ["tau_mean", "tau_sd", "mean_friction", "slip_share", "resultant_length"];
 /// Where the paper finds a significant reduction of the friction to begin, as a share of the peak force.
 const REDUCTION: Ends = (0.2, 0.3);
+/// The median interval in periods, which makes a staircase of this many periods or more and of so few amplitudes.
+const RATIO: &str = "tau_50 / T";
+const MIN_PERIODS: usize = 24;
+const MAX_AMPLITUDES: usize = 3;
+/// Ratio of the largest to the least from which it is drawn on a logarithmic axis, and whole numbers that have a line.
+const WIDE_RATIOS: f64 = 6.0;
+const MAX_LEVELS: u32 = 10;
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 400.0;
 /// Panels in a row, and in all.
@@ -35,8 +43,8 @@ const MAX_WORDS: usize = 12;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
 const LINE_WIDTH: f64 = 1.0;
-/// Sets up to which dots have their full size.
-const FEW_SETS: usize = 500;
+/// Sets up to which dots and bars have their full size.
+const FEW_SETS: usize = 200;
 const SMALL_RADIUS: f64 = 2.5;
 /// By how much the hole in the dot of a set that slides is smaller.
 const HOLE: f64 = 1.6;
@@ -89,15 +97,15 @@ fn limits(text: &str) -> Result<Limits, &'static str> {
 }
 
 /// A column as an axis or as colours.
-struct Asked<'a> {
+pub(super) struct Asked<'a> {
     option: &'static str,
-    column: Swept,
+    pub(super) column: Swept,
     /// The parameter that it shows, if it shows one.
     symbol: Option<Symbol>,
     /// What the drive alone explains of it.
     drive: Option<Values>,
     /// To the unit of the axis.
-    factor: f64,
+    pub(super) factor: f64,
     unit: &'static str,
     is_log: bool,
     /// In SI.
@@ -164,6 +172,33 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     Chart { rows, swept: &swept, x, ys, colour, panels }.draw("overview", look).ok()
 }
 
+/// Draws the staircase of sets that differ in the modulation alone, with 24 periods or more and at most 3 amplitudes: the
+/// interval in periods, on whole numbers where slips keep to it, and the locking index; `None` for others.
+pub(super) fn staircase(rows: &[SetRow], look: &Look) -> Option<Picture> {
+    let is_of_modulation = |symbol: &Symbol| matches!(symbol, Symbol::Delta | Symbol::T);
+    let asked = |column| Asked::of(rows, "y", column).ok();
+    let [x, ratio, index, colour] =
+        [asked(period_column(rows))?, asked(RATIO)?, asked("locking_index")?, asked("Delta")?];
+    let amplitudes = colour.column.distinct.iter().filter(|amplitude| **amplitude > 0.0).count();
+    if !differing(&rows.iter()).iter().all(is_of_modulation)
+        || x.column.distinct.len() < MIN_PERIODS
+        || amplitudes > MAX_AMPLITUDES
+    {
+        return None;
+    }
+    let (least, largest) = bounds(ratio.distinct())?;
+    let mut ratio =
+        Asked { label: Some("Slip interval τ / T, median"), is_log: largest > WIDE_RATIOS * least, ..ratio };
+    let quartiles = |row: &SetRow| {
+        let period = row.parameters.modulation_period?;
+        Some((row.tau_25? / period, row.tau_75? / period))
+    };
+    ratio.column.values.intervals = rows.iter().map(quartiles).collect();
+    let swept = swept(rows);
+    let chart = Chart { rows, swept: &swept, x, ys: vec![ratio, index], colour: Some(colour), panels: None };
+    chart.draw("staircase", look).ok()
+}
+
 /// The parameter that a column shows.
 fn parameter(column: &str) -> Option<Symbol> {
     if ["eta", FREQUENCY].contains(&column) { Some(Symbol::T) } else { Symbol::from_key(column) }
@@ -213,6 +248,7 @@ impl<'a> Chart<'a> {
         let lines = self.lines(&sets);
         let mut cells: Vec<Panel<'_>> = Vec::new();
         for (y, axis) in ys.iter().zip(y_axes) {
+            let height = if y.name() == RATIO { 1.5 * height } else { height };
             for (title, members) in &groups {
                 let layers = self.layers(y, &x_axis, hues.as_ref(), radius, [members, &free], &lines);
                 let mut panel = Panel::new(height, x_axis.clone(), axis.clone(), layers);
@@ -227,7 +263,7 @@ impl<'a> Chart<'a> {
             }
         }
         let look = look.with_note(&self.note(&inside, free.len()));
-        Ok(panel::draw(name, &look, layout, &self.legend(&inside, &free, hues.as_ref()), cells))
+        Ok(panel::draw(name, &look, layout, &self.legend(&inside, &free, hues.as_ref(), !lines.is_empty()), cells))
     }
 
     /// Sets without modulation, where the axis is that of the modulation: they have no place on it, but a level.
@@ -278,15 +314,21 @@ impl<'a> Chart<'a> {
         let place = |set: &usize| x.number(*set).zip(y.number(*set));
         let drive = |set: &usize| x.number(*set).zip(y.drive.as_ref()?.numbers[*set]);
         let level = |set: &usize| {
-            Some(Layer::Level(
-                y.number(*set)?,
-                Stroke { ink: if hues.is_some() { ink(set) } else { GREY }, ..REFERENCE },
-            ))
+            if y.name() == RATIO {
+                let tau = self.rows[*set].tau_50?;
+                let ratios = x_axis.evenly_placed(200).map(|place| (place, tau / x.period(place)));
+                return Some(Layer::Curve(ratios.collect(), REFERENCE));
+            }
+            let ink = if hues.is_some() { ink(set) } else { GREY };
+            Some(Layer::Level(y.number(*set)?, Stroke { ink, ..REFERENCE }))
         };
         let mut layers: Vec<Layer<'a>> = Vec::new();
         layers.extend(self.reduction(y).map(|ends| Layer::Stripe(ends, STRIPE)));
         if y.name() == "slip_share" {
             layers.extend(Regime::MIN_SHARES.map(|share| Layer::Level(share, REFERENCE)));
+        }
+        if y.name() == RATIO {
+            layers.extend((1..=MAX_LEVELS).map(|n| Layer::Level(f64::from(n), GRID)));
         }
         layers.extend(free.iter().filter_map(level));
         for line in lines {
@@ -306,7 +348,7 @@ impl<'a> Chart<'a> {
         }
         for set in members {
             let Some((at_x, at_y)) = place(set) else { continue };
-            let stroke = Stroke::solid(ink(set), BAR_WIDTH);
+            let stroke = Stroke::solid(ink(set), if radius < RADIUS { LINE_WIDTH } else { BAR_WIDTH });
             layers.extend(y.interval(*set).map(|ends| Layer::Bars(vec![(at_x, ends)], stroke)));
             layers.extend(x.interval(*set).map(|(low, high)| {
                 let left = if x_axis.place(low).is_finite() { low } else { x_axis.low };
@@ -336,7 +378,7 @@ impl<'a> Chart<'a> {
     }
 
     /// What each mark means that is drawn.
-    fn legend(&self, inside: &[usize], free: &[usize], hues: Option<&Hues>) -> Vec<Entry> {
+    fn legend(&self, inside: &[usize], free: &[usize], hues: Option<&Hues>, has_lines: bool) -> Vec<Entry> {
         let mut entries = Vec::new();
         if let Some((colour, hues)) = self.colour.as_ref().zip(hues) {
             let numbers = || inside.iter().map(|&set| colour.number(set));
@@ -355,8 +397,12 @@ impl<'a> Chart<'a> {
             let [mixed, sliding] = Regime::MIN_SHARES;
             entries.push(entry(Mark::Line(REFERENCE), format!("mixed above {mixed}, sliding above {sliding}")));
         }
+        if self.ys.iter().any(|y| y.name() == RATIO) {
+            entries.push(entry(Mark::Line(GRID), "τ = nT; bars: 25 to 75 % of slips"));
+        }
         let has_drive = self.ys.iter().any(|y| y.drive.is_some());
-        entries.extend(has_drive.then(|| entry(Mark::Line(drive_alone(BLACK)), "by the drive alone")));
+        let alone = if has_lines { Mark::Line(drive_alone(BLACK)) } else { Mark::Dot(Dot::solid(GREY, SMALL_RADIUS)) };
+        entries.extend(has_drive.then(|| entry(alone, "by the drive alone")));
         let is_reduced = self.ys.iter().any(|y| self.reduction(y).is_some());
         let stripe = "Kd Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
         entries.extend(is_reduced.then(|| entry(Mark::Patch(STRIPE), stripe)));
@@ -383,7 +429,7 @@ impl<'a> Chart<'a> {
 }
 
 impl Asked<'_> {
-    fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
+    pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
         let column = Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
         let drive = match name {
             "resultant_length" => Values::of(rows, "resultant_drive").ok(),
@@ -412,7 +458,21 @@ impl Asked<'_> {
         self.column.values.label()
     }
 
-    fn number(&self, set: usize) -> Option<f64> {
+    pub(super) fn axis_label(&self) -> String {
+        self.label.map_or_else(|| self.label().axis(self.unit), str::to_owned)
+    }
+
+    /// Each value once, ascending.
+    pub(super) fn distinct(&self) -> impl Iterator<Item = f64> + '_ {
+        self.column.distinct.iter().map(|value| self.factor * value)
+    }
+
+    /// The period in s at a place on an axis of periods or frequencies.
+    pub(super) fn period(&self, place: f64) -> f64 {
+        if self.name() == FREQUENCY { self.factor / place } else { place / self.factor }
+    }
+
+    pub(super) fn number(&self, set: usize) -> Option<f64> {
         self.column.values.numbers[set].map(|number| self.factor * number)
     }
 
@@ -437,7 +497,7 @@ impl Asked<'_> {
     /// The axis, from one limit or end of the data to the other.
     fn axis(&self, sets: &[usize]) -> Result<Axis, BadOption> {
         const SLACK: f64 = 1e-9;
-        let label = self.label.map_or_else(|| self.label().axis(self.unit), str::to_owned);
+        let label = self.axis_label();
         let short_label = self.label.is_none().then(|| self.label().short(self.unit));
         let values = &self.column.values;
         if values.is_worded() {
@@ -476,9 +536,9 @@ impl Asked<'_> {
             );
         }
         let axis = if self.is_log { Axis::logarithmic } else { Axis::linear };
-        let distinct = &self.column.distinct;
-        if self.symbol.is_some() && self.limits == (None, None) && (2..=MAX_TICKS).contains(&distinct.len()) {
-            let axis = axis(&label, low, high).with_ticks_at(&label, distinct.iter().map(|value| self.factor * value));
+        let has_few = (2..=MAX_TICKS).contains(&self.column.distinct.len());
+        if self.symbol.is_some() && self.limits == (None, None) && has_few {
+            let axis = axis(&label, low, high).with_ticks_at(&label, self.distinct());
             return Ok(axis.with_short_label(short_label));
         }
         let short_label = short_label.map(|label| axis(&label, low, high).label);
@@ -723,6 +783,30 @@ pub(super) mod tests {
         let svg = overview_of(&sets);
         assert!(svg.contains("2 sets slide: no") && svg.contains(">sliding<") && svg.contains("Share of time"));
         assert!(!svg.contains("not shown"));
+    }
+
+    #[test]
+    fn many_periods_and_few_amplitudes_make_a_staircase() {
+        let steps = |amplitude: f64, count: u32| -> Vec<SetRow> {
+            (1..=count).map(|step| set(amplitude, 0.01 * f64::from(step), (12.0 / f64::from(step)).ceil())).collect()
+        };
+        let mut sets = steps(1e-6, 24);
+        let svg = staircase(&sets, &Look::default()).unwrap().svg();
+        assert!(svg.contains(">Period of the modulation T (ms)<") && svg.contains(">Δ = 1 µm<"));
+        assert!(!svg.contains("by the drive alone"));
+        for set in &mut sets {
+            set.locking_index_drive = Some(0.4);
+        }
+        let with = staircase(&sets, &Look::default()).unwrap().svg();
+        assert!(with.contains(">by the drive alone<"));
+        // A mark of few dashes, and a curve of many.
+        assert!(with.matches("<path").count() - svg.matches("<path").count() > 40);
+        sets.push(set(0.0, 0.11, 1.0));
+        let svg = staircase(&sets, &Look::default()).unwrap().svg();
+        assert!(svg.contains(">Δ = 0<") && !with.contains(">Δ = 0<"));
+        assert!(staircase(&steps(1e-6, 23), &Look::default()).is_none());
+        let amplitudes = (1..=4).flat_map(|amplitude| steps(1e-7 * f64::from(amplitude), 24));
+        assert!(staircase(&amplitudes.collect::<Vec<_>>(), &Look::default()).is_none());
     }
 
     #[test]

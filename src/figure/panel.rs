@@ -32,7 +32,6 @@ pub(super) enum Layer<'a> {
     Dots(Vec<Place>, Dot),
     /// An upright bar between two values at each x; what lies under a logarithmic axis runs out of the frame.
     Bars(Vec<(f64, Ends)>, Stroke),
-    Boxes(Vec<Cell>, Fill),
     /// Cells, each in its own colour, and by how much they reach under their neighbours.
     Cells(Vec<(Cell, Color)>, f64),
     /// A short text in the middle of a cell of this shade.
@@ -78,7 +77,6 @@ impl Layer<'_> {
                     sheet.line(vec![(x, bottom), (x, frame.y_of(high))], stroke);
                 }
             }
-            Self::Boxes(boxes, fill) => boxes.into_iter().for_each(|cell| sheet.rectangle(frame.box_of(cell), fill)),
             Self::Cells(cells, overlap) => sheet.rectangles(cells.into_iter().map(|(cell, colour)| {
                 let [left, top, width, height] = frame.box_of(cell);
                 ([left, top, width + overlap, height + overlap], colour)

@@ -2,32 +2,13 @@
 
 use super::axis::Axis;
 use crate::model::{Parameters, Symbol, Value};
-use crate::reduce::{FREQUENCY, SetRow, ascending, differing, has_even_steps};
+use crate::reduce::{FREQUENCY, SetRow, Swept, has_even_steps};
 use crate::sweep::{label, symbol_of};
 
-pub(super) const MICROMETRES: f64 = 1e6;
-/// Sets that differ in the modulation alone.
-pub(super) struct Modulations<'a> {
-    pub(super) modulated: Vec<&'a SetRow>,
-    pub(super) free: Option<&'a SetRow>,
-    /// Amplitudes of the modulated sets in m, ascending.
-    pub(super) amplitudes: Vec<f64>,
-    /// Periods of the modulated sets in s, ascending.
-    pub(super) periods: Vec<f64>,
-}
-
-impl<'a> Modulations<'a> {
-    /// `None` if another parameter differs.
-    pub(super) fn of(sets: impl Iterator<Item = &'a SetRow> + Clone) -> Option<Self> {
-        if differing(&sets).iter().any(|symbol| !matches!(symbol, Symbol::Delta | Symbol::T)) {
-            return None;
-        }
-        let (modulated, free): (Vec<&SetRow>, Vec<&SetRow>) =
-            sets.partition(|set| set.parameters.modulation_period.is_some());
-        let amplitudes = ascending(modulated.iter().map(|set| set.parameters.modulation_amplitude));
-        let periods = ascending(modulated.iter().filter_map(|set| set.parameters.modulation_period));
-        Some(Self { modulated, free: free.first().copied(), amplitudes, periods })
-    }
+/// T, or 1/T if its steps are even and those of T are not.
+pub(super) fn period_column(sets: &[SetRow]) -> &'static str {
+    let is_even = |column| Swept::of(sets, column).is_ok_and(|swept| has_even_steps(&swept.distinct));
+    if !is_even("T") && is_even(FREQUENCY) { FREQUENCY } else { "T" }
 }
 
 /// Amplitude and frequency of a modulation, in symbols.
@@ -116,50 +97,13 @@ impl Grid {
         if self.is_linear { (low, high) } else { (libm::exp(low), libm::exp(high)) }
     }
 
-    /// The cell around a value of the grid.
-    pub(super) fn cell_of(&self, value: f64) -> (f64, f64) {
-        self.cell(self.index_of(value))
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
     }
 
     /// The index of a value of the grid.
     pub(super) fn index_of(&self, value: f64) -> usize {
         self.values.partition_point(|&other| other < value).min(self.values.len() - 1)
-    }
-}
-
-/// Periods as an axis: T, or 1/T if its steps are even and those of T are not; in units of the mean interval without
-/// modulation if that is known.
-pub(super) struct Periods {
-    pub(super) label: String,
-    is_inverse: bool,
-    unit: f64,
-}
-
-impl Periods {
-    /// `periods` in s ascend; `free` is the mean interval τ₀ without modulation, in s.
-    pub(super) fn of(periods: &[f64], free: Option<f64>) -> Self {
-        let inverse: Vec<f64> = periods.iter().rev().map(|period| 1.0 / period).collect();
-        let is_inverse = !has_even_steps(periods) && has_even_steps(&inverse);
-        let (label, unit) = match (is_inverse, free) {
-            (true, None) => (label(FREQUENCY).axis("Hz"), 1.0),
-            (true, Some(free)) => ("Modulation frequency τ₀ / T".to_owned(), free),
-            (false, Some(free)) => ("Period of the modulation T / τ₀".to_owned(), free),
-            (false, None) => {
-                let (label, factor) = axis_of("T", periods.iter().copied());
-                (label, 1.0 / factor)
-            }
-        };
-        Self { label, is_inverse, unit }
-    }
-
-    /// Where a period in s stands on the axis.
-    pub(super) fn place(&self, period: f64) -> f64 {
-        if self.is_inverse { self.unit / period } else { period / self.unit }
-    }
-
-    /// The period in s at a place; the inverse of [`Periods::place`].
-    pub(super) fn period(&self, place: f64) -> f64 {
-        if self.is_inverse { self.unit / place } else { place * self.unit }
     }
 }
 
@@ -225,7 +169,7 @@ pub(super) mod tests {
             for index in 0..values.len() {
                 let (low, high) = grid.cell(index);
                 assert!(low < values[index] && values[index] < high, "{values:?}");
-                assert_eq!(grid.cell_of(values[index]), (low, high));
+                assert_eq!(grid.index_of(values[index]), index);
                 if index > 0 {
                     assert!((grid.cell(index - 1).1 / low - 1.0).abs() < 1e-12, "{values:?}");
                 }
@@ -236,14 +180,8 @@ pub(super) mod tests {
 
     #[test]
     fn what_was_swept_in_even_steps_becomes_the_axis() {
-        let frequencies = [10.0, 20.0, 30.0, 40.0];
-        let mut periods: Vec<f64> = frequencies.iter().map(|frequency| 1.0 / frequency).collect();
-        periods.sort_by(f64::total_cmp);
-        let axis = Periods::of(&periods, None);
-        assert_eq!(axis.label, "Modulation frequency 1/T (Hz)");
-        assert!((axis.place(0.05) - 20.0).abs() < 1e-12 && (axis.period(20.0) - 0.05).abs() < 1e-15);
-        let axis = Periods::of(&[0.1, 0.2, 0.4, 0.8], Some(0.1));
-        assert_eq!(axis.label, "Period of the modulation T / τ₀");
-        assert!((axis.place(0.2) - 2.0).abs() < 1e-12 && (axis.period(2.0) - 0.2).abs() < 1e-15);
+        let sets = |periods: [f64; 4]| periods.map(|period| set(1e-6, period, 4.0));
+        assert_eq!(period_column(&sets([0.1, 0.05, 1.0 / 30.0, 0.025])), FREQUENCY);
+        assert_eq!(period_column(&sets([0.1, 0.2, 0.4, 0.8])), "T");
     }
 }

@@ -7,7 +7,7 @@ use super::frame::{Layout, OVERLAP};
 use super::legend::{Mark, entry};
 use super::panel::{self, Cell, Layer, Panel, Place};
 use super::picture::{Picture, Stroke};
-use super::sets::{MICROMETRES, common};
+use super::sets::common;
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
@@ -18,6 +18,7 @@ use std::f64::consts::TAU;
 const NAME: &str = "simulation";
 /// Width of the panels without a map, and beside the colour bar of one.
 const WIDTHS: [f64; 2] = [658.0, 588.0];
+const MICROMETRES: f64 = 1e6;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 const MODULATION: Stroke = Stroke::solid(BLUE, 1.6);
