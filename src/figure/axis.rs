@@ -36,7 +36,7 @@ const MANTISSAS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-2..1e6;
 const MAX_DECIMALS: usize = 3;
 /// Ratio of the largest to the least value above which a scale is logarithmic.
-pub(super) const DECADES: f64 = 20.0;
+const DECADES: f64 = 20.0;
 /// Most ticks of any kind: values of which nothing can come have no end of them.
 const MAX_MULTIPLES: usize = 1000;
 /// No quantity is larger than this, nor smaller than its inverse.
@@ -45,13 +45,6 @@ const LARGEST: f64 = 1e100;
 impl Axis {
     pub(super) fn linear(label: &str, low: f64, high: f64) -> Self {
         Self::linear_with(label, low, high, MAX_TICKS)
-    }
-
-    /// Linear from 0 to a little past `high`, with a number at each whole number.
-    pub(super) fn counts(label: &str, high: u32) -> Self {
-        let ticks = (0..=high).map(|count| (f64::from(count), count.to_string())).collect();
-        let high = f64::from(high) + 0.5;
-        Self::fixed(label, (0.0, high), ticks, Vec::new())
     }
 
     /// Linear from `low` to `high` with half as many ticks, for low frames.
@@ -124,26 +117,11 @@ impl Axis {
         if is_bare { Self { minor: Vec::new(), ..axis } } else { axis }
     }
 
-    /// Linear between the round numbers that enclose `low` and `high`.
-    pub(super) fn rounded(label: &str, low: f64, high: f64) -> Self {
-        let high = above(low, high);
-        let step = nice_step((high - low) / MAX_TICKS);
-        Self::linear(label, (low / step).floor() * step, (high / step).ceil() * step)
-    }
-
-    /// For data: logarithmic if the largest is more than `wide` times the least, else between round numbers, from `base` on
-    /// if no value is less; `None` without any.
-    pub(super) fn of_data(
-        label: &str,
-        values: impl Iterator<Item = f64> + Clone,
-        wide: f64,
-        base: f64,
-    ) -> Option<Self> {
-        let (low, high) = bounds(values.clone())?;
-        Some(match logarithmic_bounds(values) {
-            Some((start, end)) if low > 0.0 && high > wide * low => Self::logarithmic(label, start, end),
-            _ => Self::rounded(label, low.min(base), high),
-        })
+    /// For data: logarithmic where these lie decades apart, and a little wider than they are; `None` without any.
+    pub(super) fn of_data(label: &str, values: impl Iterator<Item = f64> + Clone) -> Option<Self> {
+        let ends = bounds(values.clone())?;
+        let ends = if is_wide(ends) { logarithmic_bounds(values)? } else { widened(ends) };
+        Some(Self::spanning(label, ends))
     }
 
     /// From `low` to `high`: logarithmic if these lie decades apart.
@@ -267,6 +245,13 @@ pub(super) fn logarithmic_bounds(values: impl Iterator<Item = f64>) -> Option<(f
     // At least half a decade, or there would be no tick.
     let margin = (MARGIN * libm::log(high / low)).max(0.5 * (0.5 * LN_10 - libm::log(high / low)));
     Some((low * libm::exp(-margin), high * libm::exp(margin)))
+}
+
+/// A range with a margin on both sides, also where it is a single value.
+pub(super) fn widened((low, high): (f64, f64)) -> (f64, f64) {
+    const MARGIN: f64 = 0.05;
+    let margin = if high > low { MARGIN * (high - low) } else { 0.5 * if low == 0.0 { 1.0 } else { low.abs() } };
+    (low - margin, high + margin)
 }
 
 /// Bounds in multiples of π/2 that enclose some angles in rad.
@@ -399,7 +384,8 @@ mod tests {
         for exponent in -12..12 {
             for span in [0.0, 0.3, 1.0, 7.7, 100.0] {
                 let low = 3.3 * libm::exp10(f64::from(exponent));
-                let linear = Axis::rounded("", low, low * (1.0 + span));
+                let (start, end) = widened((low, low * (1.0 + span)));
+                let linear = Axis::linear("", start, end);
                 assert!((2..=8).contains(&linear.ticks.len()), "{low} {span}: {:?}", linear.ticks);
                 let (low, high) = logarithmic_bounds([low, low * (1.0 + span)].into_iter()).unwrap();
                 let logarithmic = Axis::logarithmic("", low, high);

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::frame::{Frame, OVERLAP, fitting};
-use super::picture::{Anchor, Sheet};
+use super::picture::{Anchor, Picture};
 use super::style::{AXIS, LEGEND_TEXT, NOTE_TEXT, TICK_TEXT};
 use kuva::render::color::Color;
 
@@ -31,7 +31,7 @@ impl ColourBar {
     }
 
     /// Draws the bar right of a frame, and the label above it.
-    pub(super) fn draw(&self, sheet: &mut Sheet, frame: &Frame) {
+    pub(super) fn draw(&self, sheet: &mut Picture, frame: &Frame) {
         let (left, top, bottom) = (frame.right() + GAP, frame.top, frame.bottom());
         let height = frame.height / self.colours.len() as f64;
         let boxes = self.colours.iter().enumerate().map(|(step, colour)| {

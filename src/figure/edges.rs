@@ -1,6 +1,6 @@
 //! Edges with their intervals against the one other quantity in which rows differ, a colour for each statistic.
 
-use super::axis::{Axis, DECADES};
+use super::axis::Axis;
 use super::frame::Layout;
 use super::legend::{Mark, entry};
 use super::panel::{self, Layer, Panel};
@@ -38,8 +38,8 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     };
     let places = || edges.iter().filter_map(place);
     let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
-    let x = Axis::of_data(&x_label, places().map(|place| place.0), DECADES, f64::INFINITY)?;
-    let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends), DECADES, f64::INFINITY)?;
+    let x = Axis::of_data(&x_label, places().map(|place| place.0))?;
+    let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let statistics: BTreeSet<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
     let (mut legend, mut layers) = (Vec::new(), Vec::new());
     for (statistic, ink) in statistics.into_iter().zip(INKS) {

@@ -5,7 +5,7 @@ use super::axis::Axis;
 use super::font;
 use super::legend::{Entry, draw_legend, legend_rows};
 use super::panel::Cell;
-use super::picture::{Anchor, Sheet, snapped};
+use super::picture::{Anchor, Picture, snapped};
 use super::style::{AXIS, DARK_GREY, LABEL_TEXT, LEGEND_TEXT, Look, NOTE_TEXT, Style, TICK_TEXT};
 use kuva::render::color::Color;
 
@@ -64,7 +64,7 @@ impl Layout {
     }
 
     /// Frames with these heights of the rows on a sheet of the size that is asked for, under this legend.
-    pub(super) fn page(self, name: &str, look: &Look, legend: &[Entry], natural_heights: &[f64]) -> (Page, Sheet) {
+    pub(super) fn page(self, name: &str, look: &Look, legend: &[Entry], natural_heights: &[f64]) -> (Page, Picture) {
         let columns = self.columns as f64;
         let between = (columns - 1.0) * self.column_gap;
         let beside = LEFT + between + self.right;
@@ -90,7 +90,7 @@ impl Layout {
         let heights: Vec<f64> = natural_heights.iter().map(|height| (scale * height).max(SHORTEST)).collect();
         let frames: f64 = heights.iter().sum();
 
-        let mut sheet = Sheet::new(name, look, (total, frames + around));
+        let mut sheet = Picture::new(name, look, (total, frames + around));
         draw_legend(&mut sheet, legend, MARGIN, right, LEGEND_ROW);
         for (row, line) in (1..).map(f64::from).zip(&notes) {
             let place = (MARGIN, frames + above_notes + row * NOTE_ROW - 4.0);
@@ -198,9 +198,9 @@ impl Frame {
     }
 
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
-    pub(super) fn axes(&self, sheet: &mut Sheet) {
+    pub(super) fn axes(&self, sheet: &mut Picture) {
         let (right, bottom) = (self.right(), self.bottom());
-        let style = sheet.picture.style;
+        let style = sheet.style;
         let (x_axis, y_axis) = (style.numbered(&self.x, self.width), style.numbered(&self.y, self.height));
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
@@ -230,7 +230,7 @@ impl Frame {
         let mut free = EDGE;
         for (value, number) in x_axis.ticks.iter().filter(|_| self.is_lowest) {
             let (x, half) = (self.x_of(*value), 0.5 * font::width(number, TICK_TEXT));
-            if x - half >= free && x + half <= sheet.picture.scene.width - EDGE {
+            if x - half >= free && x + half <= sheet.scene.width - EDGE {
                 sheet.text((x, bottom + 1.3 * height), number, TICK_TEXT, Anchor::Middle);
                 free = x + half + 0.3 * height;
             }
@@ -262,7 +262,7 @@ impl Frame {
     }
 
     /// What the frame shows, above it, after its letter; at the right end, how much of it.
-    pub(super) fn heading(&self, sheet: &mut Sheet, text: &str, amount: &str) {
+    pub(super) fn heading(&self, sheet: &mut Picture, text: &str, amount: &str) {
         let y = self.top - 9.0;
         if let Some(letter) = self.letter {
             sheet.text((self.left - LEFT + MARGIN, y), &format!("({letter})"), LABEL_TEXT, Anchor::Start);
@@ -313,7 +313,7 @@ mod tests {
         let layout = Layout::column(500.0);
         let drawn = |style, size| {
             let look = Look { style, size, note: "small print ".repeat(40) };
-            layout.page("", &look, &[], &[300.0, 200.0]).1.finish().size()
+            layout.page("", &look, &[], &[300.0, 200.0]).1.size()
         };
         for style in [Style::Screen, Style::Print] {
             let size = Size { width: 86.0, height: if style == Style::Print { 60.0 } else { 140.0 } };
@@ -335,7 +335,7 @@ mod tests {
             frame.axes(&mut sheet);
             frame.heading(&mut sheet, "set with a long name, of which much is to be said", "");
         }
-        (sheet.picture.scene.width, sheet.texts())
+        (sheet.scene.width, sheet.texts())
     }
 
     #[test]

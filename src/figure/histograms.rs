@@ -1,15 +1,17 @@
 //! Histograms of τ (Fig. 2d-f): one panel per set, one under the other on a common axis.
 
-use super::axis::{Axis, bounds};
+use super::axis::{Axis, bounds, widened};
 use super::font;
 use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
-use super::picture::{Anchor, Fill, Picture, Sheet, Stroke};
+use super::picture::{Anchor, Fill, Picture, Stroke};
 use super::sets::{modulation, setting, thousands};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{HistogramBin, SetRow, differing};
+use crate::sweep::label;
+use kuva::render::color::Color;
 
 /// Panels that fit a page.
 const MAX_PANELS: usize = 4;
@@ -43,20 +45,6 @@ impl<'a> Panel<'a> {
         self.bars.iter().chain(self.overlay.iter().flatten()).copied()
     }
 
-    fn layers(&self, multiples: Vec<f64>) -> Vec<Layer<'a>> {
-        let (period, bars) = (self.period.unwrap_or(1.0), self.bars.clone());
-        let fills = Layer::Drawn(Box::new(move |sheet, frame| {
-            for bar in bars {
-                let (left, top) = (frame.x_of(bar.low), frame.y_of(bar.density));
-                sheet.rectangle([left, top, frame.x_of(bar.high) - left + OVERLAP, frame.y_of(0.0) - top], BAR);
-            }
-        }));
-        let outlines = outline(&self.bars).into_iter().map(|line| Layer::Curve(line, OUTLINE));
-        let overlay = self.overlay.iter().flat_map(|bars| outline(bars)).map(|line| Layer::Curve(line, OVERLAY));
-        let numbered = Layer::Drawn(Box::new(move |sheet, frame| draw_multiples(sheet, frame, multiples, period)));
-        vec![numbered, Layer::Inside(std::iter::once(fills).chain(outlines).chain(overlay).collect())]
-    }
-
     /// The size of the sample.
     fn amount(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
@@ -67,22 +55,40 @@ impl<'a> Panel<'a> {
 
 /// Draws the histograms of up to 4 sets, those of identical contacts beside other contacts not counted; `None` for more
 /// sets or none.
-pub(super) fn histograms<'a>(sets: &[SetRow], bins: &'a [HistogramBin], look: &Look) -> Option<Picture> {
-    let panels = panels(sets, bins);
+pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) -> Option<Picture> {
+    let (factor, unit) = label("tau_mean").scale(bounds(bins.iter().map(|bin| bin.high))?.1);
+    let bins: Vec<HistogramBin> = bins
+        .iter()
+        .map(|bin| HistogramBin {
+            low: factor * bin.low,
+            high: factor * bin.high,
+            density: bin.density / factor,
+            ..bin.clone()
+        })
+        .collect();
+    let panels = panels(sets, &bins);
     let (low, high) = bounds(panels.iter().flat_map(Panel::all_bars).flat_map(|bar| [bar.low, bar.high]))?;
     if panels.len() > MAX_PANELS {
         return None;
     }
-    let margin = 0.04 * (high - low);
-    let panel = |(index, panel): (usize, &Panel<'a>)| {
-        let x = Axis::linear("Slip interval τ (s)", (low - margin).max(0.0), high + margin);
-        let multiples = panel.period.map_or_else(Vec::new, |period| x.multiples_of(period, MAX_MULTIPLES));
+    let (low, high) = widened((low, high));
+    let panel = |(index, panel): (usize, &Panel<'_>)| {
+        let x = Axis::linear(&format!("Slip interval τ ({unit})"), low.max(0.0), high);
+        let period = factor * panel.period.unwrap_or(0.0);
+        let multiples = panel.period.map_or_else(Vec::new, |_| x.multiples_of(period, MAX_MULTIPLES));
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
-        let y = Axis::sparse(if index == 0 { "Probability density (1/s)" } else { "" }, 0.0, highest);
+        let density = format!("Probability density (1/{unit})");
+        let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, highest);
         // The numbers cover no bar.
         let head = if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
+        let bars = panel.bars.iter().map(|bar| (((bar.low, bar.high), (0.0, bar.density)), Color::from(BAR.ink)));
+        let outlines = outline(&panel.bars).into_iter().map(|line| Layer::Curve(line, OUTLINE));
+        let overlay = panel.overlay.iter().flat_map(|bars| outline(bars)).map(|line| Layer::Curve(line, OVERLAY));
+        let inside = std::iter::once(Layer::Cells(bars.collect(), OVERLAP)).chain(outlines).chain(overlay);
+        let numbered = Layer::Drawn(Box::new(move |sheet, frame| draw_multiples(sheet, frame, multiples, period)));
+        let layers = vec![numbered, Layer::Inside(inside.collect())];
         let heading = Some((panel.title.clone(), panel.amount()));
-        panel::Panel { head, heading, ..panel::Panel::new(HEIGHT, x, y, panel.layers(multiples)) }
+        panel::Panel { head, heading, ..panel::Panel::new(HEIGHT, x, y, layers) }
     };
     let layout = Layout { row_gap: 10.0, ..Layout::column(WIDTH) };
     let drawn = panels.iter().enumerate().map(panel).collect();
@@ -128,7 +134,7 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
 }
 
 /// The multiples of a period, with the numbers for which there is room.
-fn draw_multiples(sheet: &mut Sheet, frame: &Frame, multiples: Vec<f64>, period: f64) {
+fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
     for multiple in multiples {
         let (x, n) = (frame.x_of(multiple), (multiple / period).round());

@@ -32,7 +32,8 @@ pub(super) fn intervals(points: &[Point], look: &Look) -> Option<Picture> {
     let x = Axis::logarithmic(&x_label, low, high);
     let (low, high) = logarithmic_bounds(slips.iter().map(|slip| slip.1.1))?;
     let all = Axis::logarithmic("Slip interval in periods, τ / T: all slips", low, high);
-    let few = Axis::counts("τ / T: up to 12 periods", LINES);
+    let few = "τ / T: up to 12 periods";
+    let few = Axis::linear(few, 0.0, f64::from(LINES) + 0.5).with_ticks_at(few, (0..=LINES).map(f64::from));
 
     let phased = slips.iter().filter(|slip| slip.0.has_phase);
     let phased: Vec<f64> = phased.map(|slip| slip.0.drive_velocity).collect();

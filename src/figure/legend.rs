@@ -1,9 +1,8 @@
 //! Legends: what marks mean, in rows above the frames, where they cover nothing.
 
 use super::font;
-use super::picture::{Anchor, Dot, Fill, Ink, Sheet, Stroke};
+use super::picture::{Anchor, Dot, Fill, Ink, Picture, Stroke};
 use super::style::{LEGEND_TEXT, WHITE};
-use kuva::render::color::Color;
 
 /// Width of a line or a patch, and of a dot.
 const MARK: f64 = 26.0;
@@ -65,7 +64,7 @@ pub(super) fn legend_rows(entries: &[Entry], room: f64) -> Vec<Vec<&Entry>> {
 }
 
 /// Draws entries at the top of a sheet, between two edges.
-pub(super) fn draw_legend(sheet: &mut Sheet, entries: &[Entry], left: f64, right: f64, row_height: f64) {
+pub(super) fn draw_legend(sheet: &mut Picture, entries: &[Entry], left: f64, right: f64, row_height: f64) {
     for (row, entries) in legend_rows(entries, right - left).into_iter().enumerate() {
         let middle = TOP + (row as f64 + 0.5) * row_height;
         let mut start = left;
@@ -77,7 +76,7 @@ pub(super) fn draw_legend(sheet: &mut Sheet, entries: &[Entry], left: f64, right
     }
 }
 
-fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
+fn draw_mark(sheet: &mut Picture, mark: Mark, (start, middle): (f64, f64)) {
     let (end, centre) = (start + MARK, (start + 0.5 * mark_width(mark), middle));
     match mark {
         Mark::Dot(dot) => {
@@ -86,8 +85,8 @@ fn draw_mark(sheet: &mut Sheet, mark: Mark, (start, middle): (f64, f64)) {
             sheet.discs([centre], dot);
         }
         Mark::Ring(ink, radius, hole) => {
-            sheet.dot(centre, radius, Color::from(ink));
-            sheet.dot(centre, hole, Color::from(WHITE));
+            sheet.discs([centre], Dot::solid(ink, radius));
+            sheet.discs([centre], Dot::solid(WHITE, hole));
         }
         Mark::Bar(dot) => {
             sheet.line(vec![(centre.0, middle - 9.0), (centre.0, middle + 9.0)], Stroke::solid(dot.ink, 1.6));

@@ -1,7 +1,7 @@
 //! Maps: sets on a grid of two quantities, each a cell with the colour of what was found, and words in the middle of regions
 //! of equal cells. The locking map lies over period and amplitude of the modulation, a regime map over two other parameters.
 
-use super::axis::{Axis, DECADES, bounds};
+use super::axis::{Axis, bounds, is_wide};
 use super::colour_bar::ColourBar;
 use super::frame::{Layout, OVERLAP};
 use super::legend::{Mark, entry};
@@ -80,7 +80,10 @@ pub(super) fn map(sets: &[SetRow], look: &Look) -> Option<Picture> {
                 Axis::linear(&label, -most, most)
             }
             "slip_share" | "locking_index" => Axis::linear(&label, 0.0, 1.0),
-            _ => Axis::of_data(&label, (0..sets.len()).filter_map(number), DECADES, 0.0)?,
+            _ => {
+                let ends = ends()?;
+                Axis::spanning(&label, if is_wide(ends) { ends } else { (ends.0.min(0.0), ends.1) })
+            }
         };
         let colour = if column == "resultant_excess" { diverging } else { shade };
         let mut bar = ColourBar::of_axis(&scale, colour);
@@ -303,6 +306,6 @@ mod tests {
         numbers.insert((20, 20), 7);
         numbers.insert((21, 20), 7);
         assert_eq!(middles(&numbers), [((2, 2), 2), ((8, 2), 3)]);
-        assert!(middles(&BTreeMap::new()).is_empty());
+        assert!(middles(&BTreeMap::<Position, u32>::new()).is_empty());
     }
 }

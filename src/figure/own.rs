@@ -1,7 +1,7 @@
 //! Sets against a column: the overview of a sweep, and figures of one's own, with error bars where there are intervals.
 
 use super::BadOption;
-use super::axis::{Axis, bounds, is_wide, logarithmic_bounds};
+use super::axis::{Axis, bounds, is_wide, logarithmic_bounds, widened};
 use super::frame::{LEFT, Layout};
 use super::hues::Hues;
 use super::legend::{Entry, Mark, entry};
@@ -549,13 +549,6 @@ impl Asked<'_> {
 /// Why an option cannot name a column.
 fn refuse(option: &str, values: &Values, problem: &str) -> BadOption {
     BadOption::new(option, &values.column.name, problem)
-}
-
-/// A range with a margin on both sides, also where it is a single value.
-fn widened((low, high): (f64, f64)) -> (f64, f64) {
-    const MARGIN: f64 = 0.05;
-    let margin = if high > low { MARGIN * (high - low) } else { 0.5 * if low == 0.0 { 1.0 } else { low.abs() } };
-    (low - margin, high + margin)
 }
 
 fn hues(colour: &Asked<'_>) -> Result<Hues, BadOption> {

@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::colour_bar::{COLOUR_BAR, ColourBar};
 use super::frame::{Frame, Layout};
 use super::legend::Entry;
-use super::picture::{Anchor, Dot, Fill, Picture, Sheet, Stroke};
+use super::picture::{Anchor, Dot, Fill, Picture, Stroke};
 use super::style::{HALF_DIGIT, LEGEND_TEXT, Look, ink_on};
 use kuva::render::color::Color;
 
@@ -15,7 +15,7 @@ pub(super) type Ends = (f64, f64);
 /// A rectangle of data: its ends along x and along y.
 pub(super) type Cell = (Ends, Ends);
 
-pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Sheet, &Frame) + 'a>;
+pub(super) type Drawing<'a> = Box<dyn FnOnce(&mut Picture, &Frame) + 'a>;
 
 /// What is drawn in a panel, in units of its axes.
 pub(super) enum Layer<'a> {
@@ -41,7 +41,7 @@ pub(super) enum Layer<'a> {
 }
 
 impl Layer<'_> {
-    fn draw(self, sheet: &mut Sheet, frame: &Frame) {
+    fn draw(self, sheet: &mut Picture, frame: &Frame) {
         match self {
             Self::Inside(layers) => sheet.clipped([frame.left, frame.top, frame.width, frame.height], |sheet| {
                 for layer in layers {
@@ -147,5 +147,5 @@ pub(super) fn draw(name: &str, look: &Look, mut layout: Layout, legend: &[Entry]
             bar.draw(&mut sheet, &frame);
         }
     }
-    sheet.finish()
+    sheet
 }

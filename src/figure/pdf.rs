@@ -67,7 +67,6 @@ impl Page<'_> {
                     self.rectangle([x, y, w, h], fill);
                 }
             }
-            Primitive::Circle { cx, cy, r, fill, .. } => self.circles(&[*cx], &[*cy], *r, fill),
             Primitive::CircleBatch { cx, cy, r, fill, fill_opacity, .. } => {
                 self.with_opacity(*fill_opacity, |page| page.circles(cx, cy, *r, fill));
             }

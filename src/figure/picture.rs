@@ -23,6 +23,8 @@ pub struct Picture {
     pub(super) style: Style,
     note: String,
     pub(super) scene: Scene,
+    /// Frames that cut what is drawn in them.
+    clips: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -118,12 +120,6 @@ impl Picture {
     }
 }
 
-/// A sheet to draw on. Lengths are units of the SVG, from the upper left corner.
-pub(super) struct Sheet {
-    pub(super) picture: Picture,
-    clips: usize,
-}
-
 /// The nearest half of a unit, on a whole pixel of the PNG for screens: edges of cells that lie there show no seams.
 pub(super) fn snapped(place: f64) -> f64 {
     (2.0 * place).round() / 2.0
@@ -169,13 +165,13 @@ pub(super) struct Fill {
     pub(super) opacity: f64,
 }
 
-impl Sheet {
+/// Drawing. Lengths are units of the SVG, from the upper left corner.
+impl Picture {
     pub(super) fn new(name: &str, look: &Look, (width, height): (f64, f64)) -> Self {
         let mut scene = Scene::new(width, height);
         scene.font_family = Some(FONTS.to_owned());
         scene.text_color = Some(BLACK.to_owned());
-        let picture = Picture { name: name.to_owned(), style: look.style, note: look.note.clone(), scene };
-        Self { picture, clips: 0 }
+        Self { name: name.to_owned(), style: look.style, note: look.note.clone(), scene, clips: 0 }
     }
 
     /// Where each text starts and ends, and what it says.
@@ -191,11 +187,7 @@ impl Sheet {
             };
             Some((start, start + width, content.clone()))
         };
-        self.picture.scene.elements.iter().filter_map(text).collect()
-    }
-
-    pub(super) fn finish(self) -> Picture {
-        self.picture
+        self.scene.elements.iter().filter_map(text).collect()
     }
 
     pub(super) fn line(&mut self, points: Vec<(f64, f64)>, stroke: Stroke) {
@@ -205,7 +197,7 @@ impl Sheet {
             None => vec![points],
         };
         for points in lines {
-            self.picture.scene.add(Primitive::PolyLine {
+            self.scene.add(Primitive::PolyLine {
                 points,
                 stroke: Color::from(stroke.ink),
                 stroke_width: stroke.width,
@@ -216,7 +208,7 @@ impl Sheet {
 
     /// A rectangle from its upper left corner.
     pub(super) fn rectangle(&mut self, [x, y, width, height]: [f64; 4], fill: Fill) {
-        self.picture.scene.add(Primitive::Rect {
+        self.scene.add(Primitive::Rect {
             x,
             y,
             width,
@@ -238,24 +230,12 @@ impl Sheet {
             h.push(height);
             fills.push(fill);
         }
-        self.picture.scene.add(Primitive::RectBatch { x, y, w, h, fills });
-    }
-
-    pub(super) fn dot(&mut self, (cx, cy): (f64, f64), radius: f64, fill: Color) {
-        self.picture.scene.add(Primitive::Circle {
-            cx,
-            cy,
-            r: radius,
-            fill,
-            fill_opacity: None,
-            stroke: None,
-            stroke_width: None,
-        });
+        self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
 
     pub(super) fn discs(&mut self, centres: impl IntoIterator<Item = (f64, f64)>, dot: Dot) {
         let (cx, cy) = centres.into_iter().unzip();
-        self.picture.scene.add(Primitive::CircleBatch {
+        self.scene.add(Primitive::CircleBatch {
             cx,
             cy,
             r: dot.radius,
@@ -281,7 +261,7 @@ impl Sheet {
     ) {
         // An SVG may hold no control characters.
         let content = shown_text(text).to_string();
-        self.picture.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
+        self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
     }
 
     /// A text with the middle of its digits at this height.
@@ -293,12 +273,12 @@ impl Sheet {
     pub(super) fn clipped(&mut self, [x, y, width, height]: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let id = format!("frame-{}", self.clips);
         self.clips += 1;
-        self.picture.scene.defs.push(format!(
+        self.scene.defs.push(format!(
             r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath>"#
         ));
-        self.picture.scene.add(Primitive::ClipStart { x, y, width, height, id });
+        self.scene.add(Primitive::ClipStart { x, y, width, height, id });
         draw(self);
-        self.picture.scene.add(Primitive::ClipEnd);
+        self.scene.add(Primitive::ClipEnd);
     }
 }
 

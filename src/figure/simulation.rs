@@ -1,7 +1,7 @@
 //! One simulation: the modulation and the shear force over time (Fig. 1d), and under them the space-time map of detached
 //! contacts (Fig. 4b, d) with the onsets of slips.
 
-use super::axis::{Axis, bounds};
+use super::axis::{Axis, bounds, widened};
 use super::colour_bar::ColourBar;
 use super::frame::{Layout, OVERLAP};
 use super::legend::{Mark, entry};
@@ -11,6 +11,7 @@ use super::sets::common;
 use super::style::{BLACK, BLUE, GRID, Look, RED, REFERENCE, shade};
 use crate::model::Parameters;
 use crate::observe::MapRow;
+use crate::sweep::label;
 use anyhow::{Result, anyhow};
 use kuva::render::color::Color;
 use std::f64::consts::TAU;
@@ -22,12 +23,14 @@ const MICROMETRES: f64 = 1e6;
 const MILLIMETRES: f64 = 1e3;
 const TRACE: Stroke = Stroke::solid(BLACK, 1.3);
 const MODULATION: Stroke = Stroke::solid(BLUE, 1.6);
-const ONSET: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
+const ONSET: Stroke = Stroke::solid(RED, 1.6);
 /// Colours that an eye can distinguish.
 const LEVELS: f64 = 100.0;
 /// Periods whose peaks are marked, and that are drawn at all; more would be a grey area.
 const MAX_PEAKS: f64 = 25.0;
-const MAX_PERIODS: f64 = 200.0;
+const MAX_PERIODS: f64 = 80.0;
+/// Onsets that are lines from edge to edge; more are marks at the upper edge.
+const MAX_LINES: usize = 5;
 const POINTS_PER_PERIOD: f64 = 40.0;
 
 /// Draws what is given: the shear force in N against time in s, the map, instant by instant, or the map under the force;
@@ -49,13 +52,14 @@ pub fn simulation(
     let instants = instants.chain(map.into_iter().flatten().map(|cell| cell.time));
     let (first, last) =
         bounds(instants).filter(|(first, last)| last > first).ok_or_else(|| empty("instants of the simulation"))?;
-    let x = || Axis::linear("Time t (s)", first, last);
+    let (factor, unit) = label("tau_mean").scale(last);
+    let x = || Axis::linear(&format!("Time t ({unit})"), factor * first, factor * last);
     // One that is ramped, or too fast, is not drawn.
     let is_drawn = |period: &f64| parameters.ramp_time == 0.0 && (last - first) / period <= MAX_PERIODS;
     let period = parameters.modulation_period.filter(is_drawn);
     let onsets: Vec<f64> = onsets.iter().copied().filter(|onset| (first..=last).contains(onset)).collect();
 
-    let peaks = period.map_or_else(Vec::new, |period| x().multiples_of(period, MAX_PEAKS));
+    let peaks = period.map_or_else(Vec::new, |period| x().multiples_of(factor * period, MAX_PEAKS));
     let legend = [
         map.filter(|_| !onsets.is_empty()).map(|_| entry(Mark::Line(ONSET), "onset of a slip")),
         (!peaks.is_empty()).then(|| entry(Mark::Line(REFERENCE), "peaks of the modulation")),
@@ -69,20 +73,26 @@ pub fn simulation(
         y.minor.clear();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand points")]
         let points = (POINTS_PER_PERIOD * (last - first) / period) as u32 + 2;
-        let curve = x().evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / period)));
+        let curve = x().evenly_placed(points).map(|time| (time, amplitude * libm::cos(TAU * time / (factor * period))));
         let level = std::iter::once(Layer::Level(0.0, GRID));
         Panel::inside(64.0, x(), y, level.chain(peaks()).chain([Layer::Curve(curve.collect(), MODULATION)]))
     });
     let force = trace.map(|trace| {
-        let (least, most) = bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0));
-        let y = Axis::rounded("Shear force Fₛ (N)", least.min(0.0), most);
-        Panel::inside(230.0, x(), y, peaks().chain([Layer::Curve(thinned(trace, width), TRACE)]))
+        let (low, high) = widened(bounds(trace.iter().map(|sample| sample.1)).unwrap_or((0.0, 0.0)));
+        let y = Axis::linear("Shear force Fₛ (N)", low, high);
+        let force = thinned(trace, width).into_iter().map(|(time, force)| (factor * time, force));
+        Panel::inside(230.0, x(), y, peaks().chain([Layer::Curve(force.collect(), TRACE)]))
     });
     let contacts = map.map(|map| {
         let length = parameters.slider_length * MILLIMETRES;
         let y = Axis::linear("Position x (mm), trailing edge at 0", 0.0, length);
-        let cells = Layer::Cells(cells(map, blocks, first, length, width), OVERLAP);
-        let onsets = onsets.iter().map(|&onset| Layer::Upright(onset, ONSET));
+        let cells = cells(map, blocks, first, length, width).into_iter();
+        let cells = cells.map(|(((left, right), y), colour)| (((factor * left, factor * right), y), colour));
+        let cells = Layer::Cells(cells.collect(), OVERLAP);
+        // Many lines would cover the slips.
+        let bottom = if onsets.len() > MAX_LINES { 0.93 * length } else { 0.0 };
+        let onsets =
+            onsets.iter().map(|onset| Layer::Curve(vec![(factor * onset, length), (factor * onset, bottom)], ONSET));
         let mut percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 1.0), shade);
         percent.ticks =
             [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
