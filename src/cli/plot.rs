@@ -90,7 +90,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         }
     };
     if files.is_empty() {
-        output::report("there is nothing to draw: a single set without intervals");
+        output::report("there is nothing to draw: no set has a result");
     }
     for path in files {
         output::print(&format!("{}\n", shown(&path)))?;

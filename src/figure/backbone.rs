@@ -1,13 +1,13 @@
 //! φ against η (Fig. 3e): the density of slips, the back-bone of Eq. 2, and averages over sets that have a phase.
 
-use super::axis::{Axis, angle_bounds, bounds, logarithmic_bounds};
+use super::axis::{Axis, angle_bounds, bounds};
 use super::colour_bar::ColourBar;
 use super::frame::{Layout, OVERLAP};
-use super::legend::{Entry, Mark, entry};
+use super::legend::{Mark, entry};
 use super::panel::{self, Cell, Ends, Layer, Panel, Place};
 use super::picture::{Dot, Picture, Stroke};
 use super::sets::Grid;
-use super::style::{BAR_WIDTH, BLACK, BLUE, GREY, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
+use super::style::{BAR_WIDTH, BLUE, Look, RADIUS, RED, REFERENCE, WHITE, dot, shade};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::reduce::{BackboneBin, Point, SetRow};
 use crate::sweep::label;
@@ -16,17 +16,12 @@ use std::f64::consts::PI;
 
 const WIDTH: f64 = 580.0;
 const HEIGHT: f64 = 390.0;
-/// Slips one by one, those of sets with a phase over the others.
-const OTHER: Dot = Dot { ink: GREY, radius: 1.6, opacity: 0.45 };
-const PHASED: Dot = Dot { ink: BLACK, ..OTHER };
 const AVERAGE: Dot = dot(BLUE);
 /// Around it, so that it is seen on dark cells.
 const EDGE: Dot = Dot::solid(WHITE, RADIUS + 1.3);
 const ASYMPTOTE: Stroke = Stroke::solid(RED, 2.4);
 const EXACT: Stroke = Stroke::dashed(RED, 1.6, (7.0, 4.0));
 const CURVE_POINTS: u32 = 400;
-/// Fewer slips are drawn one by one.
-const MIN_SLIPS: usize = 2000;
 /// Most values of η that have a column each; more are put into columns, this many a decade.
 const MAX_COLUMNS: usize = 60;
 const COLUMNS_PER_DECADE: f64 = 10.0;
@@ -38,43 +33,25 @@ const FAINTEST: f64 = 0.25 / (2.0 * PI);
 /// Draws phase against η; `None` without any phase. Phases lie as measured, in the turn that ends shortly past Φ_max;
 /// the axes hold them all.
 pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], look: &Look) -> Option<Picture> {
-    let placed: Vec<(&Point, Place)> =
-        points.iter().filter_map(|point| Some((point, (point.eta, point.phase?)))).collect();
-    let slips: Vec<Place> = placed.iter().map(|slip| slip.1).collect();
-    let density = (slips.len() >= MIN_SLIPS).then(|| Density::of(&slips));
-    let (low, high) = match &density {
-        Some(density) => bounds(density.cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?,
-        None => logarithmic_bounds(slips.iter().map(|slip| slip.0))?,
-    };
+    let slips: Vec<Place> =
+        points.iter().filter_map(|point| Some((point.eta, point.phase?)).filter(|_| point.eta > 0.0)).collect();
+    let (shades, cells) = density(&slips);
+    let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
     let averages = averages(bins, sets);
-    let mut entries: Vec<Entry> = Vec::new();
-    if density.is_none() {
-        entries.extend([entry(Mark::Dot(PHASED), "slips of sets with a phase"), entry(Mark::Dot(OTHER), "others")]);
-    }
-    entries.extend([
+    let entries = [
         entry(Mark::Bar(AVERAGE), "mean of sets with a phase, 95 %"),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
-    ]);
+    ];
     let x = Axis::logarithmic(&label("eta").axis(""), low, high).with_enough_numbers();
     let (low, high) = angle_bounds(slips.iter().map(|slip| slip.1));
     let curve = |phase: fn(f64) -> Option<f64>| {
         let modulated = x.evenly_placed(CURVE_POINTS).filter(|&eta| eta >= 1.0);
         modulated.filter_map(|eta| Some((eta, phase(eta)?))).collect()
     };
-    let mut layers = match &density {
-        Some(Density { shades, cells }) => {
-            let cells = cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density))));
-            vec![Layer::Cells(cells.collect(), OVERLAP)]
-        }
-        None => [(false, OTHER), (true, PHASED)]
-            .map(|(has_phase, dot)| {
-                let slips = placed.iter().filter(|slip| slip.0.has_phase == has_phase);
-                Layer::Dots(slips.map(|slip| slip.1).collect(), dot)
-            })
-            .into(),
-    };
+    let coloured = cells.iter().map(|&(cell, density)| (cell, shade(shades.place(density))));
+    let mut layers = vec![Layer::Cells(coloured.collect(), OVERLAP)];
     let means = || averages.iter().map(|&(eta, mean, _)| (eta, mean)).collect();
     layers.extend([
         Layer::Upright(1.0, REFERENCE),
@@ -87,7 +64,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
         Layer::Dots(means(), EDGE),
         Layer::Dots(means(), AVERAGE),
     ]);
-    let bar = density.as_ref().map(|density| ColourBar::of_axis(&density.shades, shade));
+    let bar = Some(ColourBar::of_axis(&shades, shade));
     let panel = Panel { bar, ..Panel::inside(HEIGHT, x, Axis::angle("Phase φ (rad)", low, high), layers) };
     Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
 }
@@ -107,38 +84,30 @@ fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
     bins.iter().filter_map(average).collect()
 }
 
-/// How slips at each η are spread over the phase.
-struct Density {
-    /// Densities in 1/rad as shares of the colour scale.
-    shades: Axis,
-    cells: Vec<(Cell, f64)>,
-}
-
-impl Density {
-    fn of(slips: &[Place]) -> Self {
-        let columns = columns(slips.iter().map(|slip| slip.0));
-        let height = PI / ROWS;
-        let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
-        for &(eta, phase) in slips {
-            let column = columns.partition_point(|column| column.1 <= eta).min(columns.len() - 1);
-            #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
-            let row = (phase / height).floor() as i64;
-            *counts[column].entry(row).or_default() += 1;
-        }
-        let cells: Vec<(Cell, f64)> = columns
-            .iter()
-            .zip(&counts)
-            .flat_map(|(&column, counts)| {
-                let slips = f64::from(counts.values().sum::<u32>());
-                counts.iter().map(move |(&row, &count)| {
-                    let ends = (row as f64 * height, (row + 1) as f64 * height);
-                    ((column, ends), f64::from(count) / (slips * height))
-                })
-            })
-            .collect();
-        let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
-        Self { shades: Axis::logarithmic("density (1/rad)", FAINTEST, most), cells }
+/// How slips at each η are spread over the phase: the scale of densities in 1/rad, and cells with theirs.
+fn density(slips: &[Place]) -> (Axis, Vec<(Cell, f64)>) {
+    let columns = columns(slips.iter().map(|slip| slip.0));
+    let height = PI / ROWS;
+    let mut counts: Vec<BTreeMap<i64, u32>> = vec![BTreeMap::new(); columns.len()];
+    for &(eta, phase) in slips {
+        let column = columns.partition_point(|column| column.1 <= eta).min(columns.len() - 1);
+        #[expect(clippy::cast_possible_truncation, reason = "a few rows")]
+        let row = (phase / height).floor() as i64;
+        *counts[column].entry(row).or_default() += 1;
     }
+    let cells: Vec<(Cell, f64)> = columns
+        .iter()
+        .zip(&counts)
+        .flat_map(|(&column, counts)| {
+            let slips = f64::from(counts.values().sum::<u32>());
+            counts.iter().map(move |(&row, &count)| {
+                let ends = (row as f64 * height, (row + 1) as f64 * height);
+                ((column, ends), f64::from(count) / (slips * height))
+            })
+        })
+        .collect();
+    let most = cells.iter().map(|cell| cell.1).fold(10.0 * FAINTEST, f64::max);
+    (Axis::logarithmic("density (1/rad)", FAINTEST, most), cells)
 }
 
 /// Ends of the columns along η: one for each value if these are few, else evenly spaced.
@@ -177,9 +146,9 @@ mod tests {
     #[test]
     fn the_density_of_a_column_integrates_to_one() {
         let point = |step: u32| (if step.is_multiple_of(3) { 2.0 } else { 8.0 }, 1e-3 * f64::from(step % 700) - 0.5);
-        let density = Density::of(&(0..3000).map(point).collect::<Vec<_>>());
+        let (_, cells) = density(&(0..3000).map(point).collect::<Vec<_>>());
         for eta in [2.0, 8.0] {
-            let column = density.cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));
+            let column = cells.iter().filter(|((x, _), _)| (x.0..x.1).contains(&eta));
             let integral: f64 = column.map(|((_, y), density)| density * (y.1 - y.0)).sum();
             assert!((integral - 1.0).abs() < 1e-12, "{integral}");
         }

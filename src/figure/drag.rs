@@ -66,13 +66,13 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
             sheet.centred_text((x + 6.0, y), &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
         }
     }));
-    let layers = multiples().map(|n| Layer::Curve(line(n).into(), GRID)).chain(dots);
-    let upper =
-        Panel::inside(320.0, x.clone(), Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1), layers);
+    let lines = Layer::Inside(multiples().map(|n| Layer::Curve(line(n).into(), GRID)).chain(dots).collect());
+    let tau = Axis::linear(&format!("Slip interval τ ({unit})"), taus.0, taus.1);
+    let upper = Panel::new(320.0, x.clone(), tau, vec![lines, numbers]);
     let ratio = Axis::linear("Median and quartiles of τ / T", least - 0.3, most + 0.3);
     let levels = multiples().map(|n| Layer::Level(n, GRID));
     let lower = Panel::inside(210.0, x, ratio, levels.chain(medians_of(&slips, ends)));
-    Some(panel::draw("drag", look, LAYOUT, &entries, vec![Panel { notes: vec![numbers], ..upper }, lower]))
+    Some(panel::draw("drag", look, LAYOUT, &entries, vec![upper, lower]))
 }
 
 /// Medians and quartiles of τ/T in bins of the modulation, of both stages.

@@ -28,8 +28,8 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
         let maps = [map::map, own::staircase].map(|map| map(&sets, look));
-        // Where a map shows all, it would be a net of lines.
-        if maps.iter().all(Option::is_none) {
+        // Where a map shows all, it would be a net of lines; of a single set it would be a dot.
+        if sets.len() > 1 && maps.iter().all(Option::is_none) {
             pictures.extend(own::overview(&sets, look));
         }
         pictures.extend(maps.into_iter().flatten());
@@ -39,6 +39,9 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     }
     if sets.len() <= histograms::MAX_SETS {
         pictures.extend(histograms::histograms(&sets, &read(layout)?, look));
+    }
+    if pictures.is_empty() {
+        pictures.extend(own::overview(&sets, look));
     }
     write(layout, &pictures, look, formats)
 }

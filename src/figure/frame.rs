@@ -200,8 +200,11 @@ impl Frame {
     /// Border, ticks, their numbers, and the labels of both axes, over the data.
     pub(super) fn axes(&self, sheet: &mut Picture) {
         let (right, bottom) = (self.right(), self.bottom());
-        let style = sheet.style;
-        let (x_axis, y_axis) = (style.numbered(&self.x, self.width), style.numbered(&self.y, self.height));
+        let [x_axis, y_axis] =
+            [(&self.x, self.width), (&self.y, self.height)].map(|(axis, length)| match sheet.style {
+                Style::Screen => axis.clone(),
+                Style::Print => axis.clone().with_enough_numbers().without_dense_ticks(length),
+            });
         for (value, length) in ticks(&x_axis) {
             let x = self.x_of(value);
             sheet.line(vec![(x, bottom), (x, bottom - length)], AXIS);
@@ -261,17 +264,14 @@ impl Frame {
         self.room.0 + font::width(&label, size)
     }
 
-    /// What the frame shows, above it, after its letter; at the right end, how much of it.
-    pub(super) fn heading(&self, sheet: &mut Picture, text: &str, amount: &str) {
+    /// What the frame shows, above it, after its letter.
+    pub(super) fn heading(&self, sheet: &mut Picture, text: &str) {
         let y = self.top - 9.0;
         if let Some(letter) = self.letter {
             sheet.text((self.left - LEFT + MARGIN, y), &format!("({letter})"), LABEL_TEXT, Anchor::Start);
         }
-        let taken = if amount.is_empty() { 0.0 } else { font::width(amount, LEGEND_TEXT) + LABEL_GAP };
-        let end = if amount.is_empty() { self.room.1 } else { self.right() };
-        let (text, size) = fitted(text, LEGEND_TEXT, end - taken - self.left);
+        let (text, size) = fitted(text, LEGEND_TEXT, self.room.1 - self.left);
         sheet.text((self.left, y), &text, size, Anchor::Start);
-        sheet.text((self.right(), y), amount, LEGEND_TEXT, Anchor::End);
     }
 }
 
@@ -333,7 +333,7 @@ mod tests {
         for column in 0..2 {
             let frame = page.frame(0, column, x.clone(), y.clone());
             frame.axes(&mut sheet);
-            frame.heading(&mut sheet, "set with a long name, of which much is to be said", "");
+            frame.heading(&mut sheet, "set with a long name, of which much is to be said");
         }
         (sheet.scene.width, sheet.texts())
     }

@@ -6,7 +6,7 @@ use super::frame::{Frame, Layout, OVERLAP};
 use super::legend::{Entry, Mark, entry};
 use super::panel::{self, Layer, Place};
 use super::picture::{Anchor, Fill, Picture, Stroke};
-use super::sets::{modulation, setting, thousands};
+use super::sets::{modulation, setting};
 use super::style::{BLACK, LEGEND_TEXT, Look, RED, REFERENCE};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{HistogramBin, SetRow, differing};
@@ -45,11 +45,11 @@ impl<'a> Panel<'a> {
         self.bars.iter().chain(self.overlay.iter().flatten()).copied()
     }
 
-    /// The size of the sample.
-    fn amount(&self) -> String {
+    /// What it shows, and the size of the sample.
+    fn heading(&self) -> String {
         let count = |bars: &[&HistogramBin]| bars.iter().map(|bar| bar.count).sum::<u64>();
-        let overlay = self.overlay.as_ref().map_or(String::new(), |bars| format!(" and {}", thousands(count(bars))));
-        format!("{}{overlay} intervals", thousands(count(&self.bars)))
+        let overlay = self.overlay.as_ref().map_or(String::new(), |bars| format!(" and {}", count(bars)));
+        format!("{}: {}{overlay} intervals", self.title, count(&self.bars))
     }
 }
 
@@ -78,17 +78,16 @@ pub(super) fn histograms(sets: &[SetRow], bins: &[HistogramBin], look: &Look) ->
         let multiples = panel.period.map_or_else(Vec::new, |_| x.multiples_of(period, MAX_MULTIPLES));
         let highest = panel.all_bars().map(|bar| bar.density).fold(0.0, f64::max);
         let density = format!("Probability density (1/{unit})");
-        let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, highest);
         // The numbers cover no bar.
-        let head = if multiples.is_empty() { 0.5 * NUMBERS } else { NUMBERS };
+        let head = if multiples.is_empty() { 1.1 } else { 1.25 };
+        let y = Axis::sparse(if index == 0 { &density } else { "" }, 0.0, head * highest);
         let bars = panel.bars.iter().map(|bar| (((bar.low, bar.high), (0.0, bar.density)), Color::from(BAR.ink)));
         let outlines = outline(&panel.bars).into_iter().map(|line| Layer::Curve(line, OUTLINE));
         let overlay = panel.overlay.iter().flat_map(|bars| outline(bars)).map(|line| Layer::Curve(line, OVERLAY));
         let inside = std::iter::once(Layer::Cells(bars.collect(), OVERLAP)).chain(outlines).chain(overlay);
         let numbered = Layer::Drawn(Box::new(move |sheet, frame| draw_multiples(sheet, frame, multiples, period)));
         let layers = vec![numbered, Layer::Inside(inside.collect())];
-        let heading = Some((panel.title.clone(), panel.amount()));
-        panel::Panel { head, heading, ..panel::Panel::new(HEIGHT, x, y, layers) }
+        panel::Panel { heading: Some(panel.heading()), ..panel::Panel::new(HEIGHT, x, y, layers) }
     };
     let layout = Layout { row_gap: 10.0, ..Layout::column(WIDTH) };
     let drawn = panels.iter().enumerate().map(panel).collect();
@@ -200,7 +199,7 @@ mod tests {
         assert_eq!(panels[1].title, "Δ = 1 µm, 1/T = 29 Hz");
         assert_eq!((panels[2].period, panels[2].overlay.as_ref()), (Some(1.0 / 58.0), None));
         let svg = histograms(&sets, &bins, &Look::default()).unwrap().svg();
-        for text in ["(a)", "(c)", "1 and 1 intervals", "1 intervals", "Δ = 1 µm, 1/T = 58 Hz", "τ = nT"] {
+        for text in ["(a)", "(c)", "Δ = 0: 1 and 1 intervals", "Δ = 1 µm, 1/T = 58 Hz: 1 intervals", "τ = nT"] {
             assert!(svg.contains(&format!(">{text}<")), "{text}");
         }
         assert!(histograms(&sets, &[], &Look::default()).is_none() && histograms(&[], &[], &Look::default()).is_none());

@@ -149,12 +149,12 @@ pub(super) fn own(rows: &[SetRow], figure: &OwnFigure, look: &Look) -> Result<Pi
 }
 
 /// Draws what was found of the sets over the swept parameter with the most values; the second gives colours, the third panels.
-/// `None` for a single set, and if nothing was found.
+/// A single set is a dot over its velocity. `None` if nothing was found.
 pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let swept = swept(rows);
     let is_plain = rows.iter().all(|row| row.regime == Some(Regime::StickSlip));
     let asked = |place: usize, option| Asked::of(rows, option, swept.get(place)?.name()).ok();
-    let x = asked(0, "x")?;
+    let x = asked(0, "x").or_else(|| Asked::of(rows, "x", "V0").ok())?;
     let found = QUANTITIES.into_iter().filter(|name| !is_plain || *name != "slip_share");
     let found = found.filter_map(|name| Asked::of(rows, "y", name).ok());
     let shown = |y: &Asked<'_>| (0..rows.len()).filter(|&set| x.has(set) && y.has(set)).collect::<Vec<_>>();
@@ -256,7 +256,7 @@ impl<'a> Chart<'a> {
                     if !cells.len().is_multiple_of(columns) {
                         panel.y.label.clear();
                     }
-                    panel.heading = Some((title.clone(), String::new()));
+                    panel.heading = Some(title.clone());
                 }
                 panel.bar = hues.as_ref().and_then(Hues::bar).filter(|_| cells.len() + 1 == columns);
                 cells.push(panel);
@@ -417,11 +417,7 @@ impl<'a> Chart<'a> {
         let still_outside = still.iter().filter(|set| !inside.contains(set)).count();
         let count = self.rows.len();
         let left_out = count - inside.len() - levels - still_outside;
-        let still = match still.len() {
-            0 => None,
-            1 => Some("1 set slides: no intervals".to_owned()),
-            still => Some(format!("{still} sets slide: no intervals")),
-        };
+        let still = (!still.is_empty()).then(|| format!("{} of {count} sets slide: no intervals", still.len()));
         let left_out = (left_out > 0)
             .then(|| format!("not shown: {left_out} of {count} sets, without a value or outside the axes"));
         [still, left_out].into_iter().flatten().collect::<Vec<_>>().join("; ")
@@ -749,7 +745,8 @@ pub(super) mod tests {
         assert!(with.contains(">by the drive alone<"));
         // A mark of few dashes, and curves of many.
         assert!(with.matches("<path").count() - svg.matches("<path").count() > 30);
-        assert!(overview(&sets[..1], &Look::default()).is_none(), "a single set");
+        assert!(overview_of(&sets[..1]).contains("Drive velocity V₀"), "a single set");
+        assert!(overview(&[], &Look::default()).is_none());
     }
 
     #[test]
@@ -774,7 +771,7 @@ pub(super) mod tests {
             (set.regime, set.tau_mean, set.tau_deviation) = (Some(Regime::Sliding), None, None);
         }
         let svg = overview_of(&sets);
-        assert!(svg.contains("2 sets slide: no") && svg.contains(">sliding<") && svg.contains("Share of time"));
+        assert!(svg.contains("2 of 5 sets slide: no") && svg.contains(">sliding<") && svg.contains("Share of time"));
         assert!(!svg.contains("not shown"));
     }
 

@@ -97,18 +97,14 @@ pub(super) struct Panel<'a> {
     pub(super) y: Axis,
     /// From below.
     pub(super) layers: Vec<Layer<'a>>,
-    /// Over the axes.
-    pub(super) notes: Vec<Layer<'a>>,
-    /// Height over the data that layers need, whatever the size of the frame.
-    pub(super) head: f64,
-    /// What it shows, and how much of it.
-    pub(super) heading: Option<(String, String)>,
+    /// What it shows.
+    pub(super) heading: Option<String>,
     pub(super) bar: Option<ColourBar>,
 }
 
 impl<'a> Panel<'a> {
     pub(super) const fn new(height: f64, x: Axis, y: Axis, layers: Vec<Layer<'a>>) -> Self {
-        Self { height, x, y, layers, notes: Vec::new(), head: 0.0, heading: None, bar: None }
+        Self { height, x, y, layers, heading: None, bar: None }
     }
 
     /// With all layers inside the frame.
@@ -129,19 +125,12 @@ pub(super) fn draw(name: &str, look: &Look, mut layout: Layout, legend: &[Entry]
     for (index, panel) in panels.into_iter().enumerate() {
         let mut frame = page.frame(index / layout.columns, index % layout.columns, panel.x, panel.y);
         frame.is_lowest = index + layout.columns >= count;
-        if panel.head > 0.0 {
-            let high = frame.y.high * frame.height / (frame.height - panel.head);
-            frame.y = Axis::sparse(&frame.y.label, frame.y.low, high);
-        }
         for layer in panel.layers {
             layer.draw(&mut sheet, &frame);
         }
         frame.axes(&mut sheet);
-        for note in panel.notes {
-            note.draw(&mut sheet, &frame);
-        }
-        if let Some((text, amount)) = panel.heading {
-            frame.heading(&mut sheet, &text, &amount);
+        if let Some(text) = panel.heading {
+            frame.heading(&mut sheet, &text);
         }
         if let Some(bar) = panel.bar {
             bar.draw(&mut sheet, &frame);

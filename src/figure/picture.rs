@@ -222,14 +222,8 @@ impl Picture {
 
     /// Rectangles x, y, width, height, each in its own colour.
     pub(super) fn rectangles(&mut self, cells: impl IntoIterator<Item = ([f64; 4], Color)>) {
-        let (mut x, mut y, mut w, mut h, mut fills) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ([left, top, width, height], fill) in cells {
-            x.push(left);
-            y.push(top);
-            w.push(width);
-            h.push(height);
-            fills.push(fill);
-        }
+        let (sides, fills): (Vec<[f64; 4]>, Vec<Color>) = cells.into_iter().unzip();
+        let [x, y, w, h] = [0, 1, 2, 3].map(|side| sides.iter().map(|sides| sides[side]).collect());
         self.scene.add(Primitive::RectBatch { x, y, w, h, fills });
     }
 

@@ -52,14 +52,6 @@ pub(super) fn common<'a>(all: impl Iterator<Item = &'a Parameters>) -> String {
     settings.map(|setting| setting.replace(' ', "\u{a0}")).collect::<Vec<_>>().join(", ")
 }
 
-/// A count with commas between thousands.
-pub(super) fn thousands(count: u64) -> String {
-    let digits = count.to_string();
-    let groups: Vec<&str> =
-        digits.as_bytes().rchunks(3).rev().filter_map(|group| std::str::from_utf8(group).ok()).collect();
-    groups.join(",")
-}
-
 /// Values of a swept quantity and how they are spaced.
 pub(super) struct Grid {
     /// Ascending.

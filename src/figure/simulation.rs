@@ -93,9 +93,7 @@ pub fn simulation(
         let bottom = if onsets.len() > MAX_LINES { 0.93 * length } else { 0.0 };
         let onsets =
             onsets.iter().map(|onset| Layer::Curve(vec![(factor * onset, length), (factor * onset, bottom)], ONSET));
-        let mut percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 1.0), shade);
-        percent.ticks =
-            [0.0, 25.0, 50.0, 75.0, 100.0].map(|percent: f64| (percent / 100.0, percent.to_string())).to_vec();
+        let percent = ColourBar::of_axis(&Axis::linear("detached (%)", 0.0, 100.0), shade);
         Panel {
             bar: Some(percent),
             ..Panel::inside(260.0, x(), y, std::iter::once(cells).chain(peaks()).chain(onsets))

@@ -1,7 +1,6 @@
 //! The look of all figures: paper, sizes of text, strokes, colours. Lengths on a sheet are units, of which a style says how
 //! long they are: text has the same size in every figure, whatever the size of the sheet.
 
-use super::axis::Axis;
 use super::picture::{Dot, Fill, Ink, Stroke};
 use clap::ValueEnum;
 use kuva::render::color::Color;
@@ -37,14 +36,6 @@ impl Style {
         match self {
             Self::Screen => 2.0,
             Self::Print => 3.5,
-        }
-    }
-
-    /// An axis of this length with the numbers that it needs on a small figure, and ticks that can be distinguished.
-    pub(super) fn numbered(self, axis: &Axis, length: f64) -> Axis {
-        match self {
-            Self::Screen => axis.clone(),
-            Self::Print => axis.clone().with_enough_numbers().without_dense_ticks(length),
         }
     }
 
