@@ -25,6 +25,8 @@ const CURVE_POINTS: u32 = 400;
 /// Most values of η that have a column each; more are put into columns, this many a decade.
 const MAX_COLUMNS: usize = 60;
 const COLUMNS_PER_DECADE: f64 = 10.0;
+/// How far the column of a value reaches at most, as a factor: curves are compared with what it is of.
+const WIDEST: f64 = 1.5;
 /// Rows of the density in half a turn.
 const ROWS: f64 = 36.0;
 /// Least density shown, in 1/rad: a quarter of that of phases spread over the whole turn.
@@ -69,11 +71,8 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
     Some(panel::draw("phi-eta", look, Layout::column(WIDTH), &entries, vec![panel]))
 }
 
-/// η, mean phase in rad, and the ends of its interval.
-type Average = (f64, f64, Option<Ends>);
-
-/// Mean phases of the sets of each bin that have one, at the mean η of these sets, with their intervals.
-fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<Average> {
+/// Mean η of the sets of each bin that have a phase, the mean of these phases in rad, and the ends of its interval.
+fn averages(bins: &[BackboneBin], sets: &[SetRow]) -> Vec<(f64, f64, Option<Ends>)> {
     let average = |bin: &BackboneBin| {
         let within = |eta: &f64| (bin.eta_low..bin.eta_high).contains(eta);
         let phased = sets.iter().filter(|set| set.has_phase).map(|set| set.parameters.eta()).filter(within);
@@ -118,7 +117,8 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     values.sort_by(f64::total_cmp);
     values.dedup_by(|next, value| *next <= *value * SAME);
     if values.len() <= MAX_COLUMNS {
-        return Grid::logarithmic_cells(values);
+        let cells = Grid::logarithmic_cells(values.clone()).into_iter().zip(values);
+        return cells.map(|((low, high), eta)| (low.max(eta / WIDEST), high.min(eta * WIDEST))).collect();
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
