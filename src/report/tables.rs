@@ -18,7 +18,8 @@ const DECIMALS: usize = 4;
 
 #[derive(Debug, Serialize)]
 pub(super) struct Columns {
-    columns: Vec<Json>,
+    #[serde(rename = "columns")]
+    described: Vec<Json>,
     values: Vec<Vec<Json>>,
     /// Those of the rows, and whether the page has them.
     #[serde(skip)]
@@ -30,17 +31,17 @@ impl Columns {
     pub(super) fn of<R: Row>(is_shown: impl Fn(&str) -> bool) -> Self {
         let all: Vec<(Column, bool)> =
             R::columns().into_iter().map(|column| (column.clone(), is_shown(&column.name))).collect();
-        let columns: Vec<Json> = all.iter().filter(|column| column.1).map(|(Column { name, unit, meaning, kind, .. }, _)| {
+        let described: Vec<Json> = all.iter().filter(|column| column.1).map(|(Column { name, unit, meaning, kind, .. }, _)| {
             json!({ "name": name, "unit": unit, "meaning": meaning, "kind": kind.word() })
         }).collect();
-        let values = columns.iter().map(|_| Vec::new()).collect();
-        Self { columns, values, all }
+        let values = described.iter().map(|_| Vec::new()).collect();
+        Self { described, values, all }
     }
 
     /// Gives each column its label in the unit in which its values are read best, and the factor to that.
     pub(super) fn label(&mut self, label: impl Fn(&Column) -> Label) {
         let labels = self.all.iter().filter(|column| column.1).map(|column| label(&column.0));
-        for ((column, values), label) in self.columns.iter_mut().zip(&self.values).zip(labels) {
+        for ((column, values), label) in self.described.iter_mut().zip(&self.values).zip(labels) {
             let largest = values.iter().filter_map(Json::as_f64).fold(0.0, |most, value| value.abs().max(most));
             let (factor, unit) = label.scale(largest);
             column["label"] = label.axis(unit).into();
