@@ -3,10 +3,10 @@
 use super::exit::{Exit, UsageError};
 use super::output;
 use super::sweep::{self, PresetFlag, Variation, changes};
-use super::threads::ThreadsFlag;
 use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
+use crate::run::threads::{self, Threads};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
@@ -66,8 +66,9 @@ pub struct Arguments {
     /// Slips of each realisation [default: 100, with --quick 6]
     #[arg(long, value_name = "N")]
     slips: Option<u64>,
-    #[command(flatten)]
-    threads: ThreadsFlag,
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<NonZeroUsize>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -106,7 +107,8 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
         }
     }
-    let threads = arguments.threads.choose()?.count.map_or(0, NonZeroUsize::get);
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?.count;
+    let threads = threads.map_or(0, NonZeroUsize::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;

@@ -4,19 +4,20 @@ use super::exit::{Exit, UsageError};
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag, Variation};
-use super::threads::ThreadsFlag;
 use super::{output, reduce, show, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
+use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -53,8 +54,9 @@ pub struct Arguments {
     /// Results directory; needed with --set or --axis [default: results/<name of the sweep>, or the one to resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    threads: ThreadsFlag,
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<NonZeroUsize>,
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
@@ -86,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
     let (sweep, root) = arguments.sweep_and_root()?;
     output::warn(&sweep.warnings());
-    let threads = arguments.threads.choose()?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
     let options = Options {
         threads: threads.count,
         stop,
