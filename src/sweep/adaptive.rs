@@ -83,11 +83,7 @@ impl Sweep {
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
     /// the period alone are one set.
     pub fn set_at(&self, rows: &[u64]) -> Option<u64> {
-        let mut rows = rows.to_vec();
-        if let Some(axis) = self.seed_axis() {
-            rows[axis] = 0;
-        }
-        self.find(&self.point(&rows).canonical().parameters).map(|point| self.set_of(point))
+        self.set_with(&self.point(rows).canonical().parameters)
     }
 
     /// The points of a set with these of its seeds.

@@ -49,7 +49,7 @@ pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Pla
 pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
 pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic, StatisticKind};
 pub use source::{Mistake, SweepError, nearest};
-pub use variation::{Change, varied, written};
+pub use variation::{Change, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
 /// is left to [`Sweep::parse`].
