@@ -1,7 +1,7 @@
 //! `stickslip accuracy`: speed against error of the solvers, measured in one run.
 
 use super::exit::{Exit, UsageError};
-use super::output;
+use super::output::{self, Columns};
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
 use crate::model::Parameters;
@@ -173,51 +173,50 @@ fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
                 .to_owned(),
         );
     }
-    lines.extend(study.sets.iter().flat_map(|set| table(study, findings, set, all)));
-    lines.push(String::new());
-    lines.join("\n")
+    let tables = study.sets.iter().map(|set| table(study, findings, set, all));
+    lines.join("\n") + "\n" + &tables.collect::<String>()
 }
 
 /// A line for each solver at a set; -> before that of the sweep.
-fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Vec<String> {
+fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> String {
     let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
     let is_there = |quantity: &str| rows.iter().any(|row| findings.distances_of(row, quantity).is_some());
     let quantities = QUANTITIES.map(|(quantity, _)| quantity).into_iter();
-    let quantities: Vec<_> = quantities.filter(|&name| (all || name == "interval") && is_there(name)).collect();
-    let unit = |quantity: &str| if quantity == "phase" { "rad" } else { "%" };
-    let mut heading = format!("{:33}{:>9}{:>18}", "   solver", "ms/slip", "break times (s)");
-    heading.extend(quantities.iter().map(|name| format!("{:>18}", format!("{name} ({})", unit(name)))));
-    if all {
-        heading = format!("{heading}{:>8}{:>8}{:>9}{:>24}{:>9}", "median", "dearest", "ns/step", "together", "ledger");
-    }
-    let mut lines = vec![format!("\n{}", set_in_words(set)), heading];
+    let quantities = quantities.filter(|&name| (all || name == "interval") && is_there(name));
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    for &row in &rows {
-        let (mark, errors) = (if row.solver == study.own.into() { "->" } else { "  " }, row.break_times);
-        let star = if row.cost.is_extrapolated() { "*" } else { "" };
-        let cost = format!("{:.3}{star}", 1e3 * row.cost.per_slip);
-        let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
-        let mut line = format!("{:33}{cost:>9}{:>18}", format!("{mark} {}", row.solver), or_none(times));
-        for name in &quantities {
-            let bias = findings.distances_of(row, name).map(|row| {
-                let scale = if unit(name) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
+    let mut columns = Columns::default();
+    let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
+        columns.add(is_worded, std::iter::once(head.to_owned()).chain(rows.iter().map(|row| cell(row))).collect());
+    };
+    add(true, "   solver", &|row| {
+        format!("{} {}", if row.solver == study.own.into() { "->" } else { "  " }, row.solver)
+    });
+    add(false, "ms/slip", &|row| {
+        format!("{:.3}{}", 1e3 * row.cost.per_slip, if row.cost.is_extrapolated() { "*" } else { "" })
+    });
+    add(false, "break times (s)", &|MethodRow { break_times, .. }| {
+        let times = break_times.median.zip(break_times.largest);
+        or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
+    });
+    for name in quantities {
+        let unit = if name == "phase" { "rad" } else { "%" };
+        add(false, &format!("{name} ({unit})"), &|row| {
+            or_none(findings.distances_of(row, name).map(|row| {
+                let scale = if unit == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
                 format!("{:+.3} ± {:.3}", scale * row.distances.mean_bias, scale * row.half_width())
-            });
-            line = format!("{line}{:>18}", or_none(bias));
-        }
-        if all {
-            let mark = if errors.together_throughout { ">" } else { "" };
-            let together = errors.together.zip(errors.together_seconds);
-            line = format!(
-                "{line}{:>8.2}{:>8.2}{:>9.0}{:>24}{:>9}",
-                row.median_per_slip / row.cost.per_slip,
-                row.largest_per_slip / row.cost.per_slip,
-                1e9 * row.cost.per_step,
-                or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s"))),
-                or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))),
-            );
-        }
-        lines.push(line);
+            }))
+        });
     }
-    lines
+    if all {
+        add(false, "median", &|row| format!("{:.2}", row.median_per_slip / row.cost.per_slip));
+        add(false, "dearest", &|row| format!("{:.2}", row.largest_per_slip / row.cost.per_slip));
+        add(false, "ns/step", &|row| format!("{:.0}", 1e9 * row.cost.per_step));
+        add(false, "together", &|MethodRow { break_times, .. }| {
+            let mark = if break_times.together_throughout { ">" } else { "" };
+            let together = break_times.together.zip(break_times.together_seconds);
+            or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s")))
+        });
+        add(false, "ledger", &|row| or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))));
+    }
+    format!("\n{}\n{columns}", set_in_words(set))
 }

@@ -68,14 +68,6 @@ enum Command {
 /// default the executable itself; the first of the arguments is its name.
 pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let command = Cli::parse_from(arguments).command;
-    if let Some(limit) = too_little_memory() {
-        output::report(&format!(
-            "error: {} MB of memory are allowed (ulimit -v), and {} MB are needed at least",
-            limit >> 20,
-            MIN_MEMORY >> 20
-        ));
-        return Exit::Usage as u8;
-    }
     let ended = match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
@@ -97,18 +89,6 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Exit::of(&error)
     });
     exit as u8
-}
-
-/// Least bytes of memory within which the program says what it could not do, rather than be aborted.
-const MIN_MEMORY: u64 = 64 << 20;
-
-/// What this process may use, if it is less.
-fn too_little_memory() -> Option<u64> {
-    #[cfg(unix)]
-    let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
-    #[cfg(not(unix))]
-    let limit = None;
-    limit.filter(|&limit| limit < MIN_MEMORY)
 }
 
 /// An error and its causes, without those that it already quotes.

@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let report =
         crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
     let report = report.map_err(|error| match Exit::of(&error) {
-        Exit::Stopped if progress.has_results() => error.context("the run stopped; what was committed is kept"),
+        Exit::Stopped => error.context("the run stopped; what was committed is kept"),
         _ => error,
     })?;
     Ok(ending(&report, &root, arguments))
@@ -184,7 +184,12 @@ fn work(
 /// Says what is left and what to do, and how the command ends.
 fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     if report.stopped {
-        output::report(&resume_hint(report, arguments.walltime.is_some()));
+        let left = output::count(report.jobs_left, "job");
+        let hint = match arguments.walltime {
+            Some(_) if report.jobs_run == 0 => "No part ended in this time: give a longer --walltime.",
+            _ => "The same command resumes.",
+        };
+        output::report(&format!("stopped with {left} left; finished jobs are kept. {hint}"));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
         return if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped };
@@ -226,17 +231,6 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let mut lines = reduce::summary_lines(&summary, layout);
     lines.extend(status::no_slips(&results));
     Ok(Some(Reduced { lines, result: show::summary(&results, summary.sets)?, figures }))
-}
-
-/// What to do after a run that stopped early.
-fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
-    let left = output::count(report.jobs_left, "job");
-    let hint = if has_walltime && report.jobs_run == 0 {
-        "No part ended in this time: give a longer --walltime."
-    } else {
-        "The same command resumes."
-    };
-    format!("stopped with {left} left; finished jobs are kept. {hint}")
 }
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {

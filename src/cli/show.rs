@@ -1,7 +1,7 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
 use super::exit::{Exit, UsageError};
-use super::output;
+use super::output::{self, Columns};
 use crate::model::{Parameters, Symbol};
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
@@ -207,22 +207,11 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let cells: Vec<_> = columns.iter().map(|values| (values.is_worded(), column(values, rows, most))).collect();
-    side_by_side(&cells)
-}
-
-/// Columns of cells side by side, those of words to the left.
-fn side_by_side(columns: &[(bool, Vec<String>)]) -> String {
-    let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let lines = columns.first().map_or(0, |(_, cells)| cells.len());
-    let line = |line: usize| {
-        let padded = columns.iter().map(|(is_worded, cells)| {
-            let (cell, width) = (&cells[line], width(cells));
-            if *is_worded { format!("{cell:width$}") } else { format!("{cell:>width$}") }
-        });
-        format!("{}\n", padded.collect::<Vec<_>>().join("  ").trim_end())
-    };
-    (0..lines).map(line).collect()
+    let mut text = Columns::default();
+    for values in columns {
+        text.add(values.is_worded(), column(values, rows, most));
+    }
+    text.to_string()
 }
 
 /// The edges that a sweep has found, and a blank line; empty for one that looks for none.
@@ -236,9 +225,9 @@ fn edges(results: &Results<'_>) -> Result<String> {
         edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
     let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
-    let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
-    let mut columns: Vec<(bool, Vec<String>)> =
-        others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();
+    let others = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok());
+    let mut columns = Columns::default();
+    others.for_each(|values| columns.add(false, column(&values, &rows, rows.len())));
     let of_axis = label(&first.axis);
     let (factor, unit) = of_axis.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
     let number = |value: f64| {
@@ -246,7 +235,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
         digits.to_string()
     };
     let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
-        columns.push((true, std::iter::once(head).chain(edges.iter().map(cell)).collect()));
+        columns.add(true, std::iter::once(head).chain(edges.iter().map(cell)).collect());
     };
     add("edge of".to_owned(), &|edge| {
         let statistic = edge.statistic.split(' ').next().unwrap_or_default();
@@ -262,7 +251,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
-    Ok(side_by_side(&columns) + "\n")
+    Ok(format!("{columns}\n"))
 }
 
 /// The head of a column and its first cells.

@@ -7,10 +7,10 @@ mod outputs;
 
 use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
-use super::output;
+use super::output::{self, Columns};
 use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
+use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
 use crate::simulate::{self as single, Request};
 use crate::sweep::Change;
@@ -162,7 +162,7 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, &sweep, parameters)?;
+    check_outputs(arguments, &sweep, parameters).map_err(UsageError)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
@@ -235,23 +235,19 @@ fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Re
         });
         return output::json(FORMAT, &report);
     }
+    let mut columns = Columns::default();
+    let mut add = |head: &str, cell: &dyn Fn(&Slip) -> String| {
+        columns.add(false, std::iter::once(head.to_owned()).chain(slips.iter().map(cell)).collect());
+    };
+    add("slip", &|slip| slip.number.to_string());
+    add("onset (s)", &|slip| format!("{:.6}", slip.onset));
+    add("interval (s)", &|slip| slip.interval.map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}")));
+    add("phase (rad)", &|slip| slip.phase.map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}")));
+    add("peak (N)", &|slip| format!("{:.2}", slip.peak_force));
+    add("drop (N)", &|slip| format!("{:.2}", slip.drop));
+    add("precursors", &|slip| slip.precursors.to_string());
     if !slips.is_empty() {
-        output::print("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors\n")?;
-    }
-    for slip in slips {
-        let optional = |value: Option<f64>, digits: usize| {
-            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
-        };
-        output::print(&format!(
-            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}\n",
-            slip.number,
-            slip.onset,
-            optional(slip.interval, 6),
-            optional(slip.phase, 4),
-            slip.peak_force,
-            slip.drop,
-            slip.precursors
-        ))?;
+        output::print(&columns.to_string())?;
     }
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));

@@ -54,12 +54,12 @@ impl Sweep {
         let mut point = Point { parameters: self.base.clone(), fixes_period: None };
         self.axes[axis].apply(row, &mut point);
         let [quantity] = self.axes[axis].quantities()[..] else { return None };
-        let value = match (quantity, point.fixes_period) {
-            (_, Some((_, value))) => value,
-            (Quantity::Parameter(symbol), None) => point.parameters.get(symbol).number()?,
-            _ => return None,
+        let value = match (point.fixes_period, quantity) {
+            (Some((_, value)), _) => Some(value),
+            (None, Quantity::Parameter(symbol)) => point.parameters.get(symbol).number(),
+            _ => None,
         };
-        Some((quantity.key(), value))
+        Some((quantity.key(), value?))
     }
 
     pub fn set_of(&self, point: u64) -> u64 {

@@ -1,10 +1,10 @@
 //! A job as a command line, so that one that fails can be looked at alone.
 
 use super::grid::Sweep;
-use super::job::Job;
+use super::job::{Job, solver_settings};
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
-use crate::solver::{Resolve, Solver};
+use crate::solver::Solver;
 
 impl Sweep {
     /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
@@ -24,22 +24,12 @@ impl Sweep {
                 // Its default is another there.
                 RecordingKey::Slips => words.push(format!("--slips {value}")),
                 _ if value == Recording::default().get(key) => {}
-                RecordingKey::MaxTime => words.push(format!("--time {value}")),
                 _ => words.push(format!("--record {}={value}", key.key())),
             }
         }
-        match self.solver {
-            solver if solver == Solver::default() => {}
-            Solver::EventDriven { tolerance, resolve } => {
-                words.push(format!("--tolerance {}", Value::Real(tolerance)));
-                if resolve != Resolve::Auto {
-                    words.push(format!("--resolve {}", resolve.word()));
-                }
-            }
-            Solver::FixedStep { time_step } => {
-                words.push(format!("--solver fixed-step --dt {}", Value::Real(time_step)));
-            }
-        }
+        let defaults = solver_settings(Solver::default());
+        let settings = solver_settings(self.solver).into_iter().filter(|setting| !defaults.contains(setting));
+        words.extend(settings.map(|(key, value)| format!("--set {key}={value}")));
         words.join(" ")
     }
 }

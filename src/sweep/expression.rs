@@ -9,7 +9,8 @@
 //! factor     = "-" factor | number | name | "(" sum ")"
 //! ```
 //!
-//! A comparison with something undefined, such as 0/0, does not hold. Read by operator precedence (V. R. Pratt, POPL 1973).
+//! A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys of the
+//! parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
 
 use std::cmp::Ordering;
 
@@ -242,5 +243,87 @@ impl<'a, N> Reader<'a, N> {
         };
         self.advance();
         Ok(expression)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::quantity::{Point, Quantity};
+    use super::*;
+    use crate::model::Parameters;
+
+    type Condition = Expression<Quantity>;
+
+    fn parse(text: &str) -> Result<Condition, ExpressionError> {
+        Condition::condition(text, &Quantity::comparable)
+    }
+
+    fn holds_at(text: &str, amplitude: f64, period: (Quantity, f64)) -> bool {
+        let parameters = Parameters { modulation_amplitude: amplitude, ..Parameters::default() };
+        let point = Point { parameters, fixes_period: Some(period) }.canonical();
+        parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).evaluate(&|&name| point.number(name)) == 1.0
+    }
+
+    fn holds(text: &str) -> bool {
+        holds_at(text, 1e-6, (Quantity::Frequency, 49.0))
+    }
+
+    #[test]
+    fn products_bind_before_sums_before_comparisons_before_and_before_or() {
+        for (text, expected) in [
+            ("1 + 2 * 3 == 7", true),
+            ("(1 + 2) * 3 == 9", true),
+            ("8 / 2 / 2 == 2 and 8 - 2 - 2 == 4", true),
+            ("1 < 2 or 1 < 0 and 1 < 0", true),
+            ("(1 < 2 or 1 < 0) and 1 < 0", false),
+            ("((N) - -10) / 4. == 2e1", true),
+            ("N >= 70 and N <= 70 and Ns != 19", true),
+            ("Kd * Delta < 50 and Kd*Delta>39.9", true),
+            ("0 / 0 != 1", false),
+        ] {
+            assert_eq!(holds(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_an_axis_set_is_compared_as_it_was_set() {
+        // 1/(1/49) is not 49.
+        assert!(holds("frequency == 49"));
+        assert!(holds("T == 1/49"));
+    }
+
+    #[test]
+    fn without_modulation_eta_and_the_frequency_are_zero() {
+        for text in ["eta == 0", "frequency == 0", "T > 1e300"] {
+            assert!(holds_at(text, 0.0, (Quantity::Eta, 3.0)), "{text}");
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_place() {
+        for (text, position, words) in [
+            ("frequency < 5OO", 13, "not a number"),
+            ("freqency < 500", 1, "did you mean frequency"),
+            ("frequency", 1, "comparison is needed"),
+            ("T = 1", 3, "=="),
+            ("1 < T < 2", 7, "a < b and b < c"),
+            ("(T < 1", 7, "closing )"),
+            ("T < 1)", 6, "not expected"),
+            ("T < 1 T > 0", 7, "and, or"),
+            ("T <", 4, "too early"),
+            ("", 1, "too early"),
+            ("T & 1", 3, "no meaning"),
+            ("break_on == 1", 1, "cannot be compared"),
+            ("(T < 1) + 1 > 2", 1, "a number is needed"),
+            ("T < 1 and 3", 11, "comparison is needed"),
+            ("T < 1e999", 5, "not a number"),
+            ("\u{3c4} < 1", 1, "no meaning"),
+        ] {
+            let error = parse(text).expect_err(text);
+            assert_eq!(error.position, position, "{text}: {error}");
+            assert!(error.problem.contains(words), "{text}: {error}");
+        }
+        let deep = "(".repeat(100_000);
+        assert!(parse(&deep).unwrap_err().problem.contains("more than 500"));
     }
 }

@@ -1,11 +1,10 @@
 //! Sweeps: a file that says what to run, and the jobs and parts that follow from it.
 //!
 //! ```text
-//! sweep file ->  axes, filter -> points -> jobs -> parts
-//! source.rs      read_axes.rs   grid.rs   job.rs   plan.rs
-//! read.rs        axes.rs                  cost.rs
-//! checks.rs      filter.rs
-//!                expression.rs
+//! sweep file ->  axes, conditions -> points -> jobs -> parts
+//! source.rs      read_axes.rs        grid.rs   job.rs   plan.rs
+//! read.rs        axes.rs                       cost.rs
+//! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set; labels.rs: how it is called before people
@@ -23,7 +22,6 @@ mod command;
 mod controls;
 mod cost;
 mod expression;
-mod filter;
 mod grid;
 mod job;
 mod labels;

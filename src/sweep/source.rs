@@ -93,22 +93,13 @@ impl<'a> Source<'a> {
         mistakes.sort_unstable();
         // A misspelt key is met twice where it stands for one that must be there.
         mistakes.dedup();
-        let (mut line, mut start) = (1, 0);
-        let placed = mistakes.into_iter().map(|(at, problem)| {
-            line += self.line_ends(start..at);
-            start = at;
-            Mistake { line, problem }
-        });
+        let placed = mistakes.into_iter().map(|(at, problem)| Mistake { line: self.line(at), problem });
         SweepError::Invalid { path: self.path.to_owned(), mistakes: placed.collect() }
     }
 
     /// The line of a byte of the text, counted from 1.
     pub fn line(&self, at: usize) -> usize {
-        1 + self.line_ends(0..at)
-    }
-
-    fn line_ends(&self, stretch: Range<usize>) -> usize {
-        self.text.as_bytes().get(stretch).unwrap_or_default().split(|byte| *byte == b'\n').count() - 1
+        self.text.as_bytes().get(..at).unwrap_or_default().split(|byte| *byte == b'\n').count()
     }
 
     pub fn table(&self) -> Result<DeTable<'a>, Refused> {
