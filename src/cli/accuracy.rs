@@ -10,13 +10,14 @@ use crate::run::threads::{self, Threads};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
-use clap::Args;
+use clap::{Args, value_parser};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// More sets would take long, and their tables would be too many to read.
 const MAX_SETS: usize = 12;
-const DEFAULT_OUT: &str = "results/accuracy";
+/// Most seeds, and most slips of each.
+const MAX_COUNT: u64 = 1_000_000;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -61,10 +62,10 @@ pub struct Arguments {
     quick: bool,
     /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
     /// [default: 8, with --quick 4]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     seeds: Option<u64>,
     /// Slips of each realisation [default: 100, with --quick 6]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     slips: Option<u64>,
     /// Threads [default: those that the batch system grants, else all cores]
     #[arg(long, value_name = "N", value_parser = threads::parse)]
@@ -75,16 +76,10 @@ pub struct Arguments {
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
-    if let Some(setting) =
-        arguments.variation.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
-    {
-        let problem = format!("--set {setting}: a study has seeds of its own; --seeds says how many");
-        return Err(UsageError(problem).into());
-    }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
     let changes = changes(&arguments.variation)?;
     let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
-    let mut out = PathBuf::from(DEFAULT_OUT);
+    let mut out = PathBuf::from("results/accuracy");
     if has_file || !changes.is_empty() {
         let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
         output::warn(&sweep.warnings());
@@ -99,14 +94,12 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             output::report("the seeds of the sweep are not used: a study has its own, and --seeds says how many");
         }
     }
-    let out = writable(arguments.out.clone().unwrap_or(out))?;
+    let out = arguments.out.clone().unwrap_or(out);
+    if !out.is_dir() && out.symlink_metadata().is_ok() {
+        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))).into());
+    }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
-    for (flag, count) in [("--seeds", study.seeds), ("--slips", study.slips)] {
-        if !(1..=1_000_000).contains(&count) {
-            return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
-        }
-    }
     let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?.count;
     let threads = threads.map_or(0, NonZeroUsize::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -121,14 +114,6 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
     }
     Ok(Exit::Done)
-}
-
-/// A folder that can be written to.
-fn writable(out: PathBuf) -> Result<PathBuf, UsageError> {
-    if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))));
-    }
-    Ok(out)
 }
 
 /// The sets of a sweep, with seed 0, and the number of jobs of each.

@@ -21,6 +21,7 @@ pub struct Progress {
     last_line: Instant,
     tally: Tally,
     threads: Threads,
+    has_results: bool,
 }
 
 impl Progress {
@@ -33,11 +34,18 @@ impl Progress {
             last_line: now,
             tally: Tally::default(),
             threads,
+            has_results: false,
         }
+    }
+
+    /// Whether something was committed, in this run or before.
+    pub const fn has_results(&self) -> bool {
+        self.has_results
     }
 
     pub fn show(&mut self, event: &RunEvent) {
         self.tally.note(event);
+        self.has_results |= matches!(event, RunEvent::PartCommitted { .. } | RunEvent::Started { jobs_there: 1.., .. });
         match event {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.begin = Instant::now();

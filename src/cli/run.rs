@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let report =
         crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
     let report = report.map_err(|error| match Exit::of(&error) {
-        Exit::Stopped => error.context("the run stopped; what was committed is kept"),
+        Exit::Stopped if progress.has_results() => error.context("the run stopped; what was committed is kept"),
         _ => error,
     })?;
     Ok(ending(&report, &root, arguments))

@@ -2,13 +2,13 @@
 
 use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
-use crate::model::{Parameters, Symbol};
+use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
 };
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::sweep::{Sweep, label, three_digits};
+use crate::sweep::{label, three_digits};
 use crate::table::columns::Table;
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
@@ -149,10 +149,14 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     Ok(sets)
 }
 
+/// The column that shows a parameter: of the period, the frequency.
+const fn key_of(symbol: Symbol) -> &'static str {
+    if matches!(symbol, Symbol::T) { FREQUENCY } else { symbol.key() }
+}
+
 /// The parameters in which sets differ, and what was found of them.
 fn usual_columns(rows: &[SetRow]) -> Vec<Values> {
-    let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() };
-    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key).collect();
+    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
     let columns = names.into_iter().chain(FOUND).filter_map(|name| Values::of(rows, name).ok());
     columns.filter(|values| values.numbers.iter().any(Option::is_some)).collect()
@@ -221,11 +225,15 @@ fn edges(results: &Results<'_>) -> Result<String> {
     }
     let edges = read_reduced::<EdgeRow>(results.layout())?;
     let Some(first) = edges.first() else { return Ok(String::new()) };
-    let rows: Vec<SetRow> =
-        edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
+    let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
+        frequency: parameters.frequency(),
+        parameters: parameters.clone(),
+        ..SetRow::default()
+    };
+    let rows: Vec<SetRow> = edges.iter().map(row).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
     let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
-    let others = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok());
+    let others = others.filter_map(|symbol| Values::of(&rows, key_of(symbol)).ok());
     let mut columns = Columns::default();
     others.for_each(|values| columns.add(false, column(&values, &rows, rows.len())));
     let of_axis = label(&first.axis);
@@ -295,7 +303,8 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     if let Some(first) = without.first() {
         let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
         let sets = output::count(without.len() as u64, "set");
-        let command = command_of(sweep, &first.parameters.parameters);
+        let job = sweep.set_with(&first.parameters.parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
+        let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
         notes.push(format!("{jobs} of {sets} without slips; the first: {command}"));
     }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
@@ -308,12 +317,6 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         notes.push(format!("{} of these the sweep no longer has", output::count(gone as u64, "set")));
     }
     notes
-}
-
-/// The command that shows a job of a set, its first.
-fn command_of(sweep: &Sweep, parameters: &Parameters) -> String {
-    let job = sweep.set_with(parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
-    job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job))
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
         (None, None) => {
             // With a time alone, slips do not end the job.
             let slips = if changes.iter().any(|change| change.key == "max_time") { 10_000_000 } else { 20 };
-            let text = format!("name = \"simulate\"\n[record]\nslips = {slips}\n");
+            let text = format!("name = \"simulate\"\n[model]\n[record]\nslips = {slips}\n");
             return of_flags(&varied(&text, changes));
         }
     };

@@ -21,7 +21,7 @@ use super::checks::Places;
 use super::quantity::Quantity;
 use super::read_axes::{read_spaced, spaced};
 use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Target};
-use super::set::{STATISTICS, Statistic, StatisticKind};
+use super::set::{STATISTICS, Statistic};
 use super::source::{Entry, Refused, Section, all, hint};
 use crate::model::Symbol;
 use crate::table::value::Shortest;
@@ -35,7 +35,7 @@ pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused
     section.only(&["of", "relative", "absolute", "seeds"]).ok();
     let of = section.required("of", "the statistic that is to be precise, such as of = \"tau_mean\"");
     let statistics =
-        of.and_then(|of| read_statistics(&of, Statistic::has_interval, "has no confidence interval; allowed are "));
+        of.and_then(|of| read_statistics(&of, |known| known.has_interval, "has no confidence interval; allowed are "));
     let target = read_target(section, statistics.as_deref().unwrap_or_default());
     Ok(Precision { statistics: statistics?, target: target? })
 }
@@ -91,7 +91,7 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
         (Some(entry), None) => {
             let allowed = "a number > 0 and < 1, as a share of the statistic";
             let share = entry.number(allowed, |share| share > 0.0 && share < 1.0)?;
-            match of.iter().find(|statistic| statistic.kind == StatisticKind::Angle) {
+            match of.iter().find(|statistic| statistic.is_angle()) {
                 Some(Statistic { key, .. }) => {
                     Err(entry.refuse(format!("{key} is an angle and has no relative error; set absolute, in rad")))
                 }
