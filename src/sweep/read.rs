@@ -80,7 +80,7 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
         if sets > MAX_SETS {
             let problem =
                 format!("[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps");
-            return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+            return Err(source.refuse(file.place_of("axes"), problem));
         }
         let least = sets * seeds.start();
         if let Some(wanted) = wanted.as_ref().filter(|wanted| wanted.refinement.max_jobs < least) {

@@ -156,6 +156,11 @@ impl<'a> Section<'a> {
         self.entries().into_iter().find(|entry| entry.key == key)
     }
 
+    /// Byte of an entry, or of the heading if it is not there.
+    pub fn place_of(&self, key: &str) -> usize {
+        self.entry(key).map_or(self.at, |entry| entry.at)
+    }
+
     /// An entry that must be there, unless a misspelt one was meant; `need` says what it is for.
     pub fn required(&self, key: &str, need: &str) -> Result<Entry<'a>, Refused> {
         self.entry(key).ok_or_else(|| match self.entries().iter().find(|entry| nearest(entry.key, &[key]).is_some()) {
