@@ -7,7 +7,7 @@ use crate::observe::{
     TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
-use crate::sweep::{Job, Mistake, Sweep};
+use crate::sweep::{Change, Job, Mistake, Sweep};
 use std::sync::atomic::AtomicBool;
 
 /// More samples than this, of 24 bytes each, are a mistake.
@@ -24,6 +24,23 @@ pub enum RequestError {
     BadSample(f64),
     #[error("sample {sample}: more than {MAX_SAMPLES:e} samples in about {time:.3} s; take a longer one")]
     TooManySamples { sample: f64, time: f64 },
+}
+
+/// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
+pub fn sweep_text(changes: &[Change]) -> String {
+    let is_given = |key: &str| changes.iter().any(|change| change.key == key);
+    let slips = match (is_given("slips"), is_given("max_time")) {
+        (true, _) => "",
+        // With a time alone, slips do not end the job.
+        (false, true) => "slips = 10000000\n",
+        (false, false) => "slips = 20\n",
+    };
+    let of = |section: &str| {
+        let own = changes.iter().filter(|change| change.section == section);
+        own.map(|Change { key, value, .. }| format!("{key} = {value}\n")).collect::<String>()
+    };
+    let [model, record, solver] = ["model", "record", "solver"].map(of);
+    format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }
 
 /// The mistakes in the text of a sweep, as those in what it was made from, which has neither sections nor lines.

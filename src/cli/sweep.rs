@@ -93,17 +93,12 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
     Ok(changes)
 }
 
-/// Reads a sweep file, or takes a preset, as varied; without either, a sweep with one point and 20 slips.
+/// Reads a sweep file, or takes a preset, as varied; without either, a sweep with one point, of what is set.
 pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, preset) {
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
-        (None, None) => {
-            // With a time alone, slips do not end the job.
-            let slips = if changes.iter().any(|change| change.key == "max_time") { 10_000_000 } else { 20 };
-            let text = format!("name = \"simulate\"\n[model]\n[record]\nslips = {slips}\n");
-            return of_flags(&varied(&text, changes));
-        }
+        (None, None) => return of_flags(&single::sweep_text(changes)),
     };
     vary(sweep?, changes)
 }
