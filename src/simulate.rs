@@ -37,7 +37,7 @@ pub fn sweep_text(changes: &[Change]) -> String {
     };
     let of = |section: &str| {
         let own = changes.iter().filter(|change| change.section == section);
-        own.map(|Change { key, value, .. }| format!("{key} = {value}\n")).collect::<String>()
+        own.flat_map(|Change { key, value, .. }| [key, " = ", value, "\n"]).collect::<String>()
     };
     let [model, record, solver] = ["model", "record", "solver"].map(of);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
