@@ -1,14 +1,13 @@
-//! One job with records on request: that of a sweep file, or of keys, which become the text of a sweep with one point, so
-//! that values, messages and the id of the job are the same.
+//! One job with records on request: that of a sweep with one point.
 
 use crate::model::theory::typical_interval;
 use crate::model::{ContactEvent, Parameters};
 use crate::observe::{
-    AttachedMap, ContactLog, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, RecordingKey,
-    SlipObserver, Trace, TraceRow,
+    AttachedMap, ContactLog, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, SlipObserver, Trace,
+    TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
-use crate::sweep::{Job, Mistake, Sweep};
+use crate::sweep::{Change, Job, Mistake, Sweep};
 use std::sync::atomic::AtomicBool;
 
 /// More samples than this, of 24 bytes each, are a mistake.
@@ -27,26 +26,24 @@ pub enum RequestError {
     TooManySamples { sample: f64, time: f64 },
 }
 
-/// Keys of a sweep file with their values as it has them.
-pub type Written = Vec<(String, String)>;
-
 /// The text of a sweep with one point. Without a number of slips it records 20, or with a longest time all until then.
-pub fn sweep_text(model: &Written, record: &Written, solver: &Written) -> String {
-    let is_given = |key: RecordingKey| record.iter().any(|(given, _)| given == key.key());
-    let slips = match (is_given(RecordingKey::Slips), is_given(RecordingKey::MaxTime)) {
+pub fn sweep_text(changes: &[Change]) -> String {
+    let is_given = |key: &str| changes.iter().any(|change| change.key == key);
+    let slips = match (is_given("slips"), is_given("max_time")) {
         (true, _) => "",
-        // With a time alone, slips do not end the run.
+        // With a time alone, slips do not end the job.
         (false, true) => "slips = 10000000\n",
         (false, false) => "slips = 20\n",
     };
-    let lines = |entries: &Written| {
-        entries.iter().flat_map(|(key, value)| [key.as_str(), " = ", value, "\n"]).collect::<String>()
+    let of = |section: &str| {
+        let own = changes.iter().filter(|change| change.section == section);
+        own.flat_map(|Change { key, value, .. }| [key, " = ", value, "\n"]).collect::<String>()
     };
-    let [model, record, solver] = [model, record, solver].map(lines);
+    let [model, record, solver] = ["model", "record", "solver"].map(of);
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }
 
-/// The mistakes in such a text, as those in what it was made from, which has neither sections nor lines.
+/// The mistakes in the text of a sweep, as those in what it was made from, which has neither sections nor lines.
 pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
     let problems = mistakes.iter().map(|Mistake { problem, .. }| {
         let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));

@@ -8,7 +8,7 @@ use stickslip::observe::{Recording, RecordingKey};
 /// Sections of a sweep file.
 const MODEL: &str = "model";
 const RECORD: &str = "record";
-pub const SOLVER: &str = "solver";
+const SOLVER: &str = "solver";
 
 /// Keys that stand for others, and those of the solver: section, key, meaning, what is allowed.
 const OTHERS: [(&str, &str, &str, &str); 6] = [

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow};
+use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
 use stickslip::results::layout::Layout;
 use stickslip::results::parts::committed_files;
 use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, PrecursorRow, SLIPS, SlipRow};
@@ -22,7 +22,6 @@ use stickslip::results::{Results, ResultsError};
 use stickslip::table::arrow::schema;
 use stickslip::table::columns::Table as TableRow;
 use stickslip::table::file::{Dataset, DatasetError};
-use stickslip::table::shown::shown;
 use stickslip::table::storage::Disk;
 
 /// The column by which tables of jobs are joined.
@@ -149,15 +148,8 @@ impl Wanted {
                 return Err(ResultsError::refused(layout.root(), problem).into());
             }
             _ => {
-                let file = layout.reduced_file(self.table);
-                if !file.try_exists().unwrap_or(true) {
-                    let problem = format!(
-                        "has no reduced data; call reduce(), or run `stickslip reduce {}` first",
-                        shown(layout.root())
-                    );
-                    return Err(ResultsError::refused(layout.root(), problem).into());
-                }
-                Dataset::new(&Disk, vec![file])
+                renew(results)?;
+                Dataset::new(&Disk, vec![layout.reduced_file(self.table)])
             }
         };
         let mut own = self.own.clone();

@@ -1,37 +1,30 @@
 //! One job.
 
 use crate::errors::{Error, in_text};
-use crate::keys::{SOLVER, hint, section};
+use crate::keys::{hint, section};
 use crate::table::Table;
 use crate::watched::watched;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stickslip::observe::{ContactRow, RecordingKey};
+use stickslip::observe::ContactRow;
 use stickslip::results::tables::{All, DriveAndSeed, JobRecord, JobRow, PrecursorRow, SlipRow, label, relabel};
 use stickslip::simulate::{self as single, Records, Request, only_job};
-use stickslip::sweep::Sweep;
+use stickslip::sweep::{Change, Sweep};
 use stickslip::table::columns::{Row, Value};
 
 /// The text of a sweep with one job, from keys and their values as TOML.
 #[pyfunction]
 pub fn sweep_text(keys: Vec<(String, String)>) -> PyResult<String> {
-    let [mut model, mut record, mut solver] = [Vec::new(), Vec::new(), Vec::new()];
-    let mut unknown = Vec::new();
+    let (mut changes, mut unknown) = (Vec::new(), Vec::new());
     for (key, value) in keys {
-        match (section(&key), RecordingKey::from_key(&key)) {
-            (_, Some(_)) => record.push((key, value)),
-            (Some(SOLVER), None) => solver.push((key, value)),
-            (Some(_), None) => model.push((key, value)),
-            (None, None) => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),
+        match section(&key) {
+            Some(section) => changes.push(Change { section, key, value }),
+            None => unknown.push(format!("in the keys: {key} = {value}: unknown key; {}", hint(&key))),
         }
     }
-    if unknown.is_empty() {
-        Ok(single::sweep_text(&model, &record, &solver))
-    } else {
-        Err(Error::Sweep(unknown.join("\n")).into())
-    }
+    if unknown.is_empty() { Ok(single::sweep_text(&changes)) } else { Err(Error::Sweep(unknown.join("\n")).into()) }
 }
 
 /// Reads a sweep: a file, or a text that was made of something.

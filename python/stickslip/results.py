@@ -25,7 +25,8 @@ def open(directory: str | PathLike[str]) -> "Results":
 
 
 class Results:
-    """The results directory of a sweep. Each table is read when it is asked for, as far as it is there.
+    """The results directory of a sweep. Each table is read when it is asked for, as far as it is there; the tables are
+    reduced first where the reduced data are not of them as they are.
 
     Every table is one of Arrow (`stickslip.Table`), with units, and goes into pandas, polars, DuckDB or pyarrow as it is.
     `columns` are names of columns to read, which saves time and memory; what a row means is in `Table.meaning`.
@@ -82,7 +83,7 @@ class Results:
         return self._table("points", columns)
 
     def reduce(self) -> None:
-        """Reduces the tables again, as far as they are there: for `sets` and the others that a stopped run does not make."""
+        """Reduces the tables, as far as they are there. `sets` and the others do so themselves where it is due."""
         _stickslip.reduce(self.directory)
 
     @cached_property

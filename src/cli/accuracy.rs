@@ -1,22 +1,23 @@
 //! `stickslip accuracy`: speed against error of the solvers, measured in one run.
 
 use super::exit::{Exit, UsageError};
-use super::output;
+use super::output::{self, Columns};
 use super::sweep::{self, PresetFlag, Variation, changes};
-use super::threads::ThreadsFlag;
 use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
+use crate::run::threads::{self, Threads};
 use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
-use clap::Args;
+use clap::{Args, value_parser};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// More sets would take long, and their tables would be too many to read.
 const MAX_SETS: usize = 12;
-const DEFAULT_OUT: &str = "results/accuracy";
+/// Most seeds, and most slips of each.
+const MAX_COUNT: u64 = 1_000_000;
 
 /// Measure speed against error of the solvers in one run
 #[derive(Debug, Args)]
@@ -61,29 +62,24 @@ pub struct Arguments {
     quick: bool,
     /// Realisations of each ensemble; 8 times as many, not all timed, at Delta = 0 and 1e-4 m/s unless --quick
     /// [default: 8, with --quick 4]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     seeds: Option<u64>,
     /// Slips of each realisation [default: 100, with --quick 6]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=MAX_COUNT))]
     slips: Option<u64>,
-    #[command(flatten)]
-    threads: ThreadsFlag,
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<NonZeroUsize>,
     /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
-    if let Some(setting) =
-        arguments.variation.settings.iter().find(|setting| setting.split('=').next().map(str::trim) == Some("seed"))
-    {
-        let problem = format!("--set {setting}: a study has seeds of its own; --seeds says how many");
-        return Err(UsageError(problem).into());
-    }
     let mut study = if arguments.quick { Study::quick() } else { Study::full() };
     let changes = changes(&arguments.variation)?;
     let has_file = arguments.sweep.is_some() || arguments.preset.preset.is_some();
-    let mut out = PathBuf::from(DEFAULT_OUT);
+    let mut out = PathBuf::from("results/accuracy");
     if has_file || !changes.is_empty() {
         let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
         output::warn(&sweep.warnings());
@@ -98,15 +94,14 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
             output::report("the seeds of the sweep are not used: a study has its own, and --seeds says how many");
         }
     }
-    let out = writable(arguments.out.clone().unwrap_or(out))?;
+    let out = arguments.out.clone().unwrap_or(out);
+    if !out.is_dir() && out.symlink_metadata().is_ok() {
+        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))).into());
+    }
     study.seeds = arguments.seeds.unwrap_or(study.seeds);
     study.slips = arguments.slips.unwrap_or(study.slips);
-    for (flag, count) in [("--seeds", study.seeds), ("--slips", study.slips)] {
-        if !(1..=1_000_000).contains(&count) {
-            return Err(UsageError(format!("{flag} {count}: must lie from 1 to 1000000")).into());
-        }
-    }
-    let threads = arguments.threads.choose()?.count.map_or(0, NonZeroUsize::get);
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?.count;
+    let threads = threads.map_or(0, NonZeroUsize::get);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
@@ -119,14 +114,6 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
         files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
     }
     Ok(Exit::Done)
-}
-
-/// A folder that can be written to.
-fn writable(out: PathBuf) -> Result<PathBuf, UsageError> {
-    if !out.is_dir() && out.symlink_metadata().is_ok() {
-        return Err(UsageError(format!("--out {}: must be a folder, or not be there yet", shown(&out))));
-    }
-    Ok(out)
 }
 
 /// The sets of a sweep, with seed 0, and the number of jobs of each.
@@ -171,51 +158,50 @@ fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
                 .to_owned(),
         );
     }
-    lines.extend(study.sets.iter().flat_map(|set| table(study, findings, set, all)));
-    lines.push(String::new());
-    lines.join("\n")
+    let tables = study.sets.iter().map(|set| table(study, findings, set, all));
+    lines.join("\n") + "\n" + &tables.collect::<String>()
 }
 
 /// A line for each solver at a set; -> before that of the sweep.
-fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Vec<String> {
+fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> String {
     let rows: Vec<&MethodRow> = findings.methods.iter().filter(|row| *row.parameters == *set).collect();
     let is_there = |quantity: &str| rows.iter().any(|row| findings.distances_of(row, quantity).is_some());
     let quantities = QUANTITIES.map(|(quantity, _)| quantity).into_iter();
-    let quantities: Vec<_> = quantities.filter(|&name| (all || name == "interval") && is_there(name)).collect();
-    let unit = |quantity: &str| if quantity == "phase" { "rad" } else { "%" };
-    let mut heading = format!("{:33}{:>9}{:>18}", "   solver", "ms/slip", "break times (s)");
-    heading.extend(quantities.iter().map(|name| format!("{:>18}", format!("{name} ({})", unit(name)))));
-    if all {
-        heading = format!("{heading}{:>8}{:>8}{:>9}{:>24}{:>9}", "median", "dearest", "ns/step", "together", "ledger");
-    }
-    let mut lines = vec![format!("\n{}", set_in_words(set)), heading];
+    let quantities = quantities.filter(|&name| (all || name == "interval") && is_there(name));
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-    for &row in &rows {
-        let (mark, errors) = (if row.solver == study.own.into() { "->" } else { "  " }, row.break_times);
-        let star = if row.cost.is_extrapolated() { "*" } else { "" };
-        let cost = format!("{:.3}{star}", 1e3 * row.cost.per_slip);
-        let times = errors.median.zip(errors.largest).map(|(median, largest)| format!("{median:.0e} ({largest:.0e})"));
-        let mut line = format!("{:33}{cost:>9}{:>18}", format!("{mark} {}", row.solver), or_none(times));
-        for name in &quantities {
-            let bias = findings.distances_of(row, name).map(|row| {
-                let scale = if unit(name) == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
+    let mut columns = Columns::default();
+    let mut add = |is_worded: bool, head: &str, cell: &dyn Fn(&MethodRow) -> String| {
+        columns.add(is_worded, std::iter::once(head.to_owned()).chain(rows.iter().map(|row| cell(row))).collect());
+    };
+    add(true, "   solver", &|row| {
+        format!("{} {}", if row.solver == study.own.into() { "->" } else { "  " }, row.solver)
+    });
+    add(false, "ms/slip", &|row| {
+        format!("{:.3}{}", 1e3 * row.cost.per_slip, if row.cost.is_extrapolated() { "*" } else { "" })
+    });
+    add(false, "break times (s)", &|MethodRow { break_times, .. }| {
+        let times = break_times.median.zip(break_times.largest);
+        or_none(times.map(|(median, largest)| format!("{median:.0e} ({largest:.0e})")))
+    });
+    for name in quantities {
+        let unit = if name == "phase" { "rad" } else { "%" };
+        add(false, &format!("{name} ({unit})"), &|row| {
+            or_none(findings.distances_of(row, name).map(|row| {
+                let scale = if unit == "%" { 100.0 / row.reference_mean.abs() } else { 1.0 };
                 format!("{:+.3} ± {:.3}", scale * row.distances.mean_bias, scale * row.half_width())
-            });
-            line = format!("{line}{:>18}", or_none(bias));
-        }
-        if all {
-            let mark = if errors.together_throughout { ">" } else { "" };
-            let together = errors.together.zip(errors.together_seconds);
-            line = format!(
-                "{line}{:>8.2}{:>8.2}{:>9.0}{:>24}{:>9}",
-                row.median_per_slip / row.cost.per_slip,
-                row.largest_per_slip / row.cost.per_slip,
-                1e9 * row.cost.per_step,
-                or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s"))),
-                or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))),
-            );
-        }
-        lines.push(line);
+            }))
+        });
     }
-    lines
+    if all {
+        add(false, "median", &|row| format!("{:.2}", row.median_per_slip / row.cost.per_slip));
+        add(false, "dearest", &|row| format!("{:.2}", row.largest_per_slip / row.cost.per_slip));
+        add(false, "ns/step", &|row| format!("{:.0}", 1e9 * row.cost.per_step));
+        add(false, "together", &|MethodRow { break_times, .. }| {
+            let mark = if break_times.together_throughout { ">" } else { "" };
+            let together = break_times.together.zip(break_times.together_seconds);
+            or_none(together.map(|(breaks, seconds)| format!("{mark}{breaks} breaks, {seconds:.3} s")))
+        });
+        add(false, "ledger", &|row| or_none(row.ledger_residual.map(|residual| format!("{:.1e}", residual.abs()))));
+    }
+    format!("\n{}\n{columns}", set_in_words(set))
 }

@@ -122,24 +122,18 @@ pub fn batch(arguments: &Arguments, program: Option<&Path>) -> Result<Exit> {
             (HYPERQUEUE, format!("1-{starts}"), time::with_units(*time), options)
         }
     };
-    output::print(&filled(script, |name| match name {
-        "name" => sweep.name().to_owned(),
-        "logs" => quoted(&logs),
-        "array" => array.clone(),
-        "threads" => threads.to_string(),
-        "time" => time.clone(),
-        "options" => options.clone(),
-        "command" => command.clone(),
-        _ => unreachable!("the scripts have these names"),
-    }))?;
+    // Last what may hold braces itself.
+    let values = [
+        ("{{name}}", sweep.name()),
+        ("{{array}}", &array),
+        ("{{threads}}", &threads.to_string()),
+        ("{{time}}", &time),
+        ("{{logs}}", &quoted(&logs)),
+        ("{{command}}", &command),
+        ("{{options}}", &options),
+    ];
+    output::print(&values.iter().fold(script.to_owned(), |script, (name, value)| script.replace(name, value)))?;
     Ok(Exit::Done)
-}
-
-/// A text with values in the places of {{names}}.
-fn filled(text: &str, value: impl Fn(&str) -> String) -> String {
-    let mut pieces = text.split("{{");
-    let first = pieces.next().unwrap_or_default().to_owned();
-    pieces.filter_map(|piece| piece.split_once("}}")).fold(first, |text, (name, rest)| text + &value(name) + rest)
 }
 
 /// How long before the end of its time a worker stops.

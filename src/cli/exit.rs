@@ -3,6 +3,7 @@
 use crate::figure::BadOption;
 use crate::reduce::NoJobs;
 use crate::results::{ErrorKind, ResultsError};
+use crate::run::threads::ThreadsError;
 use crate::solver::SimulationError;
 use crate::sweep::SweepError;
 use crate::table::file::DatasetError;
@@ -30,7 +31,8 @@ impl Exit {
     }
 
     fn of_cause(cause: &(dyn std::error::Error + 'static)) -> Option<Self> {
-        if cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<SweepError>() || cause.is::<NoJobs>() {
+        let is_usage = cause.is::<UsageError>() || cause.is::<BadOption>() || cause.is::<ThreadsError>();
+        if is_usage || cause.is::<SweepError>() || cause.is::<NoJobs>() {
             return Some(Self::Usage);
         }
         if let Some(error) = cause.downcast_ref::<SimulationError>() {

@@ -7,9 +7,7 @@ use crate::sweep::Sweep;
 use crate::table::shown::shown;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Write a commented sweep file to start from
 #[derive(Debug, Args)]
@@ -83,27 +81,14 @@ pub fn init(arguments: &Arguments) -> Result<Exit> {
         Some(question) => format!("# {question}\n{}", &text[text.find("name = ").unwrap_or(0)..]),
         None => text,
     };
-    write_new(file, &text)?;
+    if file.symlink_metadata().is_ok() {
+        let problem = format!("{}: is there already and was not changed; choose another name", shown(file));
+        return Err(UsageError(problem).into());
+    }
+    output::replace(file, |draft| Ok(std::fs::write(draft, &text)?))?;
     let quoted = output::quoted_path(file);
     output::report(&format!("wrote {}. See what it would run: stickslip plan {quoted}", shown(file)));
     Ok(Exit::Done)
-}
-
-/// Writes a file that must not be there yet.
-fn write_new(path: &Path, text: &str) -> Result<()> {
-    let mut file = match OpenOptions::new().write(true).create_new(true).open(path) {
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            let problem = format!("{}: is there already and was not changed; choose another name", shown(path));
-            return Err(UsageError(problem).into());
-        }
-        file => file.with_context(|| format!("{}: cannot be written", shown(path)))?,
-    };
-    let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
-    if written.is_err() {
-        // What is left is no sweep file.
-        let _ = std::fs::remove_file(path);
-    }
-    written.with_context(|| format!("{}: cannot be written", shown(path)))
 }
 
 #[cfg(test)]
@@ -111,6 +96,7 @@ mod tests {
     use super::*;
     use crate::model::Symbol;
     use crate::observe::RecordingKey;
+    use std::path::Path;
 
     fn sweep(text: &str) -> Sweep {
         Sweep::parse(text, Path::new("template.toml")).unwrap()

@@ -18,12 +18,11 @@ mod signals;
 mod simulate;
 mod status;
 mod sweep;
-mod threads;
 mod time;
 mod verify;
 
-use self::exit::{Exit, UsageError};
-use clap::{Args, Parser, Subcommand};
+use self::exit::Exit;
+use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::Path;
 
@@ -63,37 +62,12 @@ enum Command {
     Accuracy(accuracy::Arguments),
     #[command(hide = true)]
     Generate(generate::Arguments),
-    #[command(hide = true)]
-    Compact(Gone),
-    #[command(hide = true)]
-    Merge(Gone),
 }
-
-/// A command that is there no more, with whatever it is given.
-#[derive(Debug, Args)]
-#[command(disable_help_flag = true)]
-struct Gone {
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-    _arguments: Vec<OsString>,
-}
-
-const NO_COMPACT: &str = "compact: is gone; `stickslip export DIR -o FOLDER` writes a few large files elsewhere, and leaves \
-                          DIR as it is";
-const NO_MERGE: &str = "merge: is gone; parts have the same names and bytes wherever they were made, and the script in \
-                        docs/clusters.md (Without a common disk) copies them into one directory";
 
 /// Parses a command line, does what it asks, and returns the exit code. `program` is what starts this program again, by
 /// default the executable itself; the first of the arguments is its name.
 pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let command = Cli::parse_from(arguments).command;
-    if let Some(limit) = too_little_memory() {
-        output::report(&format!(
-            "error: {} MB of memory are allowed (ulimit -v), and {} MB are needed at least",
-            limit >> 20,
-            MIN_MEMORY >> 20
-        ));
-        return Exit::Usage as u8;
-    }
     let ended = match command {
         Command::Init(arguments) => init::init(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments),
@@ -109,26 +83,12 @@ pub fn main(program: Option<&Path>, arguments: impl IntoIterator<Item = OsString
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::Generate(arguments) => generate::generate(&arguments),
-        Command::Compact(_) => Err(UsageError(NO_COMPACT.to_owned()).into()),
-        Command::Merge(_) => Err(UsageError(NO_MERGE.to_owned()).into()),
     };
     let exit = ended.unwrap_or_else(|error| {
         output::report(&format!("error: {}", message(&error)));
         Exit::of(&error)
     });
     exit as u8
-}
-
-/// Least bytes of memory within which the program says what it could not do, rather than be aborted.
-const MIN_MEMORY: u64 = 64 << 20;
-
-/// What this process may use, if it is less.
-fn too_little_memory() -> Option<u64> {
-    #[cfg(unix)]
-    let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
-    #[cfg(not(unix))]
-    let limit = None;
-    limit.filter(|&limit| limit < MIN_MEMORY)
 }
 
 /// An error and its causes, without those that it already quotes.

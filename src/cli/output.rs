@@ -7,9 +7,10 @@ use crate::table::shown::{is_plain, shown};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
-use std::fs::{self, OpenOptions};
-use std::io::{self, ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::fmt;
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::time::Duration;
 
 /// Writes to standard output. That its reader has seen enough, as `head` has, is no error.
@@ -51,6 +52,31 @@ pub fn plain_json(value: &impl Serialize) -> Result<()> {
 pub fn pairs(pairs: &[(&str, String)]) -> Result<()> {
     let width = pairs.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
     pairs.iter().try_for_each(|(label, value)| print(&format!("{label:width$}  {value}\n")))
+}
+
+/// Columns of cells side by side, each with whether it is of words, which stand to the left.
+#[derive(Default)]
+pub struct Columns(Vec<(bool, Vec<String>)>);
+
+impl Columns {
+    pub fn add(&mut self, is_worded: bool, cells: Vec<String>) {
+        self.0.push((is_worded, cells));
+    }
+}
+
+impl fmt::Display for Columns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = self.0.iter().map(|(_, cells)| width(cells)).collect();
+        let lines = self.0.first().map_or(0, |(_, cells)| cells.len());
+        (0..lines).try_for_each(|line| {
+            let padded = self.0.iter().zip(&widths).map(|((is_worded, cells), &width)| {
+                let cell = &cells[line];
+                if *is_worded { format!("{cell:width$}") } else { format!("{cell:>width$}") }
+            });
+            writeln!(f, "{}", padded.collect::<Vec<_>>().join("  ").trim_end())
+        })
+    }
 }
 
 /// A duration in the unit that suits it.
@@ -101,25 +127,13 @@ pub fn replace(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<(
         Err(_) if path.is_symlink() => return refused("is a link that leads nowhere; remove it, or name another file"),
         Err(_) => path.to_owned(),
     };
-    let draft = new_draft(&place).with_context(cannot)?;
+    let draft = place.with_file_name(format!(".stickslip-{}.draft", std::process::id()));
     let written = write(&draft).and_then(|()| Ok(fs::rename(&draft, &place)?));
     if written.is_err() {
         // What remains of a draft is of no use; the first error is the one to report.
         let _ = fs::remove_file(&draft);
     }
     written.with_context(cannot)
-}
-
-/// A new file beside a place, under a name that nothing has.
-fn new_draft(place: &Path) -> io::Result<PathBuf> {
-    let mut number = 0_u32;
-    loop {
-        let draft = place.with_file_name(format!(".stickslip-{number}.draft"));
-        match OpenOptions::new().write(true).create_new(true).open(&draft) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
-            created => return created.map(|_| draft),
-        }
-    }
 }
 
 /// A line on a terminal, with the time so far, until it is dropped.
@@ -158,6 +172,7 @@ pub fn quoted_path(path: &Path) -> String {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use std::io;
     use std::os::unix::fs::{FileTypeExt, symlink};
     use std::process::Command;
 
@@ -166,21 +181,20 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_where_its_links_lead_and_drafts_take_no_name_of_another() {
+    fn a_file_is_replaced_where_its_links_lead_and_no_draft_remains() {
         let folder = tempfile::tempdir().unwrap();
-        let [file, link, draft] = ["page", "link", ".stickslip-0.draft"].map(|name| folder.path().join(name));
-        fs::write(&draft, "mine").unwrap();
+        let [file, link] = ["page", "link"].map(|name| folder.path().join(name));
         symlink("page", &link).unwrap();
         assert!(put(&link, "a").unwrap_err().to_string().contains("is a link that leads nowhere"));
         put(&file, "b").unwrap();
         put(&link, "c").unwrap();
         assert!(link.is_symlink());
-        assert_eq!([&file, &draft].map(|path| fs::read_to_string(path).unwrap()), ["c", "mine"]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), "c");
         assert!(put(folder.path(), "d").unwrap_err().to_string().contains("is a folder"));
         replace(&file, |draft| fs::write(draft, "half").and(Err(io::Error::other("full"))).map_err(Into::into))
             .unwrap_err();
         assert_eq!(fs::read_to_string(&file).unwrap(), "c");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Report`] as JSON.
+/// Version of the JSON.
 const FORMAT: u32 = 1;
 
 /// Bytes of memory that a worker takes beside its jobs, for the program, commits and the reduction; and for each thread, for
@@ -48,26 +48,6 @@ const FORMAT: u32 = 1;
 const MEMORY: f64 = 80e6;
 const MEMORY_OF_A_CONTACT: f64 = 350.0;
 const MEMORY_OF_A_SLIP: f64 = 600.0;
-
-#[derive(Serialize)]
-struct Report {
-    name: String,
-    /// Keys that each axis moves, and its number of points.
-    axes: Vec<Json>,
-    points: u64,
-    jobs: u64,
-    parts: u64,
-    slips: u64,
-    predicted_cpu_seconds: f64,
-    predicted_wall_seconds: f64,
-    threads: usize,
-    worker_memory_bytes: f64,
-    thread_memory_bytes: f64,
-    /// What all rounds of a sweep that decides for itself may add up to; the numbers above are those of the first.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    at_most: Option<Bounds>,
-    directory: Option<Directory>,
-}
 
 /// What of the sweep is in its results directory, or why it cannot be run there.
 #[derive(Serialize)]
@@ -102,10 +82,15 @@ impl Directory {
         let round =
             self.rounds.as_ref().map_or_else(String::new, |rounds| format!("; round {}", output::rounds(rounds)));
         match (&self.overview, &self.refused) {
-            (Some(overview), _) => format!(
-                "{path}: {} done, {} failed, {} to run; {} kept that the sweep no longer has{round}",
-                overview.jobs_done, overview.jobs_failed, overview.jobs_missing, overview.jobs_kept
-            ),
+            (Some(overview), _) => {
+                let Overview { jobs_done, jobs_failed, jobs_kept, jobs_missing, .. } = overview;
+                let kept = match jobs_kept {
+                    0 => String::new(),
+                    kept => format!("; {kept} more done that the sweep no longer has"),
+                };
+                let own = jobs_done - jobs_kept;
+                format!("{path}: {own} done, {jobs_failed} failed, {jobs_missing} to run{kept}{round}")
+            }
             (None, refused) => format!("refused: {}", refused.as_deref().unwrap_or_default()),
         }
     }
@@ -119,54 +104,58 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
     let root = arguments.out.clone().or(default);
     let totals = Plan::new(&[Extension::new(&sweep, &[])]).totals();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let report = Report {
-        name: sweep.name().to_owned(),
-        axes: sweep.axes().map(|(keys, points)| json!({ "keys": keys, "points": points })).collect(),
-        points: sweep.point_count(),
-        jobs: totals.jobs,
-        parts: totals.parts,
-        slips: totals.jobs.saturating_mul(sweep.recording().slips),
-        predicted_cpu_seconds: totals.cost,
-        predicted_wall_seconds: totals.cost / threads as f64,
-        threads,
-        worker_memory_bytes: MEMORY,
-        thread_memory_bytes: MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part,
-        at_most: sweep.bounds(),
-        directory: root.map_or(Ok(None), |root| Directory::of(&sweep, root))?,
-    };
+    let wall_time = totals.cost / threads as f64;
+    let thread_memory = MEMORY_OF_A_CONTACT * totals.contacts as f64 + MEMORY_OF_A_SLIP * totals.slips_of_part;
+    let slips = totals.jobs.saturating_mul(sweep.recording().slips);
+    // What all rounds of a sweep that decides for itself may add up to; the other numbers are those of the first.
+    let at_most = sweep.bounds();
+    let directory = root.map_or(Ok(None), |root| Directory::of(&sweep, root))?;
     if arguments.json {
+        let axes: Vec<Json> = sweep.axes().map(|(keys, points)| json!({ "keys": keys, "points": points })).collect();
+        let mut report = json!({
+            "name": sweep.name(),
+            "axes": axes,
+            "points": sweep.point_count(),
+            "jobs": totals.jobs,
+            "parts": totals.parts,
+            "slips": slips,
+            "predicted_cpu_seconds": totals.cost,
+            "predicted_wall_seconds": wall_time,
+            "threads": threads,
+            "worker_memory_bytes": MEMORY,
+            "thread_memory_bytes": thread_memory,
+            "directory": directory,
+        });
+        if let Some(at_most) = at_most {
+            report["at_most"] = json!(at_most);
+        }
         output::json(FORMAT, &report)?;
     } else {
         let axes: Vec<String> = sweep.axes().map(|(keys, points)| format!("{keys} ({points})")).collect();
-        let directory =
-            report.directory.as_ref().map_or("none yet: all jobs are to run".to_owned(), Directory::in_words);
-        let (choice, which) = match report.at_most {
+        let directory = directory.map_or("none yet: all jobs are to run".to_owned(), |directory| directory.in_words());
+        let (choice, which) = match at_most {
             Some(_) => (", from which the rounds choose", "in the first round, to which the numbers below refer"),
             None if sweep.recording().control => ("", "after conditions and duplicates, and their controls"),
             None => ("", "after conditions and duplicates"),
         };
         let mut pairs = vec![
-            ("sweep", report.name),
+            ("sweep", sweep.name().to_owned()),
             ("axes", if axes.is_empty() { "none: a single point".to_owned() } else { axes.join(" x ") }),
-            ("grid points", format!("{}{choice}", report.points)),
-            ("jobs", format!("{} {which}", report.jobs)),
-            ("parts", report.parts.to_string()),
-            ("slips to record", report.slips.to_string()),
+            ("grid points", format!("{}{choice}", sweep.point_count())),
+            ("jobs", format!("{} {which}", totals.jobs)),
+            ("parts", totals.parts.to_string()),
+            ("slips to record", slips.to_string()),
             (
                 "predicted CPU time",
                 format!("{}, {:.1} core-hours", output::duration(totals.cost), totals.cost / 3600.0),
             ),
-            ("predicted wall time", format!("{} on {threads} cores", output::duration(report.predicted_wall_seconds))),
+            ("predicted wall time", format!("{} on {threads} cores", output::duration(wall_time))),
             (
                 "worker memory",
-                format!(
-                    "{} and {} for each thread",
-                    output::memory(MEMORY),
-                    output::memory(report.thread_memory_bytes)
-                ),
+                format!("{} and {} for each thread", output::memory(MEMORY), output::memory(thread_memory)),
             ),
         ];
-        if let Some(Bounds { sets, jobs, predicted_cost }) = report.at_most {
+        if let Some(Bounds { sets, jobs, predicted_cost }) = at_most {
             let cost = output::duration(predicted_cost);
             pairs.push(("all rounds", format!("at most {sets} sets, {jobs} jobs, {cost} of CPU time")));
         }

@@ -4,19 +4,20 @@ use super::exit::{Exit, UsageError};
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag, Variation};
-use super::threads::ThreadsFlag;
 use super::{output, reduce, show, signals, status, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
 use crate::results::Results;
 use crate::results::layout::Layout;
+use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -53,8 +54,9 @@ pub struct Arguments {
     /// Results directory; needed with --set or --axis [default: results/<name of the sweep>, or the one to resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    threads: ThreadsFlag,
+    /// Threads [default: those that the batch system grants, else all cores]
+    #[arg(long, value_name = "N", value_parser = threads::parse)]
+    threads: Option<NonZeroUsize>,
     /// Run one share of N into a directory of its own, where there is no common disk
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
@@ -86,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
     let stop = signals::catch()?;
     let (sweep, root) = arguments.sweep_and_root()?;
     output::warn(&sweep.warnings());
-    let threads = arguments.threads.choose()?;
+    let threads = Threads::choose(arguments.threads, |variable| std::env::var_os(variable))?;
     let options = Options {
         threads: threads.count,
         stop,
@@ -182,7 +184,12 @@ fn work(
 /// Says what is left and what to do, and how the command ends.
 fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
     if report.stopped {
-        output::report(&resume_hint(report, arguments.walltime.is_some()));
+        let left = output::count(report.jobs_left, "job");
+        let hint = match arguments.walltime {
+            Some(_) if report.jobs_run == 0 => "No part ended in this time: give a longer --walltime.",
+            _ => "The same command resumes.",
+        };
+        output::report(&format!("stopped with {left} left; finished jobs are kept. {hint}"));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
         return if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped };
@@ -224,17 +231,6 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
     let mut lines = reduce::summary_lines(&summary, layout);
     lines.extend(status::no_slips(&results));
     Ok(Some(Reduced { lines, result: show::summary(&results, summary.sets)?, figures }))
-}
-
-/// What to do after a run that stopped early.
-fn resume_hint(report: &RunReport, has_walltime: bool) -> String {
-    let left = output::count(report.jobs_left, "job");
-    let hint = if has_walltime && report.jobs_run == 0 {
-        "No part ended in this time: give a longer --walltime."
-    } else {
-        "The same command resumes."
-    };
-    format!("stopped with {left} left; finished jobs are kept. {hint}")
 }
 
 fn summary_lines(report: &RunReport) -> Vec<(&'static str, String)> {

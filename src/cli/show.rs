@@ -1,14 +1,14 @@
 //! `stickslip show`: the result of a sweep, a line for each set. `run` ends with its first lines.
 
 use super::exit::{Exit, UsageError};
-use super::output;
-use crate::model::{Parameters, Symbol};
+use super::output::{self, Columns};
+use crate::model::Symbol;
 use crate::reduce::{
     EdgeRow, FREQUENCY, Interval, SetRow, Values, compare, differing, read_reduced, renew, sets_where,
 };
 use crate::results::Results;
 use crate::results::layout::Layout;
-use crate::sweep::{Sweep, label, three_digits};
+use crate::sweep::{label, three_digits};
 use crate::table::columns::Table;
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
@@ -149,10 +149,14 @@ fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
     Ok(sets)
 }
 
+/// The column that shows a parameter: of the period, the frequency.
+const fn key_of(symbol: Symbol) -> &'static str {
+    if matches!(symbol, Symbol::T) { FREQUENCY } else { symbol.key() }
+}
+
 /// The parameters in which sets differ, and what was found of them.
 fn usual_columns(rows: &[SetRow]) -> Vec<Values> {
-    let key = |symbol: Symbol| if symbol == Symbol::T { FREQUENCY } else { symbol.key() };
-    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key).collect();
+    let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
     let columns = names.into_iter().chain(FOUND).filter_map(|name| Values::of(rows, name).ok());
     columns.filter(|values| values.numbers.iter().any(Option::is_some)).collect()
@@ -207,22 +211,11 @@ fn print_csv(columns: &[Values], sets: usize) -> Result<()> {
 
 /// A table for people: symbols and units at its head, values with half of their 95 % intervals.
 fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
-    let cells: Vec<_> = columns.iter().map(|values| (values.is_worded(), column(values, rows, most))).collect();
-    side_by_side(&cells)
-}
-
-/// Columns of cells side by side, those of words to the left.
-fn side_by_side(columns: &[(bool, Vec<String>)]) -> String {
-    let width = |cells: &[String]| cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
-    let lines = columns.first().map_or(0, |(_, cells)| cells.len());
-    let line = |line: usize| {
-        let padded = columns.iter().map(|(is_worded, cells)| {
-            let (cell, width) = (&cells[line], width(cells));
-            if *is_worded { format!("{cell:width$}") } else { format!("{cell:>width$}") }
-        });
-        format!("{}\n", padded.collect::<Vec<_>>().join("  ").trim_end())
-    };
-    (0..lines).map(line).collect()
+    let mut text = Columns::default();
+    for values in columns {
+        text.add(values.is_worded(), column(values, rows, most));
+    }
+    text.to_string()
 }
 
 /// The edges that a sweep has found, and a blank line; empty for one that looks for none.
@@ -232,13 +225,17 @@ fn edges(results: &Results<'_>) -> Result<String> {
     }
     let edges = read_reduced::<EdgeRow>(results.layout())?;
     let Some(first) = edges.first() else { return Ok(String::new()) };
-    let rows: Vec<SetRow> =
-        edges.iter().map(|edge| SetRow { parameters: edge.parameters.clone(), ..SetRow::default() }).collect();
+    let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
+        frequency: parameters.frequency(),
+        parameters: parameters.clone(),
+        ..SetRow::default()
+    };
+    let rows: Vec<SetRow> = edges.iter().map(row).collect();
     let axis = Symbol::from_key(&first.axis).unwrap_or(Symbol::T);
     let others = differing(&rows.iter()).into_iter().filter(|symbol| *symbol != axis);
-    let others: Vec<Values> = others.filter_map(|symbol| Values::of(&rows, symbol.key()).ok()).collect();
-    let mut columns: Vec<(bool, Vec<String>)> =
-        others.iter().map(|values| (false, column(values, &rows, rows.len()))).collect();
+    let others = others.filter_map(|symbol| Values::of(&rows, key_of(symbol)).ok());
+    let mut columns = Columns::default();
+    others.for_each(|values| columns.add(false, column(&values, &rows, rows.len())));
     let of_axis = label(&first.axis);
     let (factor, unit) = of_axis.scale(edges.iter().map(|edge| edge.bracket_high).fold(0.0, f64::max));
     let number = |value: f64| {
@@ -246,7 +243,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
         digits.to_string()
     };
     let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
-        columns.push((true, std::iter::once(head).chain(edges.iter().map(cell)).collect()));
+        columns.add(true, std::iter::once(head).chain(edges.iter().map(cell)).collect());
     };
     add("edge of".to_owned(), &|edge| {
         let statistic = edge.statistic.split(' ').next().unwrap_or_default();
@@ -262,7 +259,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
-    Ok(side_by_side(&columns) + "\n")
+    Ok(format!("{columns}\n"))
 }
 
 /// The head of a column and its first cells.
@@ -306,7 +303,8 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     if let Some(first) = without.first() {
         let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
         let sets = output::count(without.len() as u64, "set");
-        let command = command_of(sweep, &first.parameters.parameters);
+        let job = sweep.set_with(&first.parameters.parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
+        let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
         notes.push(format!("{jobs} of {sets} without slips; the first: {command}"));
     }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
@@ -319,12 +317,6 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         notes.push(format!("{} of these the sweep no longer has", output::count(gone as u64, "set")));
     }
     notes
-}
-
-/// The command that shows a job of a set, its first.
-fn command_of(sweep: &Sweep, parameters: &Parameters) -> String {
-    let job = sweep.set_with(parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
-    job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job))
 }
 
 #[cfg(test)]

@@ -1,23 +1,22 @@
 //! `stickslip simulate`: one job, everything visible.
 //!
-//! The job is that of a sweep file, or of flags, which are turned into the text of a sweep with one point: values, messages
-//! and the id of the job are the same.
+//! The job is that of a sweep with one point, a file or the text that flags make: values, messages and the id of the job
+//! are the same.
 
 mod outputs;
 
 use self::outputs::{check_outputs, write_pictures, write_table};
 use super::exit::{Exit, UsageError};
-use super::output;
-use super::sweep::{self, PresetFlag, Variation, changes, number, real};
+use super::output::{self, Columns};
+use super::sweep::{self, PresetFlag, Variation, changes};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{ContactRow, Measurements, RecordingKey, Regime};
+use crate::observe::{ContactRow, Measurements, RecordingKey, Regime, Slip};
 use crate::results::tables::{self, DriveAndSeed, JobOutcome, SlipRow};
 use crate::simulate::{self as single, Request};
 use crate::sweep::Change;
 use crate::table::file::Footer;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -50,22 +49,22 @@ struct JobFlags {
     #[arg(long = "set", visible_alias = "record", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Slips to record after start-up [default: that of the file; without one 20, unless --time is given]
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "N")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     slips: Option<String>,
     /// Model time at which the job ends even without its slips, in s
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     time: Option<String>,
     /// Method [default: event-driven]
     #[arg(long, value_parser = ["event-driven", "fixed-step"])]
     solver: Option<String>,
     /// Tolerance of the event-driven solver, relative to fs/k [default: 1e-3]
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "X")]
+    #[arg(long, allow_negative_numbers = true, value_name = "X")]
     tolerance: Option<String>,
     /// How the event-driven solver resolves motion: on a grid, in Taylor steps, or whichever is better
     #[arg(long, value_name = "auto|grid|taylor")]
     resolve: Option<String>,
     /// Step of the fixed-step solver, in s [default: 1e-6]
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "SECONDS")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     dt: Option<String>,
 }
 
@@ -88,7 +87,7 @@ struct TableFlags {
     #[arg(long, value_name = "FILE")]
     slip_table: Option<PathBuf>,
     /// Time between samples of trace, map and plot, in s
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 1e-4)]
     sample: f64,
 }
 
@@ -102,10 +101,10 @@ struct PlotFlags {
     #[arg(long, value_enum, default_value_t = Panel::Both, requires = "files")]
     panel: Panel,
     /// First instant of the plot, in s
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "files")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", default_value_t = 0.0, requires = "files")]
     from: f64,
     /// Last instant of the plot, in s [default: the end]
-    #[arg(long, value_parser = real, allow_negative_numbers = true, value_name = "SECONDS", requires = "files")]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", requires = "files")]
     until: Option<f64>,
 }
 
@@ -155,34 +154,15 @@ enum Panel {
     Both,
 }
 
-/// Version of [`Report`] as JSON.
+/// Version of the JSON.
 const FORMAT: u32 = 1;
-
-#[derive(Serialize)]
-struct Report {
-    job_id: String,
-    simulated_seconds: f64,
-    slips: usize,
-    mean_interval_seconds: Option<f64>,
-    outcome: &'static str,
-    regime: Option<&'static str>,
-    mean_friction_newtons: Option<f64>,
-    attached_fraction: Option<f64>,
-    slip_share: Option<f64>,
-    breaks: u64,
-    reattachments: u64,
-    ruptures: u64,
-    steps: u64,
-    leaps: u64,
-    wall_seconds: f64,
-}
 
 pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let changes = arguments.job.changes()?;
     let sweep = sweep::read(arguments.sweep.as_deref(), arguments.preset.preset, &changes)?;
     let job = single::only_job(&sweep).map_err(|error| UsageError(error.to_string()))?;
     let parameters = &job.parameters;
-    check_outputs(arguments, &sweep, parameters)?;
+    check_outputs(arguments, &sweep, parameters).map_err(UsageError)?;
     output::warn(&sweep.warnings());
     let begin = Instant::now();
     let never = AtomicBool::new(false);
@@ -228,66 +208,64 @@ fn as_json(parameters: &Parameters) -> String {
     serde_json::Value::Object(entries.collect()).to_string()
 }
 
-fn report(json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
+fn report(in_json: bool, job_id: &str, measured: &Measurements, wall: f64) -> Result<()> {
     let (slips, summary, averages) = (&measured.slips, &measured.summary, measured.averages);
     let intervals: Vec<f64> = slips.iter().filter_map(|slip| slip.interval).collect();
     let mean = (!intervals.is_empty()).then(|| intervals.iter().sum::<f64>() / intervals.len() as f64);
-    let report = Report {
-        job_id: job_id.to_owned(),
-        simulated_seconds: summary.end_time,
-        slips: slips.len(),
-        mean_interval_seconds: mean,
-        outcome: JobOutcome::of(measured).word(),
-        regime: measured.regime().map(Regime::word),
-        mean_friction_newtons: averages.map(|averages| averages.friction),
-        attached_fraction: averages.map(|averages| averages.attached_fraction),
-        slip_share: averages.map(|averages| averages.slip_share),
-        breaks: summary.breaks,
-        reattachments: summary.reattachments,
-        ruptures: measured.ruptures,
-        steps: summary.steps,
-        leaps: summary.leaps,
-        wall_seconds: wall,
-    };
-    if json {
+    let (outcome, regime) = (JobOutcome::of(measured).word(), measured.regime().map(Regime::word));
+    let friction = averages.map(|averages| averages.friction);
+    let slip_share = averages.map(|averages| averages.slip_share);
+    if in_json {
+        let report = json!({
+            "job_id": job_id,
+            "simulated_seconds": summary.end_time,
+            "slips": slips.len(),
+            "mean_interval_seconds": mean,
+            "outcome": outcome,
+            "regime": regime,
+            "mean_friction_newtons": friction,
+            "attached_fraction": averages.map(|averages| averages.attached_fraction),
+            "slip_share": slip_share,
+            "breaks": summary.breaks,
+            "reattachments": summary.reattachments,
+            "ruptures": measured.ruptures,
+            "steps": summary.steps,
+            "leaps": summary.leaps,
+            "wall_seconds": wall,
+        });
         return output::json(FORMAT, &report);
     }
+    let mut columns = Columns::default();
+    let mut add = |head: &str, cell: &dyn Fn(&Slip) -> String| {
+        columns.add(false, std::iter::once(head.to_owned()).chain(slips.iter().map(cell)).collect());
+    };
+    add("slip", &|slip| slip.number.to_string());
+    add("onset (s)", &|slip| format!("{:.6}", slip.onset));
+    add("interval (s)", &|slip| slip.interval.map_or_else(|| "-".to_owned(), |interval| format!("{interval:.6}")));
+    add("phase (rad)", &|slip| slip.phase.map_or_else(|| "-".to_owned(), |phase| format!("{phase:.4}")));
+    add("peak (N)", &|slip| format!("{:.2}", slip.peak_force));
+    add("drop (N)", &|slip| format!("{:.2}", slip.drop));
+    add("precursors", &|slip| slip.precursors.to_string());
     if !slips.is_empty() {
-        output::print("slip  onset (s)     interval (s)  phase (rad)  peak (N)  drop (N)  precursors\n")?;
-    }
-    for slip in slips {
-        let optional = |value: Option<f64>, digits: usize| {
-            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
-        };
-        output::print(&format!(
-            "{:4}  {:<12.6}  {:<12}  {:<11}  {:<8.2}  {:<8.2}  {}\n",
-            slip.number,
-            slip.onset,
-            optional(slip.interval, 6),
-            optional(slip.phase, 4),
-            slip.peak_force,
-            slip.drop,
-            slip.precursors
-        ))?;
+        output::print(&columns.to_string())?;
     }
     let or_none =
         |value: Option<f64>, unit: &str| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.6} {unit}"));
-    let outcome = report.outcome;
-    let regime = match report.regime.zip(report.slip_share) {
+    let regime = match regime.zip(slip_share) {
         None => "none".to_owned(),
         Some((regime, _)) if slips.is_empty() => regime.to_owned(),
         Some((regime, share)) => format!("{regime}, {:.3} % of the time within slips", 100.0 * share),
     };
     output::pairs(&[
-        ("job", report.job_id),
-        ("simulated time", format!("{:.6} s", report.simulated_seconds)),
-        ("slips", report.slips.to_string()),
+        ("job", job_id.to_owned()),
+        ("simulated time", format!("{:.6} s", summary.end_time)),
+        ("slips", slips.len().to_string()),
         ("outcome", outcome.to_owned()),
         ("regime", regime),
-        ("mean interval", or_none(report.mean_interval_seconds, "s")),
-        ("mean friction", or_none(report.mean_friction_newtons, "N")),
-        ("contacts", format!("{} breaks, {} reattachments", report.breaks, report.reattachments)),
-        ("steps", format!("{}, of which {} leaps", report.steps, report.leaps)),
-        ("wall time", output::duration(report.wall_seconds)),
+        ("mean interval", or_none(mean, "s")),
+        ("mean friction", or_none(friction, "N")),
+        ("contacts", format!("{} breaks, {} reattachments", summary.breaks, summary.reattachments)),
+        ("steps", format!("{}, of which {} leaps", summary.steps, summary.leaps)),
+        ("wall time", output::duration(wall)),
     ])
 }

@@ -2,7 +2,7 @@
 
 use super::exit::UsageError;
 use crate::simulate as single;
-use crate::sweep::{Change, Sweep, SweepError, varied, written};
+use crate::sweep::{Change, Sweep, SweepError, varied};
 use anyhow::Result;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
@@ -98,10 +98,7 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
     let sweep = match (file, preset) {
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
-        (None, None) => {
-            let [model, record, solver] = ["model", "record", "solver"].map(|section| written(changes, section));
-            return of_flags(&single::sweep_text(&model, &record, &solver));
-        }
+        (None, None) => return of_flags(&single::sweep_text(changes)),
     };
     vary(sweep?, changes)
 }
@@ -109,15 +106,6 @@ pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> 
 /// A sweep as varied.
 pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
     if changes.is_empty() { Ok(sweep) } else { of_flags(&varied(sweep.text(), changes)) }
-}
-
-pub fn real(text: &str) -> Result<f64, &'static str> {
-    text.parse().map_err(|_| "must be a number")
-}
-
-/// A number, as text.
-pub fn number(text: &str) -> Result<String, &'static str> {
-    real(text).map(|_| text.to_owned())
 }
 
 /// Reads a text that flags were made into; mistakes are those of the flags.

@@ -90,10 +90,8 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
     let missing = match verification.missing.len() as u64 {
         0 => "nothing".to_owned(),
         parts => {
-            let more = if parts > SHOWN as u64 { ", ..." } else { "" };
-            let names = verification.missing[..verification.missing.len().min(SHOWN)].join(", ");
-            let jobs = output::count(verification.jobs_missing, "job");
-            format!("{}, {jobs}: {names}{more}", output::count(parts, "part"))
+            let (jobs, names) = (output::count(verification.jobs_missing, "job"), first_of(&verification.missing));
+            format!("{}, {jobs}: {names}", output::count(parts, "part"))
         }
     };
     let damaged = match verification.problems.len() as u64 {
@@ -116,11 +114,13 @@ fn print_summary(verification: &Verification, commands: &[String], repaired: boo
     Ok(())
 }
 
-fn jobs_of(problem: &Problem) -> String {
-    if problem.jobs.is_empty() {
-        return String::new();
+fn jobs_of(Problem { jobs, .. }: &Problem) -> String {
+    match jobs.len() as u64 {
+        0 => String::new(),
+        count => format!("; concerns {}: {}", output::count(count, "job"), first_of(jobs)),
     }
-    let more = if problem.jobs.len() > SHOWN { ", ..." } else { "" };
-    let shown = &problem.jobs[..problem.jobs.len().min(SHOWN)];
-    format!("; concerns {}: {}{more}", output::count(problem.jobs.len() as u64, "job"), shown.join(", "))
+}
+
+fn first_of(names: &[String]) -> String {
+    names[..names.len().min(SHOWN)].join(", ") + if names.len() > SHOWN { ", ..." } else { "" }
 }

@@ -4,7 +4,7 @@
 use super::precision::{need, seeds_for};
 use crate::reduce::{Pool, PooledJob, SetRow, mean_of};
 use crate::results::layout::Layout;
-use crate::sweep::{MIN_SEEDS, Precision, STATISTICS, Statistic, StatisticKind, Target};
+use crate::sweep::{MIN_SEEDS, Precision, STATISTICS, Statistic, Target};
 use crate::table::storage::Disk;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -152,7 +152,7 @@ fn ends(row: &SetRow, statistic: Statistic) -> Option<[f64; 2]> {
 /// Whether the interval of a statistic holds its true value; of an angle, any turn of it.
 fn holds(row: &SetRow, truth: &SetRow, statistic: Statistic) -> bool {
     let (Some([low, high]), Some(truth)) = (ends(row, statistic), truth.number(statistic.key)) else { return false };
-    let turns: &[f64] = if statistic.kind == StatisticKind::Angle { &[-TAU, 0.0, TAU] } else { &[0.0] };
+    let turns: &[f64] = if statistic.is_angle() { &[-TAU, 0.0, TAU] } else { &[0.0] };
     turns.iter().any(|turn| low <= truth + turn && truth + turn <= high)
 }
 
@@ -221,7 +221,7 @@ fn coverage_is_measured() {
         format!("|---|---|---|{}", "---|".repeat(head.len())),
     ];
     let shown = |values: &[f64]| values.iter().map(|value| format!("{value:.1}")).collect::<Vec<_>>().join(" | ");
-    for statistic in STATISTICS.iter().copied().filter(|statistic| statistic.has_interval()) {
+    for statistic in STATISTICS.iter().copied().filter(|statistic| statistic.has_interval) {
         let mut all = Vec::new();
         for (set, locking) in ["weak", "middle", "strong"].into_iter().enumerate() {
             let truth = truths[set][0].number(statistic.key).unwrap();

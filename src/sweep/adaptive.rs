@@ -54,12 +54,12 @@ impl Sweep {
         let mut point = Point { parameters: self.base.clone(), fixes_period: None };
         self.axes[axis].apply(row, &mut point);
         let [quantity] = self.axes[axis].quantities()[..] else { return None };
-        let value = match (quantity, point.fixes_period) {
-            (_, Some((_, value))) => value,
-            (Quantity::Parameter(symbol), None) => point.parameters.get(symbol).number()?,
-            _ => return None,
+        let value = match (point.fixes_period, quantity) {
+            (Some((_, value)), _) => Some(value),
+            (None, Quantity::Parameter(symbol)) => point.parameters.get(symbol).number(),
+            _ => None,
         };
-        Some((quantity.key(), value))
+        Some((quantity.key(), value?))
     }
 
     pub fn set_of(&self, point: u64) -> u64 {
@@ -83,11 +83,7 @@ impl Sweep {
     /// The set at these rows, that of the seeds left out; `None` if it is no job. Without modulation, rows that differ in
     /// the period alone are one set.
     pub fn set_at(&self, rows: &[u64]) -> Option<u64> {
-        let mut rows = rows.to_vec();
-        if let Some(axis) = self.seed_axis() {
-            rows[axis] = 0;
-        }
-        self.find(&self.point(&rows).canonical().parameters).map(|point| self.set_of(point))
+        self.set_with(&self.point(rows).canonical().parameters)
     }
 
     /// The points of a set with these of its seeds.

@@ -69,7 +69,6 @@ const MAX_POINTS: u64 = 10_000_000;
 
 /// All checks of a sweep that is read.
 pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
-    let place_of = |key: &str| file.entry(key).map_or(0, |entry| entry.at);
     let points = sweep.axes.iter().try_fold(1_u64, |points, axis| points.checked_mul(axis.len()));
     if points.is_none_or(|points| points > MAX_POINTS) {
         let points = points.map_or_else(|| "2^64 points or more".to_owned(), |points| format!("{points} points"));
@@ -77,10 +76,9 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
             "[axes]: {points}; a sweep has at most {MAX_POINTS}, before conditions. Take fewer, or a sample \
              ([axes.sobol]), or several sweeps"
         );
-        return Err(file.source.refuse(place_of("axes"), problem));
+        return Err(file.source.refuse(file.place_of("axes"), problem));
     }
-    period(sweep, places)?;
-    controls(sweep, file)?;
+    modulation(sweep, file, places)?;
     if sweep.points_of_one_seed().any(|point| invalid(&point).is_some())
         && let Some(((quantity, problem), point)) =
             sweep.admitted(0..sweep.point_count()).find_map(|(_, point)| Some((invalid(&point)?, point)))
@@ -88,15 +86,17 @@ pub(super) fn whole(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> R
         return Err(places.refuse(quantity, problem + &place(sweep, &point)));
     }
     let Some((_, first)) = sweep.admitted(0..sweep.point_count()).next() else {
-        return Err(file.source.refuse(place_of("where"), "where: drops every point; relax it, or extend the axes"));
+        return Err(file
+            .source
+            .refuse(file.place_of("where"), "where: drops every point; relax it, or extend the axes"));
     };
     if sweep.recording.energies && matches!(sweep.solver, Solver::EventDriven { resolve: Resolve::Grid, .. }) {
         let problem = "energies: are recorded along Taylor steps only; remove resolve = \"grid\" from [solver]";
-        return Err(file.source.refuse(place_of("record"), problem));
+        return Err(file.source.refuse(file.place_of("record"), problem));
     }
     // A later job can only differ where an axis moves masses or stiffnesses; it then fails by itself, and others continue.
     let solver = file.entry("solver").and_then(|entry| entry.section("[solver]"));
-    let time_step = solver.and_then(|solver| solver.entry("dt")).map_or(0, |entry| entry.at);
+    let time_step = solver.map_or(0, |solver| solver.place_of("dt"));
     sweep.solver.check(&first.parameters).map_err(|error| file.source.refuse(time_step, error.to_string()))
 }
 
@@ -137,43 +137,34 @@ impl Sweep {
     }
 }
 
-/// A period without modulation has no effect, and a modulation without period no meaning.
-fn period(sweep: &Sweep, places: &Places<'_>) -> Result<(), Refused> {
+/// A period and controls without modulation have no effect, a modulation without period no meaning, and what the drive alone
+/// explains needs controls.
+fn modulation(sweep: &Sweep, file: &Section<'_>, places: &Places<'_>) -> Result<(), Refused> {
     let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
     match places.set.iter().find(|place| place.quantity.is_period()) {
         Some(place) if !is_modulated => {
             let key = place.quantity.key();
             let problem = format!("{key}: has no effect while Delta = 0; set Delta > 0 (m), or remove {key}");
-            Err(places.source.refuse(place.at, problem))
+            return Err(places.source.refuse(place.at, problem));
         }
         None if is_modulated => {
             let problem = "Delta > 0: needs a period; set T (s), frequency (Hz) or eta";
-            Err(places.refuse(Quantity::Parameter(Symbol::Delta), problem.to_owned()))
+            return Err(places.refuse(Quantity::Parameter(Symbol::Delta), problem.to_owned()));
         }
-        _ => Ok(()),
+        _ => {}
     }
-}
-
-/// Controls are those of a modulation, and what the drive alone explains needs them.
-fn controls(sweep: &Sweep, file: &Section<'_>) -> Result<(), Refused> {
-    let refuse = |section: &str, problem: String| {
-        let at = file.entry(section).map_or(0, |entry| entry.at);
-        Err(file.source.refuse(at, problem))
-    };
     if sweep.controls.is_some() {
         let problem = "control: has no effect while Delta = 0; set Delta > 0 (m), or remove control";
-        let is_modulated = sweep.points_of_one_seed().any(|point| point.is_modulated());
-        return if is_modulated { Ok(()) } else { refuse("record", problem.to_owned()) };
+        return if is_modulated { Ok(()) } else { Err(file.source.refuse(file.place_of("record"), problem)) };
     }
-    let rounds = sweep.rounds.as_ref();
-    let precise =
-        rounds.and_then(|rounds| rounds.precision.as_ref()).map_or(&[][..], |precision| &precision.statistics);
-    let refined = sweep.refinement().map_or(&[][..], |refinement| &refinement.by);
-    let mut named = precise.iter().map(|by| ("precision", by)).chain(refined.iter().map(|by| ("refine", by)));
-    match named.find(|(_, by)| by.needs_control()) {
+    let Some(Rounds { precision, refinement, .. }) = &sweep.rounds else { return Ok(()) };
+    let precise = precision.iter().flat_map(|precision| &precision.statistics).map(|by| ("precision", by));
+    let refined = refinement.iter().flat_map(|refinement| &refinement.by).map(|by| ("refine", by));
+    match precise.chain(refined).find(|(_, by)| by.needs_control()) {
         None => Ok(()),
         Some((section, Statistic { key, .. })) => {
-            refuse(section, format!("[{section}]: {key} needs controls; set control = true in [record]"))
+            let problem = format!("[{section}]: {key} needs controls; set control = true in [record]");
+            Err(file.source.refuse(file.place_of(section), problem))
         }
     }
 }

@@ -38,7 +38,9 @@ impl Axis {
 impl Sweep {
     /// The sweep of its controls.
     pub(super) fn unmodulated(&self) -> Self {
-        let conditions = self.conditions.iter().filter(|condition| !condition.names(Quantity::is_of_modulation));
+        let conditions = self.conditions.iter();
+        let conditions =
+            conditions.filter(|condition| !condition.names().into_iter().any(|name| name.is_of_modulation()));
         Self {
             base: self.base.without_modulation(),
             axes: self.axes.iter().filter_map(Axis::unmodulated).collect(),

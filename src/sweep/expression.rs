@@ -9,12 +9,13 @@
 //! factor     = "-" factor | number | name | "(" sum ")"
 //! ```
 //!
-//! A comparison with something undefined, such as 0/0, does not hold. Read by operator precedence (V. R. Pratt, POPL 1973).
+//! A comparison with something undefined, such as 0/0, does not hold. Names of the conditions of a sweep are the keys of the
+//! parameters, `eta` and `frequency`, in SI. Read by operator precedence (V. R. Pratt, POPL 1973).
 
 use std::cmp::Ordering;
 
 /// Most words and signs of a condition: it is read and evaluated by recursion.
-const MAX_TOKENS: usize = 500;
+const MAX_WORDS: usize = 500;
 
 /// A condition or a number, over names of type `N`. Reading makes sure that each stands where it may.
 #[derive(Clone, Debug)]
@@ -85,15 +86,13 @@ impl<N> Expression<N> {
     }
 
     fn parse(text: &str, names: Names<'_, N>, is_condition: bool) -> Result<Self, ExpressionError> {
-        let tokens = tokens(text)?;
-        let mut reader = Reader { tokens: &tokens, next: 0, end: text.chars().count() + 1, names };
+        let mut reader = Reader { text, next: text.len() - text.trim_start().len(), words: 0, names };
         let start = reader.position();
         let expression = reader.expression(OR)?;
-        if reader.next < tokens.len() {
-            let found = reader.peek();
-            return Err(reader.error(format!("\"{found}\" is not expected here; join conditions by and, or")));
+        match reader.peek() {
+            "" => expression.demanded(is_condition, start),
+            found => Err(reader.error(format!("\"{found}\" is not expected here; join conditions by and, or"))),
         }
-        expression.demanded(is_condition, start)
     }
 
     /// The number, with these values of the names; 1 of a condition that holds.
@@ -131,72 +130,63 @@ impl<N> Expression<N> {
     }
 }
 
-struct Token {
-    /// Character of the condition, counted from 1.
-    position: usize,
-    text: String,
-}
-
-fn tokens(text: &str) -> Result<Vec<Token>, ExpressionError> {
-    let characters: Vec<char> = text.chars().collect();
-    let mut tokens = Vec::new();
-    let mut next = 0;
-    while let Some(&character) = characters.get(next) {
-        let start = next;
-        next += 1;
-        match character {
-            _ if character.is_whitespace() => continue,
-            'a'..='z' | 'A'..='Z' | '0'..='9' | '_' | '.' => {
-                let is_number = !character.is_ascii_alphabetic();
-                while characters.get(next).is_some_and(|&c| match c {
-                    '+' | '-' => is_number && matches!(characters[next - 1], 'e' | 'E'),
-                    _ => c.is_ascii_alphanumeric() || c == '_' || c == '.',
-                }) {
-                    next += 1;
-                }
-            }
-            '<' | '>' | '=' | '!' => next += usize::from(characters.get(next) == Some(&'=')),
-            '+' | '-' | '*' | '/' | '(' | ')' => {}
-            other => {
-                let problem = format!(
-                    "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ), < <= > >= == !=, and, or"
-                );
-                return Err(ExpressionError { position: next, problem });
-            }
-        }
-        tokens.push(Token { position: start + 1, text: characters[start..next].iter().collect() });
-        if tokens.len() > MAX_TOKENS {
-            let problem = format!("more than {MAX_TOKENS} words and signs; split it into a list of conditions");
-            return Err(ExpressionError { position: start + 1, problem });
-        }
-    }
-    Ok(tokens)
-}
-
 struct Reader<'a, N> {
-    tokens: &'a [Token],
-    names: Names<'a, N>,
+    text: &'a str,
+    /// Byte at which the next word or sign begins.
     next: usize,
-    /// Position just after the last character.
-    end: usize,
+    /// Words and signs that were read.
+    words: usize,
+    names: Names<'a, N>,
 }
 
-impl<N> Reader<'_, N> {
+impl<'a, N> Reader<'a, N> {
+    /// Character of the text at which the next word or sign begins, counted from 1.
     fn position(&self) -> usize {
-        self.tokens.get(self.next).map_or(self.end, |token| token.position)
+        self.text[..self.next].chars().count() + 1
     }
 
+    /// What is wrong with the next word or sign, unless it means nothing anywhere.
     fn error(&self, problem: impl Into<String>) -> ExpressionError {
-        ExpressionError { position: self.position(), problem: problem.into() }
+        let has_meaning = |letter: char| letter.is_ascii_alphanumeric() || "_.<>=!+-*/()".contains(letter);
+        let problem = match self.peek() {
+            other if other.chars().all(has_meaning) => problem.into(),
+            other => format!(
+                "\"{other}\" has no meaning here; allowed are keys, numbers, + - * / ( ), < <= > >= == !=, and, or"
+            ),
+        };
+        ExpressionError { position: self.position(), problem }
     }
 
-    fn peek(&self) -> &str {
-        self.tokens.get(self.next).map_or("", |token| token.text.as_str())
+    /// The next word, number or sign; empty at the end.
+    fn peek(&self) -> &'a str {
+        let rest = &self.text[self.next..];
+        let is_number = rest.starts_with(|first: char| first.is_ascii_digit() || first == '.');
+        let mut before = ' ';
+        let ends = |letter: char| {
+            let is_of_exponent = is_number && "+-".contains(letter) && "eE".contains(before);
+            before = letter;
+            !(letter.is_ascii_alphanumeric() || "_.".contains(letter) || is_of_exponent)
+        };
+        let mut letters = rest.chars();
+        let length = match (rest.find(ends).unwrap_or(rest.len()), letters.next(), letters.next()) {
+            (0, Some('<' | '>' | '=' | '!'), Some('=')) => 2,
+            (0, Some(sign), _) => sign.len_utf8(),
+            (length, ..) => length,
+        };
+        &rest[..length]
+    }
+
+    fn advance(&mut self) {
+        let rest = &self.text[self.next + self.peek().len()..];
+        self.next = self.text.len() - rest.trim_start().len();
+        self.words += 1;
     }
 
     fn accept(&mut self, text: &str) -> bool {
         let found = self.peek() == text;
-        self.next += usize::from(found);
+        if found {
+            self.advance();
+        }
         found
     }
 
@@ -211,7 +201,7 @@ impl<N> Reader<'_, N> {
         while let Some(operator) = self.operator().filter(|operator| operator.precedence >= min) {
             let joins_conditions = operator.precedence < COMPARISON;
             let demanded = left.demanded(joins_conditions, start)?;
-            self.next += 1;
+            self.advance();
             let position = self.position();
             let right = self.expression(operator.precedence + 1)?.demanded(joins_conditions, position)?;
             left = Expression::Combined(Box::new((demanded, operator, right)));
@@ -226,6 +216,11 @@ impl<N> Reader<'_, N> {
     }
 
     fn factor(&mut self) -> Result<Expression<N>, ExpressionError> {
+        if self.words >= MAX_WORDS {
+            return Err(
+                self.error(format!("more than {MAX_WORDS} words and signs; split it into a list of conditions"))
+            );
+        }
         if self.accept("-") {
             let start = self.position();
             return Ok(Expression::Negative(Box::new(self.factor()?.demanded(false, start)?)));
@@ -246,7 +241,89 @@ impl<N> Reader<'_, N> {
             }
             Some(_) => return Err(self.error(format!("\"{text}\" is not expected here; a key or a number is needed"))),
         };
-        self.next += 1;
+        self.advance();
         Ok(expression)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::quantity::{Point, Quantity};
+    use super::*;
+    use crate::model::Parameters;
+
+    type Condition = Expression<Quantity>;
+
+    fn parse(text: &str) -> Result<Condition, ExpressionError> {
+        Condition::condition(text, &Quantity::comparable)
+    }
+
+    fn holds_at(text: &str, amplitude: f64, period: (Quantity, f64)) -> bool {
+        let parameters = Parameters { modulation_amplitude: amplitude, ..Parameters::default() };
+        let point = Point { parameters, fixes_period: Some(period) }.canonical();
+        parse(text).unwrap_or_else(|error| panic!("{text}: {error}")).evaluate(&|&name| point.number(name)) == 1.0
+    }
+
+    fn holds(text: &str) -> bool {
+        holds_at(text, 1e-6, (Quantity::Frequency, 49.0))
+    }
+
+    #[test]
+    fn products_bind_before_sums_before_comparisons_before_and_before_or() {
+        for (text, expected) in [
+            ("1 + 2 * 3 == 7", true),
+            ("(1 + 2) * 3 == 9", true),
+            ("8 / 2 / 2 == 2 and 8 - 2 - 2 == 4", true),
+            ("1 < 2 or 1 < 0 and 1 < 0", true),
+            ("(1 < 2 or 1 < 0) and 1 < 0", false),
+            ("((N) - -10) / 4. == 2e1", true),
+            ("N >= 70 and N <= 70 and Ns != 19", true),
+            ("Kd * Delta < 50 and Kd*Delta>39.9", true),
+            ("0 / 0 != 1", false),
+        ] {
+            assert_eq!(holds(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_an_axis_set_is_compared_as_it_was_set() {
+        // 1/(1/49) is not 49.
+        assert!(holds("frequency == 49"));
+        assert!(holds("T == 1/49"));
+    }
+
+    #[test]
+    fn without_modulation_eta_and_the_frequency_are_zero() {
+        for text in ["eta == 0", "frequency == 0", "T > 1e300"] {
+            assert!(holds_at(text, 0.0, (Quantity::Eta, 3.0)), "{text}");
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_place() {
+        for (text, position, words) in [
+            ("frequency < 5OO", 13, "not a number"),
+            ("freqency < 500", 1, "did you mean frequency"),
+            ("frequency", 1, "comparison is needed"),
+            ("T = 1", 3, "=="),
+            ("1 < T < 2", 7, "a < b and b < c"),
+            ("(T < 1", 7, "closing )"),
+            ("T < 1)", 6, "not expected"),
+            ("T < 1 T > 0", 7, "and, or"),
+            ("T <", 4, "too early"),
+            ("", 1, "too early"),
+            ("T & 1", 3, "no meaning"),
+            ("break_on == 1", 1, "cannot be compared"),
+            ("(T < 1) + 1 > 2", 1, "a number is needed"),
+            ("T < 1 and 3", 11, "comparison is needed"),
+            ("T < 1e999", 5, "not a number"),
+            ("\u{3c4} < 1", 1, "no meaning"),
+        ] {
+            let error = parse(text).expect_err(text);
+            assert_eq!(error.position, position, "{text}: {error}");
+            assert!(error.problem.contains(words), "{text}: {error}");
+        }
+        let deep = "(".repeat(100_000);
+        assert!(parse(&deep).unwrap_err().problem.contains("more than 500"));
     }
 }

@@ -7,7 +7,7 @@
 
 use super::axes::Axis;
 use super::cost::predicted_cost;
-use super::filter::Condition;
+use super::expression::Expression;
 use super::job::{Id, Identity, Job, settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
@@ -23,7 +23,7 @@ pub struct Sweep {
     /// `[model]` over the defaults; what an axis sets is not used.
     pub(super) base: Parameters,
     pub(super) axes: Vec<Axis>,
-    pub(super) conditions: Vec<Condition>,
+    pub(super) conditions: Vec<Expression<Quantity>>,
     pub(super) recording: Recording,
     pub(super) solver: Solver,
     pub(super) identity: Identity,
@@ -196,7 +196,7 @@ impl Sweep {
 
     /// Whether a canonical point fulfils the conditions.
     fn admits(&self, point: &Point) -> bool {
-        self.conditions.iter().all(|condition| condition.holds(point))
+        self.conditions.iter().all(|condition| condition.evaluate(&|&quantity| point.number(quantity)) == 1.0)
     }
 }
 

@@ -34,11 +34,9 @@ impl fmt::Display for Id {
     }
 }
 
-/// Keys and values of the solver and the recording, as a sweep file writes them, but for the longest time, the budget of
-/// events and the controls: they change no job that ends by itself, and always count as the default. Values read back to the
-/// same bits.
-pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> + use<> {
-    let solver = match solver {
+/// Keys and values of the solver, as a sweep file writes them: they read back to the same bits.
+pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
+    match solver {
         Solver::EventDriven { tolerance, resolve } => vec![
             ("method", "event-driven".to_owned()),
             ("tolerance", Shortest(tolerance).to_string()),
@@ -47,11 +45,16 @@ pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<I
         Solver::FixedStep { time_step } => {
             vec![("method", "fixed-step".to_owned()), ("dt", Shortest(time_step).to_string())]
         }
-    };
+    }
+}
+
+/// Those of the solver and the recording, but for the longest time, the budget of events and the controls: they change no
+/// job that ends by itself, and always count as the default.
+pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<Item = (String, String)> + use<> {
     let default = Recording::default();
     let Recording { max_time, max_events, control, .. } = default;
     let recording = Recording { max_time, max_events, control, ..*recording };
-    let solver = solver.into_iter().map(|(key, value)| (format!("solver.{key}"), value));
+    let solver = solver_settings(solver).into_iter().map(|(key, value)| (format!("solver.{key}"), value));
     solver.chain(RecordingKey::ALL.map(|key| (format!("record.{}", key.key()), recording.get(key).to_string())))
 }
 

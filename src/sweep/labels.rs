@@ -5,14 +5,12 @@ use crate::model::{Description, Symbol};
 use crate::table::columns::Row;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 35] = [
+const LABELS: [(&str, &str, &str); 30] = [
     ("Delta", "Δ", "Amplitude"),
     ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
     ("frequency", "1/T", "Modulation frequency"),
-    ("failed_jobs", "failed", "Failed jobs"),
     ("slip_share", "slip share", "Share of time within slips"),
-    ("attached_fraction", "attached", "Attached contacts"),
     ("tau_mean", "⟨τ⟩", ""),
     ("tau_sd", "σ(τ)", "S.d. of the intervals"),
     ("tau_05", "τ(5 %)", ""),
@@ -35,11 +33,8 @@ const LABELS: [(&str, &str, &str); 35] = [
     ("peak_force_mean", "⟨F⟩ at onsets", "Mean peak force"),
     ("mean_friction", "⟨Fₛ⟩", "Mean friction"),
     ("friction_coefficient", "μ", "Friction coefficient"),
-    ("slip_distance_mean", "slip distance", "Mean slip distance"),
     ("edge_distance_mean", "edge distance", "Mean slip distance of the driven edge"),
     ("least_attached_mean", "least attached", "Least attached contacts in a slip"),
-    ("precursors_mean", "precursors", ""),
-    ("front_speed_mean", "front speed", ""),
     ("slow_front_speed_mean", "slow fronts", "Mean speed of slow fronts"),
 ];
 
@@ -83,7 +78,7 @@ pub fn label(column: &str) -> Label {
         return Label { symbol: symbol_of(symbol), what: capitalised(what), unit };
     }
     let described = SetRow::columns().into_iter().find(|known| known.name == column);
-    let plain = column.replace('_', " ");
+    let plain = column.strip_suffix("_mean").unwrap_or(column).replace('_', " ");
     let symbol = known.map_or_else(|| plain.clone(), |(_, symbol, _)| (*symbol).to_owned());
     let meaning = described.as_ref().map(|column| column.meaning).filter(|meaning| meaning.len() <= LONGEST);
     let what = match (known, meaning) {

@@ -1,11 +1,10 @@
 //! Sweeps: a file that says what to run, and the jobs and parts that follow from it.
 //!
 //! ```text
-//! sweep file ->  axes, filter -> points -> jobs -> parts
-//! source.rs      read_axes.rs   grid.rs   job.rs   plan.rs
-//! read.rs        axes.rs                  cost.rs
-//! checks.rs      filter.rs
-//!                expression.rs
+//! sweep file ->  axes, conditions -> points -> jobs -> parts
+//! source.rs      read_axes.rs        grid.rs   job.rs   plan.rs
+//! read.rs        axes.rs                       cost.rs
+//! checks.rs      expression.rs
 //! controls.rs: the same jobs without modulation
 //! read_rounds.rs -> rounds.rs -> adaptive.rs: a sweep that decides for itself
 //! set.rs: what is known of a set; labels.rs: how it is called before people
@@ -23,7 +22,6 @@ mod command;
 mod controls;
 mod cost;
 mod expression;
-mod filter;
 mod grid;
 mod job;
 mod labels;
@@ -47,9 +45,9 @@ pub use job::{Id, Identity, Job};
 pub use labels::{Label, capitalised, label, symbol_of, three_digits};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
-pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic, StatisticKind};
+pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic};
 pub use source::{Mistake, SweepError, nearest};
-pub use variation::{Change, varied, written};
+pub use variation::{Change, varied};
 
 /// JSON Schema of a sweep file, for editors that complete and check TOML. What depends on several keys, such as `dfs <= fs`,
 /// is left to [`Sweep::parse`].

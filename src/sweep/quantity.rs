@@ -3,6 +3,7 @@
 //! T = 2πΔ/(η V0) and T = 1/f. Contract: a value that passed [`Quantity::checked`] is canonical, so that equal values
 //! have equal bits.
 
+use super::source::hint;
 use crate::model::{Parameters, Symbol, Value};
 use crate::table::value::Kind;
 use std::f64::consts::TAU;
@@ -38,6 +39,21 @@ impl Quantity {
 
     pub fn from_key(key: &str) -> Option<Self> {
         Self::all().find(|quantity| quantity.key() == key)
+    }
+
+    /// That of a name in a condition.
+    pub fn comparable(name: &str) -> Result<Self, String> {
+        match Self::from_key(name) {
+            Some(Self::BREAK_ON) => {
+                Err("break_on is a word and cannot be compared; choose its values on an axis".into())
+            }
+            Some(quantity) => Ok(quantity),
+            None => {
+                let numbers = Self::all().filter(|quantity| *quantity != Self::BREAK_ON);
+                let hint = hint(name, &numbers.map(Self::key).collect::<Vec<_>>());
+                Err(format!("\"{name}\" is not a known quantity; {hint}"))
+            }
+        }
     }
 
     /// Whether it fixes the period T, and so means nothing without modulation.

@@ -6,7 +6,7 @@
 
 use super::axes::{Axis, Column};
 use super::checks::{self, Places};
-use super::filter::Condition;
+use super::expression::Expression;
 use super::grid::Sweep;
 use super::job::Identity;
 use super::quantity::Quantity;
@@ -14,7 +14,7 @@ use super::read_axes;
 use super::read_rounds::{read_precision, read_refinement, read_seeds};
 use super::rounds::{MAX_SETS, Rounds};
 use super::source::{Entry, Refused, Section, Source, SweepError, all};
-use crate::model::{Parameters, Value};
+use crate::model::Parameters;
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::{Resolve, Solver, TOLERANCES};
 use crate::table::storage::{Disk, Storage};
@@ -80,7 +80,7 @@ fn read(source: &Source<'_>) -> Result<Sweep, Refused> {
         if sets > MAX_SETS {
             let problem =
                 format!("[axes]: {sets} sets; a sweep with rounds has at most {MAX_SETS}; take several sweeps");
-            return Err(source.refuse(file.entry("axes").map_or(0, |entry| entry.at), problem));
+            return Err(source.refuse(file.place_of("axes"), problem));
         }
         let least = sets * seeds.start();
         if let Some(wanted) = wanted.as_ref().filter(|wanted| wanted.refinement.max_jobs < least) {
@@ -144,12 +144,12 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameter
     Ok((parameters, period))
 }
 
-fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Condition>, Refused> {
+fn read_conditions(entry: &Entry<'_>) -> Result<Vec<Expression<Quantity>>, Refused> {
     all(entry.list().unwrap_or_else(|| vec![*entry]).iter().map(|entry| {
         let text = entry.word().ok_or_else(|| {
             entry.must_be("a condition in quotes, or a list of them, such as where = \"frequency < 500\"")
         })?;
-        Condition::parse(text).map_err(|error| entry.refuse(error.to_string()))
+        Expression::condition(text, &Quantity::comparable).map_err(|error| entry.refuse(error.to_string()))
     }))
 }
 
@@ -172,13 +172,10 @@ fn read_solver(solver: &Section<'_>) -> Result<Solver, Refused> {
             let Solver::EventDriven { tolerance, resolve } = Solver::default() else {
                 unreachable!("the default is event-driven")
             };
-            let tolerance = solver.entry("tolerance").map_or(Ok(tolerance), |entry| match entry.value() {
-                Some(Value::Real(tolerance)) if TOLERANCES.contains(&tolerance) => Ok(tolerance),
-                _ => {
-                    let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
-                    Err(entry.must_be(&format!("a number from {min:e} to {max:e}, relative to fs/k")))
-                }
-            });
+            let (min, max) = (TOLERANCES.start(), TOLERANCES.end());
+            let allowed = format!("a number from {min:e} to {max:e}, relative to fs/k");
+            let fits = |tolerance| TOLERANCES.contains(&tolerance);
+            let tolerance = solver.entry("tolerance").map_or(Ok(tolerance), |entry| entry.number(&allowed, fits));
             let resolve = solver.entry("resolve").map_or(Ok(resolve), |entry| {
                 let word = entry.word().and_then(Resolve::from_word);
                 word.ok_or_else(|| entry.must_be("\"auto\", \"grid\" or \"taylor\""))

@@ -21,7 +21,7 @@ use super::checks::Places;
 use super::quantity::Quantity;
 use super::read_axes::{read_spaced, spaced};
 use super::rounds::{MAX_JOBS, MIN_SEEDS, Precision, Refinement, Target};
-use super::set::{STATISTICS, Statistic, StatisticKind};
+use super::set::{STATISTICS, Statistic};
 use super::source::{Entry, Refused, Section, all, hint};
 use crate::model::Symbol;
 use crate::table::value::Shortest;
@@ -34,11 +34,8 @@ const HALF: f64 = 0.5;
 pub(super) fn read_precision(section: &Section<'_>) -> Result<Precision, Refused> {
     section.only(&["of", "relative", "absolute", "seeds"]).ok();
     let of = section.required("of", "the statistic that is to be precise, such as of = \"tau_mean\"");
-    let statistics = of.and_then(|of| {
-        let entries = of.list().unwrap_or_else(|| vec![of]);
-        let statistics = all(entries.iter().map(read_estimate))?;
-        if statistics.is_empty() { Err(of.refuse("at least one statistic")) } else { Ok(statistics) }
-    });
+    let statistics =
+        of.and_then(|of| read_statistics(&of, |known| known.has_interval, "has no confidence interval; allowed are "));
     let target = read_target(section, statistics.as_deref().unwrap_or_default());
     Ok(Precision { statistics: statistics?, target: target? })
 }
@@ -63,16 +60,25 @@ pub(super) fn read_seeds(section: &Section<'_>, places: &mut Places<'_>) -> Resu
     Ok((asked.max(MIN_SEEDS.min(most))..=most, asked, Axis::Counted { symbol: Symbol::Seed, first, count: most }))
 }
 
-fn read_estimate(entry: &Entry<'_>) -> Result<Statistic, Refused> {
-    let known: Vec<&str> = STATISTICS.iter().filter(|known| known.has_interval()).map(|known| known.key).collect();
-    match entry.word().map(Statistic::from_key) {
-        Some(Some(statistic)) if statistic.has_interval() => Ok(statistic),
-        Some(Some(_)) => Err(entry.refuse(format!("has no confidence interval; allowed are {}", known.join(", ")))),
-        Some(None) => {
-            Err(entry.refuse(format!("is no statistic of a set; {}", hint(entry.word().unwrap_or_default(), &known))))
+/// Reads a statistic that is allowed, or a list of such; `problem` is what is wrong with others, before those that are.
+fn read_statistics(
+    entry: &Entry<'_>,
+    is_allowed: fn(Statistic) -> bool,
+    problem: &str,
+) -> Result<Vec<Statistic>, Refused> {
+    let known: Vec<&str> = STATISTICS.iter().filter(|known| is_allowed(**known)).map(|known| known.key).collect();
+    let entries = entry.list().unwrap_or_else(|| vec![*entry]);
+    let statistics = all(entries.iter().map(|entry| {
+        let word = entry
+            .word()
+            .ok_or_else(|| entry.must_be(&format!("a statistic in quotes, or a list of them: {}", known.join(", "))))?;
+        match Statistic::from_key(word) {
+            Some(statistic) if is_allowed(statistic) => Ok(statistic),
+            Some(_) => Err(entry.refuse(format!("{problem}{}", known.join(", ")))),
+            None => Err(entry.refuse(format!("is no statistic of a set; {}", hint(word, &known)))),
         }
-        None => Err(entry.must_be(&format!("a statistic in quotes: {}", known.join(", ")))),
-    }
+    }))?;
+    if statistics.is_empty() { Err(entry.refuse("at least one statistic")) } else { Ok(statistics) }
 }
 
 fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refused> {
@@ -85,7 +91,7 @@ fn read_target(section: &Section<'_>, of: &[Statistic]) -> Result<Target, Refuse
         (Some(entry), None) => {
             let allowed = "a number > 0 and < 1, as a share of the statistic";
             let share = entry.number(allowed, |share| share > 0.0 && share < 1.0)?;
-            match of.iter().find(|statistic| statistic.kind == StatisticKind::Angle) {
+            match of.iter().find(|statistic| statistic.is_angle()) {
                 Some(Statistic { key, .. }) => {
                     Err(entry.refuse(format!("{key} is an angle and has no relative error; set absolute, in rad")))
                 }
@@ -150,19 +156,7 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Vec<Statistic>, 
         let value = value.and_then(|value| value.count(0, MAX_ROWS));
         return Ok((Statistic::from_key("periods").into_iter().collect(), Some(value?), threshold?.unwrap_or(HALF)));
     }
-    let known: Vec<&str> = STATISTICS.iter().filter(|known| known.can_cross()).map(|known| known.key).collect();
-    let entries = entry.list().unwrap_or_else(|| vec![*entry]);
-    let statistics = all(entries.iter().map(|entry| match entry.word().map(Statistic::from_key) {
-        Some(Some(statistic)) if statistic.can_cross() => Ok(statistic),
-        Some(Some(_)) => Err(entry.refuse(format!("crosses no threshold; allowed are periods, {}", known.join(", ")))),
-        Some(None) => {
-            Err(entry.refuse(format!("is no statistic of a set; {}", hint(entry.word().unwrap_or_default(), &known))))
-        }
-        None => Err(entry.must_be("a statistic in quotes, such as \"resultant_length\", or a list of them")),
-    }))?;
-    if statistics.is_empty() {
-        return Err(entry.refuse("at least one statistic"));
-    }
+    let statistics = read_statistics(entry, Statistic::can_cross, "crosses no threshold; allowed are periods, ")?;
     if let Some(value) = section.entry("value") {
         return Err(value.refuse("belongs to by = \"periods\"; remove it"));
     }
@@ -173,22 +167,11 @@ fn read_by(section: &Section<'_>, entry: &Entry<'_>) -> Result<(Vec<Statistic>, 
 impl Wanted<'_> {
     /// Finds its axis among these, which the section has, and makes it as fine as is wanted.
     pub fn over(&self, axes: &mut [Axis], section: Option<Section<'_>>) -> Result<Refinement, Refused> {
-        let Some(axis) = axes.iter().position(|axis| axis.quantities().contains(&self.quantity)) else {
-            let fixing = axes.iter().flat_map(Axis::quantities).find(|other| other.is_period());
-            return Err(self.axis.refuse(match fixing.map(Quantity::key).filter(|_| self.quantity.is_period()) {
-                Some(other) => format!("{} follows from the axis {other}; refine {other}", self.quantity.key()),
-                None => "is no axis of [axes]; add it there as a range".to_owned(),
-            }));
-        };
-        if axes[axis].quantities().len() > 1 {
-            return Err(self
-                .axis
-                .refuse("moves together with others in a zip or a sample; make it an axis of its own"));
-        }
-        let Some(entry) =
-            section.and_then(|axes| axes.entry(self.quantity.key())).filter(|entry| entry.list().is_none())
-        else {
-            let problem = "has no values in between; write the axis as { linear = [low, high], points = n }, or log";
+        let axis = axes.iter().position(|axis| axis.quantities() == [self.quantity]);
+        let entry = section.and_then(|axes| axes.entry(self.quantity.key())).filter(|entry| entry.list().is_none());
+        let Some((axis, entry)) = axis.zip(entry) else {
+            let problem = "has no range of its own in [axes], and only there are values in between; write it there as \
+                           { linear = [low, high], points = n }, or log";
             return Err(self.axis.refuse(problem));
         };
         let (range, points) = read_spaced(&entry, self.quantity)?;

@@ -132,19 +132,9 @@ pub struct Statistic {
     pub key: &'static str,
     /// Its SI unit; empty for a pure number or a word.
     pub unit: &'static str,
-    pub kind: StatisticKind,
-}
-
-/// What can be asked of a statistic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StatisticKind {
-    /// A number with a confidence interval.
-    Estimate,
-    /// An angle with a confidence interval: a relative error means nothing.
-    Angle,
-    Number,
-    /// A flag, a word, or a count that tells kinds of sets apart.
-    Class,
+    /// A number, or what tells kinds of sets apart: a flag, a word or a count.
+    pub kind: Kind,
+    pub has_interval: bool,
 }
 
 /// All that a sweep file may name, in the order of the table.
@@ -158,20 +148,16 @@ pub static STATISTICS: LazyLock<Vec<Statistic>> = LazyLock::new(|| {
         let is_measured = column.nullable || column.kind == Kind::Flag;
         let is_given =
             Symbol::from_key(key).is_some() || key.starts_with("expected_") || ["control", "frequency"].contains(&key);
-        let kind = match column.kind {
-            Kind::Flag | Kind::Text | Kind::Count => StatisticKind::Class,
-            Kind::Real if !has_interval(key) => StatisticKind::Number,
-            Kind::Real if column.unit == "rad" => StatisticKind::Angle,
-            Kind::Real => StatisticKind::Estimate,
-        };
-        (is_measured && !is_given).then_some(Statistic { key, unit: column.unit, kind })
+        let Column { unit, kind, .. } = *column;
+        (is_measured && !is_given).then_some(Statistic { key, unit, kind, has_interval: has_interval(key) })
     };
     columns.iter().filter_map(statistic).collect()
 });
 
 impl Statistic {
-    pub const fn has_interval(self) -> bool {
-        matches!(self.kind, StatisticKind::Estimate | StatisticKind::Angle)
+    /// Whether a relative error of it means nothing.
+    pub fn is_angle(self) -> bool {
+        self.unit == "rad"
     }
 
     /// Whether the population has a value of it, with an error that leaving out seeds shows: quantiles jump, numbers of
@@ -180,8 +166,7 @@ impl Statistic {
         const OTHERS: &[&str] = &["share_below", "tau_05", "tau_25", "tau_50", "tau_75", "tau_95"];
         let is_of_sample =
             ["effective_", "tau_mean_", "rayleigh_", "load_"].iter().any(|begin| self.key.starts_with(begin));
-        let is_number = matches!(self.kind, StatisticKind::Estimate | StatisticKind::Number);
-        is_number && !is_of_sample && !OTHERS.contains(&self.key)
+        self.kind == Kind::Real && !self.is_angle() && !is_of_sample && !OTHERS.contains(&self.key)
     }
 
     /// Whether it says what the drive alone explains, or what it does not.
@@ -200,16 +185,16 @@ mod tests {
 
     #[test]
     fn statistics_are_what_jobs_and_slips_tell_of_a_set() {
-        let of = |key: &str| Statistic::from_key(key).map(|statistic| (statistic.unit, statistic.kind));
-        assert_eq!(of("tau_mean"), Some(("s", StatisticKind::Estimate)));
-        assert_eq!(of("phase_mean"), Some(("rad", StatisticKind::Angle)));
-        assert_eq!(of("slip_share"), Some(("", StatisticKind::Number)));
-        for class in ["has_phase", "regime", "periods"] {
-            assert_eq!(of(class), Some(("", StatisticKind::Class)), "{class}");
+        let of = |key: &str| Statistic::from_key(key).map(|known| (known.unit, known.kind, known.has_interval));
+        assert_eq!(of("tau_mean"), Some(("s", Kind::Real, true)));
+        assert_eq!(of("phase_mean"), Some(("rad", Kind::Real, true)));
+        assert_eq!(of("slip_share"), Some(("", Kind::Real, false)));
+        for (class, kind) in [("has_phase", Kind::Flag), ("regime", Kind::Text), ("periods", Kind::Count)] {
+            assert_eq!(of(class), Some(("", kind, false)), "{class}");
         }
         for other in ["set_id", "V0", "T", "eta", "jobs", "slips", "tau_mean_low", "expected_resultant"] {
             assert_eq!(of(other), None, "{other}");
         }
-        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval()).count(), 11);
+        assert_eq!(STATISTICS.iter().filter(|statistic| statistic.has_interval).count(), 11);
     }
 }

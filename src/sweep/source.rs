@@ -93,22 +93,13 @@ impl<'a> Source<'a> {
         mistakes.sort_unstable();
         // A misspelt key is met twice where it stands for one that must be there.
         mistakes.dedup();
-        let (mut line, mut start) = (1, 0);
-        let placed = mistakes.into_iter().map(|(at, problem)| {
-            line += self.line_ends(start..at);
-            start = at;
-            Mistake { line, problem }
-        });
+        let placed = mistakes.into_iter().map(|(at, problem)| Mistake { line: self.line(at), problem });
         SweepError::Invalid { path: self.path.to_owned(), mistakes: placed.collect() }
     }
 
     /// The line of a byte of the text, counted from 1.
     pub fn line(&self, at: usize) -> usize {
-        1 + self.line_ends(0..at)
-    }
-
-    fn line_ends(&self, stretch: Range<usize>) -> usize {
-        self.text.as_bytes().get(stretch).unwrap_or_default().split(|byte| *byte == b'\n').count() - 1
+        self.text.as_bytes().get(..at).unwrap_or_default().split(|byte| *byte == b'\n').count()
     }
 
     pub fn table(&self) -> Result<DeTable<'a>, Refused> {
@@ -163,6 +154,11 @@ impl<'a> Section<'a> {
 
     pub fn entry(&self, key: &str) -> Option<Entry<'a>> {
         self.entries().into_iter().find(|entry| entry.key == key)
+    }
+
+    /// Byte of an entry, or of the heading if it is not there.
+    pub fn place_of(&self, key: &str) -> usize {
+        self.entry(key).map_or(self.at, |entry| entry.at)
     }
 
     /// An entry that must be there, unless a misspelt one was meant; `need` says what it is for.

@@ -49,19 +49,13 @@ impl Change {
 
 /// One value as TOML: a number, true or false; anything else is a word.
 fn scalar(text: &str) -> String {
-    match (text.parse::<i128>(), text.parse::<f64>()) {
+    match (text.parse::<i64>(), text.parse::<f64>()) {
         (Ok(whole), _) => whole.to_string(),
         (_, Ok(real)) if real.is_nan() => "nan".to_owned(),
         (_, Ok(real)) => format!("{real:?}"),
         _ if matches!(text, "true" | "false") => text.to_owned(),
         _ => format!("{text:?}"),
     }
-}
-
-/// The changes of a section, as keys and values.
-pub fn written(changes: &[Change], section: &str) -> Vec<(String, String)> {
-    let own = changes.iter().filter(|change| change.section == section);
-    own.map(|change| (change.key.clone(), change.value.clone())).collect()
 }
 
 /// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter, or the

@@ -78,7 +78,6 @@ fn what_cannot_be_studied_is_refused() {
         ("none.toml", "drops every point"),
         ("--set Foo=3", "unknown key"),
         ("--set V0", "must be KEY=VALUE"),
-        ("--set seed=77", "--seeds says how many"),
         ("--preset fig4b -o many.toml", "--out many.toml: must be a folder"),
     ] {
         let ended = folder.ends(2, &format!("accuracy {arguments}"));

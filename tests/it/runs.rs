@@ -418,6 +418,8 @@ fn a_plan_says_what_of_the_sweep_is_in_its_directory() {
     assert_eq!((extended["jobs_done"].as_u64(), extended["jobs_missing"].as_u64()), (Some(3), Some(2)));
     folder.write("p.toml", &text(1, ""));
     assert_eq!(directory(&folder)["jobs_kept"].as_u64(), Some(2));
+    let said = folder.ends(0, "plan p.toml").stdout;
+    assert!(said.contains(": 1 done, 0 failed, 0 to run; 2 more done that the sweep no longer has"), "{said}");
     folder.write("p.toml", &text(3, "Ns = 10"));
     assert!(directory(&folder)["refused"].as_str().unwrap().contains("model.Ns: 20 -> 10"));
     assert!(folder.contents("results") == before, "a plan writes nothing");

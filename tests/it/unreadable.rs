@@ -75,11 +75,6 @@ fn within_limits_on_files_and_memory_every_command_works_or_says_what_it_could_n
         }
     }
     assert!(refused > 0, "no limit was met");
-    for command in COMMANDS {
-        let ended = run_within(&folder, "-v 40000", command);
-        let said = "error: 39 MB of memory are allowed (ulimit -v), and 64 MB are needed at least\n";
-        assert_eq!((ended.code, ended.stderr.as_str()), (Some(2), said), "{command}");
-    }
 }
 
 #[test]

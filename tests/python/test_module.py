@@ -213,10 +213,18 @@ def test_what_was_not_recorded_is_named(tmp_path):
     results = module.run({"name": "a", "model": {"N": 9}, "record": {"slips": 1}}, tmp_path / "a", progress=False, reduce=False)
     with pytest.raises(module.ResultsError, match="precursors = true"):
         results.precursors()
-    with pytest.raises(module.ResultsError, match=r"call reduce\(\)"):
-        results.sets()
-    results.reduce()
-    assert len(results.sets()) == 1
+
+
+def test_sets_are_always_those_of_the_tables_that_are_there(tmp_path):
+    def run(seeds):
+        sweep = {"name": "a", "model": {"N": 9}, "axes": {"seed": seeds}, "record": {"slips": 1}}
+        return module.run(sweep, tmp_path / "a", progress=False, reduce=False)
+
+    assert run([0]).sets(["jobs"]).to_pandas()["jobs"].tolist() == [1]
+    # Another worker extends the sweep, and does not reduce it.
+    assert run([0, 1]).sets(["jobs"]).to_pandas()["jobs"].tolist() == [2]
+    (tmp_path / "a" / "reduced" / "sets.parquet").write_bytes(b"half")
+    assert module.open(tmp_path / "a").sets(["jobs"]).to_pandas()["jobs"].tolist() == [2]
 
 
 def test_progress_is_shown_and_ends_at_one(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sqlite3
 import subprocess
 import sys
 
@@ -51,6 +52,32 @@ def test_units_are_in_the_fields_and_in_the_footer(results):
     query = f"select decode(value) from parquet_kv_metadata('{file}') where decode(key) = 'units'"
     assert json.loads(duckdb.sql(query).fetchall()[0][0]) == stickslip.open(results).slips().units == in_fields
     assert [in_fields[name] for name in ("V0", "interval", "phase", "periods")] == ["m/s", "s", "rad", ""]
+
+
+def sql_of(engine, column, name):
+    """A value of a column, under this name, as SQL finds it."""
+    query = f"select avg({name}), {name} from t where {name} > 1 group by {name} order by {name}"
+    if engine == "polars":
+        return pl.SQLContext(t=pl.DataFrame({column: [1.5]})).execute(query, eager=True).rows()[0]
+    connection = duckdb.connect() if engine == "duckdb" else sqlite3.connect(":memory:")
+    connection.execute(f'create table t ("{column}" real)')
+    connection.execute("insert into t values (1.5)")
+    return connection.execute(query).fetchall()[0]
+
+
+@pytest.mark.parametrize("engine, keywords", [("duckdb", set()), ("polars", {"interval"}), ("sqlite3", {"drop"})])
+def test_the_columns_that_need_quotes_in_sql_are_those_of_the_document(results, engine, keywords):
+    files = [*results.glob("tables/*/*.parquet"), *results.glob("reduced/*.parquet")]
+    columns = {name for file in files for name in pq.read_schema(file).names}
+    assert len(columns) > 100
+    needy = set()
+    for column in columns:
+        assert sql_of(engine, column, f'"{column}"') == (1.5, 1.5)
+        try:
+            assert sql_of(engine, column, column) == (1.5, 1.5)
+        except (duckdb.Error, pl.exceptions.PolarsError, sqlite3.Error):
+            needy.add(column)
+    assert needy == keywords
 
 
 @pytest.mark.parametrize("table, rows", [("slips", SLIPS), ("jobs", JOBS), ("precursors", None)])

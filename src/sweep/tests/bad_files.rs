@@ -333,16 +333,16 @@ fn refinements_that_cannot_be_are_refused_with_what_is_allowed() {
         (instead("\"frequency\"", "[\"frequency\"]"), 7, &["axis = [\"frequency\"]", "the name of one axis"]),
         (instead("frequency", "break_on"), 7, &["axis = \"break_on\"", "is a word"]),
         (instead("frequency", "N"), 7, &["axis = \"N\"", "whole numbers"]),
-        (instead("frequency", "T"), 7, &["axis = \"T\"", "T follows from the axis frequency", "refine frequency"]),
-        (instead("frequency", "K"), 7, &["axis = \"K\"", "is no axis of [axes]"]),
-        (instead("frequency", "V0"), 7, &["axis = \"V0\"", "no values in between", "linear"]),
+        (instead("frequency", "T"), 7, &["axis = \"T\"", "no range of its own in [axes]"]),
+        (instead("frequency", "K"), 7, &["axis = \"K\"", "no range of its own in [axes]"]),
+        (instead("frequency", "V0"), 7, &["axis = \"V0\"", "no range of its own in [axes]", "linear"]),
         (
             format!(
                 "name = \"a\"\n[axes.zip]\nK = [1e8, 2e8]\nV0 = [1e-4, 2e-4]\n[refine]\n{}",
                 good.replace("frequency", "K")
             ),
             6,
-            &["axis = \"K\"", "zip or a sample"],
+            &["axis = \"K\"", "no range of its own in [axes]"],
         ),
         (instead("\"resultant_length\"", "\"resultant\""), 8, &["by = \"resultant\"", "no statistic of a set"]),
         (instead("\"resultant_length\"", "\"tau_meen\""), 8, &["did you mean tau_mean?"]),

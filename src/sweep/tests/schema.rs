@@ -157,7 +157,7 @@ fn the_schema_names_what_rounds_can_be_told_as_the_documentation_does() {
             assert_eq!(property["description"], json!(format!("{meaning}: {allowed}")));
         }
     }
-    let estimates: Vec<&str> = STATISTICS.iter().filter(|known| known.has_interval()).map(|known| known.key).collect();
+    let estimates: Vec<&str> = STATISTICS.iter().filter(|known| known.has_interval).map(|known| known.key).collect();
     let between = |quantity: &Quantity| *quantity != Quantity::BREAK_ON && !quantity.is_count();
     let refinable: Vec<&str> = Quantity::all().filter(between).map(Quantity::key).collect();
     let crossing: Vec<&str> = STATISTICS.iter().filter(|known| known.can_cross()).map(|known| known.key).collect();
