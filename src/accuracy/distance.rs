@@ -1,9 +1,8 @@
 //! After chaos: how far the distributions of two samples of slips are apart, with bootstrap intervals.
 //!
-//! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity; Kolmogorov-Smirnov is max |F - G|. Both are positive even
-//! between samples of the same distribution; the floor says how large that is. Biases of mean and standard deviation
-//! have a sign and no floor. Resampling draws blocks of consecutive slips, since neighbours are correlated, and is
-//! keyed: the same samples give the same intervals.
+//! Wasserstein-1 is ∫ |F - G|, in the unit of the quantity. It is positive even between samples of the same distribution;
+//! the floor says how large that is. Biases of mean and standard deviation have a sign and no floor. Resampling draws blocks
+//! of consecutive slips, since neighbours are correlated, and is keyed: the same samples give the same intervals.
 
 use crate::table::columns::columns;
 use rand_chacha::ChaCha8Rng;
@@ -34,10 +33,6 @@ columns! {
         w1_low: f64 = "", "lower end of its 95 % interval";
         w1_high: f64 = "", "upper end";
         w1_floor: f64 = "", "95 % quantile of the distance by chance alone";
-        ks: f64 = "", "Kolmogorov-Smirnov distance";
-        ks_low: f64 = "", "lower end of its 95 % interval";
-        ks_high: f64 = "", "upper end";
-        ks_floor: f64 = "", "95 % quantile of the distance by chance alone";
     }
 }
 
@@ -52,34 +47,29 @@ pub fn distances(sample: &[f64], reference: &[f64], key: u64) -> Option<Distance
     for _ in 0..RESAMPLES {
         let other = resample(reference, reference.len(), &mut generator);
         resampled.push(differences(&resample(sample, sample.len(), &mut generator), &other));
-        by_chance.push(differences(&resample(reference, sample.len(), &mut generator), &other));
+        by_chance.push(wasserstein(&resample(reference, sample.len(), &mut generator), &other));
     }
     let found = differences(&sorted(sample), &sorted(reference));
     let interval = |which: usize| shifted(found[which], resampled.iter().map(|other| other[which]).collect());
-    let floor = |which: usize| quantile(&mut by_chance.iter().map(|other| other[which]).collect::<Vec<_>>(), FLOOR);
-    let [(w1_low, w1_high), (ks_low, ks_high), mean, deviation] = [0, 1, 2, 3].map(interval);
+    let [(w1_low, w1_high), mean, deviation] = [0, 1, 2].map(interval);
+    let [w1, mean_bias, deviation_bias] = found;
     Some(Distances {
-        mean_bias: found[2],
+        mean_bias,
         mean_bias_low: mean.0,
         mean_bias_high: mean.1,
-        deviation_bias: found[3],
+        deviation_bias,
         deviation_bias_low: deviation.0,
         deviation_bias_high: deviation.1,
-        w1: found[0],
+        w1,
         w1_low: w1_low.max(0.0),
         w1_high,
-        w1_floor: floor(0),
-        ks: found[1],
-        ks_low: ks_low.max(0.0),
-        ks_high,
-        ks_floor: floor(1),
+        w1_floor: quantile(&mut by_chance, FLOOR),
     })
 }
 
-/// Differences of two sorted samples: Wasserstein-1, Kolmogorov-Smirnov, of the means, of the standard deviations.
-fn differences(sample: &[f64], reference: &[f64]) -> [f64; 4] {
-    let (wasserstein, kolmogorov) = wasserstein_and_kolmogorov(sample, reference);
-    [wasserstein, kolmogorov, mean(sample) - mean(reference), deviation(sample) - deviation(reference)]
+/// Differences of two sorted samples: Wasserstein-1, of the means, of the standard deviations.
+fn differences(sample: &[f64], reference: &[f64]) -> [f64; 3] {
+    [wasserstein(sample, reference), mean(sample) - mean(reference), deviation(sample) - deviation(reference)]
 }
 
 pub(super) fn mean(sample: &[f64]) -> f64 {
@@ -125,29 +115,19 @@ fn below(bound: usize, generator: &mut ChaCha8Rng) -> usize {
     drawn
 }
 
-/// Both distances of sorted samples.
-fn wasserstein_and_kolmogorov(left: &[f64], right: &[f64]) -> (f64, f64) {
-    let (mut i, mut j) = (0, 0);
-    let (mut wasserstein, mut kolmogorov) = (0.0, 0.0_f64);
+/// The distance of sorted samples.
+fn wasserstein(left: &[f64], right: &[f64]) -> f64 {
+    let (mut i, mut j, mut distance) = (0, 0, 0.0);
     let mut before = left[0].min(right[0]);
     while i < left.len() || j < right.len() {
-        let next = match (left.get(i), right.get(j)) {
-            (Some(&l), Some(&r)) => l.min(r),
-            (Some(&only), None) | (None, Some(&only)) => only,
-            (None, None) => break,
-        };
+        let [l, r] = [left.get(i), right.get(j)].map(|value| value.copied().unwrap_or(f64::INFINITY));
         let gap = (i as f64 / left.len() as f64 - j as f64 / right.len() as f64).abs();
-        wasserstein += gap * (next - before);
-        kolmogorov = kolmogorov.max(gap);
-        before = next;
-        while left.get(i) == Some(&next) {
-            i += 1;
-        }
-        while right.get(j) == Some(&next) {
-            j += 1;
-        }
+        distance += gap * (l.min(r) - before);
+        before = l.min(r);
+        i += usize::from(l <= r);
+        j += usize::from(r <= l);
     }
-    (wasserstein, kolmogorov)
+    distance
 }
 
 /// Nearest-rank quantile.
@@ -169,10 +149,10 @@ mod tests {
 
     #[test]
     fn distances_of_small_samples_are_those_by_hand() {
-        assert_eq!(wasserstein_and_kolmogorov(&[0.0, 1.0], &[0.0, 1.0]), (0.0, 0.0));
-        assert_eq!(wasserstein_and_kolmogorov(&[0.0, 1.0], &[2.0, 3.0]), (2.0, 1.0));
-        let (wasserstein, kolmogorov) = wasserstein_and_kolmogorov(&[1.0, 2.0, 3.0], &[2.0]);
-        assert!((wasserstein - 2.0 / 3.0).abs() < 1e-15 && (kolmogorov - 1.0 / 3.0).abs() < 1e-15);
+        assert_eq!(wasserstein(&[0.0, 1.0], &[0.0, 1.0]), 0.0);
+        assert_eq!(wasserstein(&[0.0, 1.0], &[2.0, 3.0]), 2.0);
+        assert_eq!(wasserstein(&[1.0, 1.0, 4.0], &[1.0]), 1.0);
+        assert!((wasserstein(&[1.0, 2.0, 3.0], &[2.0]) - 2.0 / 3.0).abs() < 1e-15);
     }
 
     #[test]
@@ -183,7 +163,6 @@ mod tests {
         let moved = distances(&uniform(500, 0.1, 2), &reference, 3).unwrap();
         assert!(moved.w1 > 2.0 * moved.w1_floor, "{moved:?}");
         assert!(moved.w1_low < 0.1 && 0.1 < moved.w1_high, "{moved:?}");
-        assert!(moved.ks > moved.ks_floor, "{moved:?}");
         assert!(moved.mean_bias_low > 0.0 && moved.mean_bias_low < 0.1 && 0.1 < moved.mean_bias_high, "{moved:?}");
         assert!(moved.deviation_bias_low < 0.0 && 0.0 < moved.deviation_bias_high, "{moved:?}");
     }
@@ -196,7 +175,6 @@ mod tests {
             let found = distances(&sample, &reference, 3).unwrap();
             for (least, low, value, high) in [
                 (0.0, found.w1_low, found.w1, found.w1_high),
-                (0.0, found.ks_low, found.ks, found.ks_high),
                 (f64::NEG_INFINITY, found.mean_bias_low, found.mean_bias, found.mean_bias_high),
                 (f64::NEG_INFINITY, found.deviation_bias_low, found.deviation_bias, found.deviation_bias_high),
             ] {

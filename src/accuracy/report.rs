@@ -9,17 +9,17 @@ use crate::results::commit::Commit;
 use crate::results::layout::Layout;
 use crate::table::arrow;
 use crate::table::columns::Table;
-use crate::table::file::{DatasetError, Footer, PROGRAM, TableWriter};
-use crate::table::storage::{Disk, Storage, StoredFile};
+use crate::table::file::{Footer, PROGRAM, TableWriter};
+use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
-/// The findings of a study, with a figure for the sets that differ in the modulation alone.
-pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<'a>> {
-    let json = json!({
+/// What a study found, as JSON.
+pub fn to_json(study: &Study, findings: &Findings) -> Value {
+    json!({
         "format": FORMAT,
         "program": PROGRAM,
         "processor": cost::processor(),
@@ -29,72 +29,50 @@ pub fn study_report<'a>(study: &Study, findings: &'a Findings) -> Result<Report<
         "breaks": study.breaks,
         "followed_breaks": study.followed_breaks,
         "verdict": verdict(study, findings),
-    });
-    let mut report = Report { json, tables: Vec::new(), pictures: Vec::new() }
-        .table("methods", &findings.methods)
-        .table("distances", &findings.distances);
-    let mut drawn = Vec::new();
+        "methods": findings.methods.iter().map(arrow::json).collect::<Value>(),
+        "distances": findings.distances.iter().map(arrow::json).collect::<Value>(),
+    })
+}
+
+/// Writes what a study found into a folder, over what an earlier one left there, with a figure for the sets that differ in the
+/// modulation alone; returns the files.
+pub fn write(study: &Study, findings: &Findings, folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut sets: Vec<Parameters> = Vec::new();
     for set in study.sets.iter().map(unmodulated) {
-        if !drawn.contains(&set) {
-            let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
-            let name = format!("work-precision-V0-{:e}{}", set.drive_velocity, others.collect::<String>());
-            report.pictures.push((name, work_precision_figure(&set, findings)?));
-            drawn.push(set);
+        if !sets.contains(&set) {
+            sets.push(set);
         }
     }
-    Ok(report)
+    let mut documents = vec![("accuracy.json".to_owned(), to_json(study, findings).to_string().into_bytes())];
+    for set in sets {
+        let others = other_settings(&set).map(|(key, value)| format!("-{key}-{value}"));
+        let name = format!("work-precision-V0-{:e}{}", set.drive_velocity, others.collect::<String>());
+        let picture = work_precision_figure(&set, findings)?;
+        documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
+        documents.push((format!("{name}.png"), picture.png()?));
+    }
+    Disk.ensure_folder(folder)?;
+    let staging = folder.join("staging");
+    let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
+    let mut files =
+        vec![stage(&mut commit, folder, &findings.methods)?, stage(&mut commit, folder, &findings.distances)?];
+    for (name, bytes) in documents {
+        let file = folder.join(name);
+        commit.stage_bytes(&file, &bytes)?;
+        files.push(file);
+    }
+    commit.publish()?;
+    // Empty now; should it not go, it does no harm.
+    let _ = std::fs::remove_dir(staging);
+    Ok(files)
 }
 
-/// Writes a table into a file.
-type TableFile<'a> = Box<dyn Fn(StoredFile, &Footer) -> Result<(), DatasetError> + 'a>;
-
-/// Tables, JSON and figures.
-pub struct Report<'a> {
-    pub json: Value,
-    tables: Vec<(&'static str, TableFile<'a>)>,
-    pictures: Vec<(String, Picture)>,
-}
-
-impl<'a> Report<'a> {
-    /// Adds a table, whose rows become a field of the JSON, too.
-    fn table<R: Table>(mut self, field: &str, rows: &'a [R]) -> Self {
-        self.json[field] = rows.iter().map(arrow::json).collect();
-        let write = move |file: StoredFile, footer: &Footer| {
-            let mut writer = TableWriter::new(file, footer)?;
-            rows.iter().try_for_each(|row| writer.push(row))?;
-            writer.finish().map(drop)
-        };
-        self.tables.push((R::NAME, Box::new(write)));
-        self
-    }
-
-    /// Writes everything into a folder, over what an earlier command left there; returns the files.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>> {
-        Disk.ensure_folder(folder)?;
-        let staging = folder.join("staging");
-        let mut commit = Commit::begin(&Layout::new(&Disk, folder), &staging)?;
-        let mut files = Vec::new();
-        let footer = Footer::default().with("processor", &cost::processor());
-        for (name, write) in &self.tables {
-            let file = folder.join(format!("{name}.parquet"));
-            write(commit.stage(&file)?, &footer)?;
-            files.push(file);
-        }
-        let mut documents = vec![("accuracy.json".to_owned(), self.json.to_string().into_bytes())];
-        for (name, picture) in &self.pictures {
-            documents.push((format!("{name}.svg"), picture.svg().into_bytes()));
-            documents.push((format!("{name}.png"), picture.png()?));
-        }
-        for (name, bytes) in documents {
-            let file = folder.join(name);
-            commit.stage_bytes(&file, &bytes)?;
-            files.push(file);
-        }
-        commit.publish()?;
-        // Empty now; should it not go, it does no harm.
-        let _ = std::fs::remove_dir(staging);
-        Ok(files)
-    }
+fn stage<R: Table>(commit: &mut Commit<'_>, folder: &Path, rows: &[R]) -> Result<PathBuf> {
+    let file = folder.join(format!("{}.parquet", R::NAME));
+    let mut writer = TableWriter::new(commit.stage(&file)?, &Footer::default().with("processor", &cost::processor()))?;
+    rows.iter().try_for_each(|row| writer.push(row))?;
+    writer.finish()?;
+    Ok(file)
 }
 
 /// The figure of the sets that are this one without modulation: cost against the error of break times, and against
@@ -223,7 +201,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let study = Study { sets: vec![Parameters::default()], ..Study::quick() };
         let findings = findings();
-        let files = study_report(&study, &findings).unwrap().write(folder.path()).unwrap();
+        let files = write(&study, &findings, folder.path()).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(
             names,
@@ -251,7 +229,7 @@ mod tests {
         let page = include_str!("../../docs/commands.md");
         let (study, findings) = (Study { sets: vec![Parameters::default()], ..Study::quick() }, findings());
         let row = page.lines().find(|line| line.starts_with("| `accuracy` |")).unwrap();
-        for field in study_report(&study, &findings).unwrap().json.as_object().unwrap().keys() {
+        for field in to_json(&study, &findings).as_object().unwrap().keys() {
             assert!(row.contains(&format!("`{field}`")), "{field}");
         }
     }

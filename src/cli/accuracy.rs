@@ -3,7 +3,7 @@
 use super::exit::{Exit, UsageError};
 use super::output::{self, Columns};
 use super::sweep::{self, PresetFlag, Variation, changes};
-use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, study_report, verdict};
+use crate::accuracy::{self, Findings, MethodRow, QUANTITIES, Study, set_in_words, verdict};
 use crate::model::Parameters;
 use crate::results::layout::Layout;
 use crate::run::threads::{self, Threads};
@@ -105,10 +105,9 @@ pub fn accuracy(arguments: &Arguments) -> Result<Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("cannot start {threads} threads; take fewer with --threads"))?;
     let findings = pool.install(|| study.run(&mut |next| output::report(next)))?;
-    let report = study_report(&study, &findings)?;
-    let files = report.write(&out)?;
+    let files = accuracy::write(&study, &findings, &out)?;
     if arguments.json {
-        output::plain_json(&report.json)?;
+        output::plain_json(&accuracy::to_json(&study, &findings))?;
     } else {
         output::print(&study_text(&study, &findings, arguments.all))?;
         files.iter().try_for_each(|file| output::print(&format!("{}\n", shown(file))))?;
