@@ -69,12 +69,9 @@ impl fmt::Display for Method {
 
 /// The drive of a set in words, and what else differs from the defaults.
 pub fn set_in_words(parameters: &Parameters) -> String {
-    let modulation = parameters.modulation_period.map_or_else(
+    let modulation = parameters.frequency().map_or_else(
         || "Delta = 0".to_owned(),
-        |period| {
-            let frequency = (1e4 / period).round() / 1e4;
-            format!("Delta = {:e} m, 1/T = {frequency} Hz", parameters.modulation_amplitude)
-        },
+        |frequency| format!("Delta = {:e} m, 1/T = {frequency} Hz", parameters.modulation_amplitude),
     );
     let others = other_settings(parameters).map(|(key, value)| format!(", {key} = {value}"));
     format!("V0 = {:e} m/s, {modulation}{}", parameters.drive_velocity, others.collect::<String>())

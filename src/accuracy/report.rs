@@ -123,13 +123,10 @@ fn points(
     let is_one = modulations().all(|row| modulations().next().is_some_and(|first| first.parameters == row.parameters));
     let point = |row: &&MethodRow| {
         let (error, uncertainty) = error(row)?;
-        let drive = match row.parameters.modulation_period {
+        let drive = match row.parameters.frequency() {
             None => "Δ = 0".to_owned(),
             Some(_) if is_one => "Δ > 0".to_owned(),
-            Some(period) => {
-                let frequency = (1e4 / period).round() / 1e4;
-                format!("Δ = {:e} m, {frequency} Hz", row.parameters.modulation_amplitude)
-            }
+            Some(frequency) => format!("Δ = {:e} m, {frequency} Hz", row.parameters.modulation_amplitude),
         };
         let mark = if row.cost.is_extrapolated() { "*" } else { "" };
         let method = format!("{}{mark}", row.solver.name());
@@ -173,9 +170,7 @@ mod tests {
             case: "defaults".to_owned(),
             solver: solver.clone(),
             cost,
-            timings: 2,
             median_per_slip: 0.02,
-            largest_per_slip: 0.03,
             break_times,
             ledger_residual: Some(-1e-3),
         };

@@ -150,9 +150,7 @@ columns! {
         case: String = "", "the drive, and what else differs from the defaults";
         solver: Method;
         cost: Cost;
-        timings: u64 = "", "timings, one of each realisation; the costs are by the cheapest per step";
         median_per_slip as "median_cpu_per_slip": f64 = "s", "CPU time per slip by the median timing";
-        largest_per_slip as "largest_cpu_per_slip": f64 = "s", "CPU time per slip by the dearest timing";
         break_times: BreakErrors;
         ledger_residual: Option<f64> = "", "residual of the energy ledger, relative to the work of the drive";
     }
@@ -239,16 +237,15 @@ impl Ensemble {
         self.slips.extend(slips);
     }
 
-    /// Costs by the CPU time per step of the fastest realisation, of the median one and of the slowest. Without slips
-    /// those per slip follow from the mean interval in s.
-    fn costs(&self, mean_interval: f64) -> [Cost; 3] {
+    /// Costs by the CPU time per step of the fastest realisation, and of the median one. Without slips those per slip follow
+    /// from the mean interval in s.
+    fn costs(&self, mean_interval: f64) -> [Cost; 2] {
         let mut per_step = self.per_step.clone();
         per_step.sort_by(f64::total_cmp);
-        let last = per_step.len() - 1;
         let (steps, slips) = (self.steps as f64, self.slips_seen as f64);
         let is_sample = self.slips_seen > 0;
         let steps_per_slip = if is_sample { steps / slips } else { mean_interval * steps / self.end_time };
-        [0, last / 2, last].map(|place| Cost {
+        [0, (per_step.len() - 1) / 2].map(|place| Cost {
             per_simulated_second: per_step[place] * steps / self.end_time,
             per_slip: per_step[place] * steps_per_slip,
             per_step: per_step[place],
@@ -294,15 +291,13 @@ impl Study {
             let pairs: Vec<(Solver, &Ensemble)> = self.solvers.iter().copied().zip(&ensembles).collect();
             for (&(solver, ensemble), (break_times, ledger_residual)) in pairs.iter().zip(checks) {
                 let (case, parameters) = (set_in_words(parameters), parameters.clone());
-                let [cost, median, dearest] = ensemble.costs(mean_interval);
+                let [cost, median] = ensemble.costs(mean_interval);
                 findings.methods.push(MethodRow {
                     parameters: Selected::new(parameters),
                     case,
                     solver: solver.into(),
                     cost,
-                    timings: self.seeds,
                     median_per_slip: median.per_slip,
-                    largest_per_slip: dearest.per_slip,
                     break_times,
                     ledger_residual,
                 });
@@ -448,7 +443,7 @@ mod tests {
             assert!(rows[0].ledger_residual.unwrap().abs() > 1e-4 && rows[2].ledger_residual.unwrap().abs() < 1e-8);
             assert_eq!(rows[1].ledger_residual, None);
             for row in rows {
-                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9 && row.timings == 1, "{row:?}");
+                assert!(row.cost.per_slip > 0.0 && row.cost.timed_slips == 9, "{row:?}");
             }
         }
         // All quantities of all solvers, but no phase where there is no modulation.

@@ -125,9 +125,7 @@ mod tests {
             case: String::new(),
             solver: solver.into(),
             cost: Cost { per_slip, timed_slips: 9, ..Cost::default() },
-            timings: 1,
             median_per_slip: per_slip,
-            largest_per_slip: per_slip,
             break_times: BreakErrors { median: Some(error), largest: Some(10.0 * error), ..BreakErrors::default() },
             ledger_residual: None,
         }

@@ -152,8 +152,9 @@ fn study_text(study: &Study, findings: &Findings, all: bool) -> String {
     ));
     if all {
         lines.push(
-            "median and dearest: costs as multiples of the cheapest; together: breaks and model time until the trajectory\n\
-             leaves that of the reference, or > at least; ledger: residual of the energy over the work of the drive"
+            "median: cost of the median realisation over that of the cheapest; together: breaks and model time until\n\
+             the trajectory leaves that of the reference, or > at least; ledger: residual of the energy over the\n\
+             work of the drive"
                 .to_owned(),
         );
     }
@@ -193,7 +194,6 @@ fn table(study: &Study, findings: &Findings, set: &Parameters, all: bool) -> Str
     }
     if all {
         add(false, "median", &|row| format!("{:.2}", row.median_per_slip / row.cost.per_slip));
-        add(false, "dearest", &|row| format!("{:.2}", row.largest_per_slip / row.cost.per_slip));
         add(false, "ns/step", &|row| format!("{:.0}", 1e9 * row.cost.per_step));
         add(false, "together", &|MethodRow { break_times, .. }| {
             let mark = if break_times.together_throughout { ">" } else { "" };

@@ -4,7 +4,7 @@ use super::exit::{Exit, UsageError};
 use super::progress::Progress;
 use super::report::Reporter;
 use super::sweep::{self, PresetFlag, Variation};
-use super::{output, reduce, show, signals, status, time};
+use super::{output, reduce, show, signals, time};
 use crate::figure::{Format, Look, draw_all};
 use crate::observe::measure;
 use crate::reduce::NoJobs;
@@ -228,8 +228,7 @@ fn reduce_and_draw(layout: &Layout<'_>) -> Result<Option<Reduced>> {
         summary => summary?,
     };
     let figures = draw_all(layout, &Look::of_sweep(results.sweep().name()), &Format::DEFAULT)?;
-    let mut lines = reduce::summary_lines(&summary, layout);
-    lines.extend(status::no_slips(&results));
+    let lines = reduce::summary_lines(&summary, layout);
     Ok(Some(Reduced { lines, result: show::summary(&results, summary.sets)?, figures }))
 }
 

@@ -305,7 +305,9 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         let sets = output::count(without.len() as u64, "set");
         let job = sweep.set_with(&first.parameters.parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
         let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
-        notes.push(format!("{jobs} of {sets} without slips; the first: {command}"));
+        notes.push(format!(
+            "{jobs} of {sets} without slips: they slide, or give_up_after is too short for their slips; the first: {command}"
+        ));
     }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();
     if failed > 0 {

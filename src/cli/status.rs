@@ -5,7 +5,7 @@ use super::output;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::results::workers::Worker;
-use crate::run::{Failure, Overview, Present, Status};
+use crate::run::{Failure, Overview, Present};
 use crate::table::shown::shown_text;
 use crate::table::storage::Disk;
 use anyhow::Result;
@@ -30,13 +30,12 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of [`Status`] as JSON.
+/// Version of [`Status`](crate::run::Status) as JSON.
 const FORMAT: u32 = 2;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
     let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
-    let no_slips = if arguments.json { None } else { no_slips(&results) };
     let overview = status.overview;
     if arguments.json {
         output::json(FORMAT, &status)?;
@@ -59,7 +58,6 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             ("time left", left),
         ];
         pairs.extend(status.rounds.as_ref().map(|rounds| ("round", output::rounds(rounds))));
-        pairs.extend(no_slips);
         output::pairs(&pairs)?;
         for Present { worker, last_beat } in &status.workers {
             let Worker { host, process, threads, jobs_per_second, .. } = worker;
@@ -81,36 +79,4 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
         Overview { jobs_failed: 1.., .. } => Exit::Failed,
         _ => Exit::Done,
     })
-}
-
-/// A line for people if half of the jobs or more ended without a slip: the likely reason, and what to do. Tables that
-/// cannot be read are for `verify`.
-pub fn no_slips(results: &Results<'_>) -> Option<(&'static str, String)> {
-    let (without, ended) = Status::jobs_without_slips(results).ok()?;
-    no_slips_in_words(without, ended).map(|words| ("no slips", words))
-}
-
-fn no_slips_in_words(without: u64, ended: u64) -> Option<String> {
-    if without == 0 || 2 * without < ended {
-        return None;
-    }
-    let jobs = if without == ended { "in any job".to_owned() } else { format!("in {without} of {ended} jobs") };
-    Some(format!(
-        "{jobs}: the slider slides, or slips are too rare (see regime and slip_share in tables/jobs); lower V0, shorten tau_r, \
-         or raise give_up_after"
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn it_is_said_if_half_of_the_jobs_or_more_do_not_slip() {
-        assert_eq!((no_slips_in_words(0, 0), no_slips_in_words(0, 9), no_slips_in_words(4, 9)), (None, None, None));
-        let words = |without, ended| no_slips_in_words(without, ended).unwrap();
-        assert!(words(5, 9).starts_with("in 5 of 9 jobs: the slider slides"));
-        assert!(words(9, 9).starts_with("in any job: the slider") && words(9, 9).contains("lower V0"));
-        assert!(!words(9, 9).contains('\n'));
-    }
 }

@@ -3,12 +3,10 @@
 use crate::results::events::RunEvent;
 use crate::results::pending::{Again, PartState};
 use crate::results::rounds::RoundsSoFar;
-use crate::results::tables::{self, JobOutcome};
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
 use crate::run::take::Share;
 use crate::sweep::{Outline, Part};
-use crate::table::columns::columns;
 use serde::Serialize;
 use std::time::SystemTime;
 
@@ -126,27 +124,6 @@ fn jobs_kept(share: &Share<'_>) -> u64 {
     let earlier = share.parts.iter().filter(|part| part.extension < last && share.pending.done.has(part));
     let jobs = earlier.flat_map(|part| share.part(part).jobs);
     jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
-}
-
-columns! {
-    /// How a job ended.
-    struct OutcomeAlone {
-        outcome: JobOutcome;
-    }
-}
-
-impl Status {
-    /// How many jobs of the tables ended without a slip, and how many were run to an end.
-    pub fn jobs_without_slips(results: &Results<'_>) -> Result<(u64, u64), ResultsError> {
-        let (mut without, mut ended) = (0, 0);
-        for batch in results.layout().dataset(tables::JOBS)?.rows::<OutcomeAlone>() {
-            for OutcomeAlone { outcome } in batch? {
-                without += u64::from(outcome == JobOutcome::NoSlips);
-                ended += u64::from(outcome != JobOutcome::Failed);
-            }
-        }
-        Ok((without, ended))
-    }
 }
 
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {

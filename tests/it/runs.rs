@@ -192,25 +192,6 @@ fn the_status_counts_what_is_there_for_people_and_for_programs() {
 }
 
 #[test]
-fn run_and_status_say_in_the_same_words_that_nothing_slips() {
-    let folder = Folder::new();
-    let line = |text: &str| text.lines().find_map(|line| Some(line.strip_prefix("no slips")?.trim().to_owned()));
-    for (name, velocities, expected) in [
-        ("all", "[5e-3, 1e-2]", Some("in any job: ")),
-        ("some", "[1e-4, 1e-2]", Some("in 1 of 2 jobs: ")),
-        ("none", "[1e-4, 2e-4]", None),
-    ] {
-        folder.write("sweep.toml", &format!("name = \"{name}\"\n[axes]\nV0 = {velocities}\n[record]\nslips = 3\n"));
-        let run = line(&folder.ends(0, &format!("run sweep.toml --out {name}")).stdout);
-        assert_eq!(run, line(&folder.ends(0, &format!("status {name}")).stdout));
-        match (run, expected) {
-            (Some(found), Some(start)) => assert!(found.starts_with(start) && found.contains("lower V0"), "{found}"),
-            (found, expected) => assert_eq!(found.as_deref(), expected),
-        }
-    }
-}
-
-#[test]
 fn reduced_data_and_figures_can_be_made_again() {
     let folder = Folder::new();
     folder.write("tiny.toml", TINY);

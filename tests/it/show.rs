@@ -83,6 +83,8 @@ fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
     let run = folder.ends(0, "run fast.toml --out out").stdout;
-    assert!(run.contains("2 jobs of 1 set without slips; the first: stickslip simulate"), "{run}");
+    let note = "2 jobs of 1 set without slips: they slide, or give_up_after is too short for their slips; the first: stickslip \
+                simulate";
+    assert!(run.contains(note), "{run}");
     assert!(run.contains("--set V0=1"), "{run}");
 }
