@@ -33,9 +33,9 @@ impl Tally {
         }
     }
 
-    /// Share of the predicted cost that is done.
+    /// Share of the predicted cost that is done; exactly 1 at the end, in whatever order costs were summed.
     pub fn share(&self) -> f64 {
         let done = self.predicted_own + self.predicted_others;
-        if self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 }
+        if self.jobs_done < self.jobs && self.predicted > 0.0 { (done / self.predicted).min(1.0) } else { 1.0 }
     }
 }
