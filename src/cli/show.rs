@@ -122,7 +122,7 @@ fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<E
     Ok(Exit::Done)
 }
 
-/// The first sets of a directory that has just been reduced to so many, and what ended otherwise. Memory: [`MAX_READ`] sets.
+/// The first of the `count` sets of a directory, and what ended otherwise. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(&rows);

@@ -21,7 +21,7 @@ slips = {slips}
 
 PARTS = 64
 
-# A number of blocks with which ten slips of all jobs take some 2 s of CPU time.
+# A number of blocks with which ten slips of all jobs take some 0.7 s of CPU time.
 BLOCKS = 100
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "clusters.md"
