@@ -28,27 +28,52 @@ __all__ = [
 ]
 
 VERSION: str
+"""Version of the program and of the module."""
 
-class SweepError(ValueError): ...
-class ResultsError(RuntimeError): ...
-class SimulationError(RuntimeError): ...
+class SweepError(ValueError):
+    """A sweep, or a key of a simulation, that says nothing that can run."""
+
+class ResultsError(RuntimeError):
+    """A results directory that cannot be used, read or written."""
+
+class SimulationError(RuntimeError):
+    """A simulation that cannot continue."""
 
 @final
 class Table:
+    """A table with its units, in Arrow's memory layout.
+
+    pandas, polars, DuckDB and pyarrow take it as it is, without a copy: `pyarrow.table(slips)`,
+    `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
+    """
+
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the table."""
+
     @property
-    def columns(self) -> list[str]: ...
+    def columns(self) -> list[str]:
+        """Names of the columns."""
+
     @property
-    def units(self) -> dict[str, str]: ...
+    def units(self) -> dict[str, str]:
+        """Unit of each column; "" for a pure number or a text."""
+
     @property
-    def meaning(self) -> dict[str, str]: ...
+    def meaning(self) -> dict[str, str]:
+        """Meaning of each column."""
+
     def __len__(self) -> int: ...
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> Any: ...
     def __arrow_c_schema__(self) -> Any: ...
-    def to_pyarrow(self) -> pyarrow.Table: ...
-    def to_pandas(self) -> pandas.DataFrame: ...
-    def to_polars(self) -> polars.DataFrame: ...
+    def to_pyarrow(self) -> pyarrow.Table:
+        """The table as a `pyarrow.Table`; units and meanings are in the metadata of its fields."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as a `pandas.DataFrame`; units and meanings are in `.attrs["units"]` and `.attrs["meaning"]`."""
+
+    def to_polars(self) -> polars.DataFrame:
+        """The table as a `polars.DataFrame`, which keeps no units: see `units`."""
 
 def keys() -> dict[str, tuple[str, str, Any]]: ...
 def sweep_text(keys: list[tuple[str, str]]) -> str: ...

@@ -15,14 +15,14 @@ class Progress:
     """How far a run is. `share` goes by predicted cost; other processes that share the work are counted."""
 
     jobs_done: int
-    #: All jobs to run.
     jobs: int
-    #: Share of the work that is done, from 0 to 1.
+    """All jobs to run."""
     share: float
-    #: Seconds since the run began.
+    """Share of the work that is done, from 0 to 1."""
     elapsed: float
-    #: What happened since the last call, such as a job that failed.
+    """Seconds since the run began."""
     messages: list[str] = field(default_factory=list)
+    """What happened since the last call, such as a job that failed."""
 
     @property
     def remaining(self) -> float | None:

@@ -33,9 +33,12 @@ class Results:
     """
 
     def __init__(self, directory: str | PathLike[str]) -> None:
-        #: Where the results are.
-        self.directory = Path(fspath(directory))
-        #: Name of the sweep, and its text as TOML.
+        self.directory: Path = Path(fspath(directory))
+        """Where the results are."""
+        self.name: str
+        """Name of the sweep."""
+        self.sweep: str
+        """The text of the sweep, as TOML."""
         self.name, self.sweep = _stickslip.sweep_of(self.directory)
 
     def __repr__(self) -> str:

@@ -19,12 +19,12 @@ class Simulation:
     """What one job did: `outcome`, its row among the jobs, and its tables (`stickslip.Table`)."""
 
     def __init__(self, job: dict[str, Any], sweep: str, tables: dict[str, Table]) -> None:
-        #: The row that a sweep would have for it among its jobs: parameters, outcome, mean friction (N), counts.
-        self.job = job
-        #: `done`, `time limit` or `no slips`.
+        self.job: dict[str, Any] = job
+        """The row that a sweep would have for it among its jobs: parameters, outcome, mean friction (N), counts."""
         self.outcome: str = job["outcome"]
-        #: The text of the sweep with this one job, as TOML.
-        self.sweep = sweep
+        """`done`, `time limit` or `no slips`."""
+        self.sweep: str = sweep
+        """The text of the sweep with this one job, as TOML."""
         self._tables = tables
 
     def __repr__(self) -> str:

@@ -12,10 +12,10 @@ import pandas
 from numpy.typing import ArrayLike
 from scipy import stats
 
-#: Confidence level of all intervals.
 LEVEL = 0.95
-#: Resamples of a bootstrap, enough for the ends of an interval to two digits.
+"""Confidence level of all intervals."""
 RESAMPLES = 400
+"""Resamples of a bootstrap, enough for the ends of an interval to two digits."""
 
 
 def resultant_length(angles: ArrayLike) -> float:

@@ -23,6 +23,12 @@ def run(
 ) -> Results:
     """Runs a sweep, or what is missing of it, and opens its results; then reduces and plots, as `stickslip run` does.
 
+    Ctrl-C stops the run and raises `KeyboardInterrupt`: finished jobs are kept, and the same call resumes. So does an
+    exception in `progress`. Failed and missing jobs are warned of. Other processes may run the same sweep meanwhile, also
+    on other hosts with a common disk: they share the work.
+
+    Raises `SweepError` for mistakes in the sweep, and `ResultsError` if the directory does not fit or fails.
+
     Parameters
     ----------
     sweep
@@ -41,12 +47,8 @@ def run(
     reduce
         Whether to reduce the tables and to draw the figures, when all is done.
 
-    Ctrl-C stops the run and raises `KeyboardInterrupt`: finished jobs are kept, and the same call resumes. So does an
-    exception in `progress`. Failed and missing jobs are warned of. Other processes may run the same sweep meanwhile, also
-    on other hosts with a common disk: they share the work.
-
-    Raises `SweepError` for mistakes in the sweep, and `ResultsError` if the directory does not fit or fails.
-
+    Examples
+    --------
     >>> results = stickslip.run({
     ...     "name": "first",
     ...     "model": {"Delta": 1e-6},

@@ -1,5 +1,6 @@
 """The module stickslip: the same bits as the command line, tables that every library takes, and no way to hang or crash."""
 
+import ast
 import inspect
 import os
 import re
@@ -10,6 +11,7 @@ import sys
 import threading
 import time
 import tomllib
+from operator import attrgetter
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -379,6 +381,18 @@ def test_the_stubs_are_those_of_the_module(tmp_path):
     environment = {**os.environ, "MYPY_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_stubs_have_the_words_of_the_module():
+    stubs = ast.parse((ROOT / "python" / "stickslip" / "_stickslip.pyi").read_text())
+    classes = [node for node in stubs.body if isinstance(node, ast.ClassDef)]
+    words = {node.name: ast.get_docstring(node) for node in classes}
+    table = next(node for node in classes if node.name == "Table")
+    words |= {f"Table.{node.name}": ast.get_docstring(node) for node in table.body if isinstance(node, ast.FunctionDef)}
+    # Those between underscores have none.
+    words = {name: text for name, text in words.items() if text or "__" not in name}
+    assert len(words) == 11
+    assert words == {name: attrgetter(name)(module._stickslip).__doc__ for name in words}
 
 
 def test_sweeps_in_rounds_have_edges_and_say_whether_targets_are_met(tmp_path, opened):
