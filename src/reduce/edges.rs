@@ -24,8 +24,10 @@ use std::collections::BTreeMap;
 
 /// Groups of seeds, so that the cost of leaving them out is bounded.
 pub const GROUPS: usize = 30;
-/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width.
-const WINDOW: u64 = 3;
+/// Rows up to which sets lie close to each other, and to the edge for the line: one is at most the wanted width. Fewer where
+/// they are a larger share of the value at the edge, over which responses bend.
+const WINDOW: f64 = 3.0;
+const LARGEST_SHARE: f64 = 0.2;
 /// What the interval of a line is widened by, as windows that are steep by chance end first: measured, docs/rounds.md.
 const LOOKS: f64 = 1.2;
 /// How often the window is moved to where its line crosses.
@@ -150,8 +152,9 @@ pub struct Edge<'a> {
 }
 
 impl<'a> Edge<'a> {
-    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted.
-    fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64) -> Option<Self> {
+    /// Between two sets of a line that are clear, those in between being unclear. `width` is wanted; `window` are the rows
+    /// for a line at a place.
+    fn between(all: &[Placed<'a>], [first, last]: [usize; 2], width: f64, window: impl Fn(f64) -> u64) -> Option<Self> {
         let bracket = [all[first], all[last]];
         let excess = |set: &Placed<'_>| bracket[1].side * set.sample.excess;
         let rise = |pair: &&[Placed<'_>]| excess(&pair[1]) - excess(&pair[0]);
@@ -165,18 +168,20 @@ impl<'a> Edge<'a> {
             let (interval, error) = (Some(ends), gap as f64 / width);
             return Some(Self { sets: pair.to_vec(), bracket, place, interval, error, wanted_row, is_bracketed: true });
         }
-        let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= WINDOW as f64;
+        let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= window(place) as f64;
         let mut place = fit(pair, ends[0])?.crossing;
         for _ in 0..MOVES {
-            let window: Vec<Placed<'_>> = all.iter().filter(|set| near(set, place)).copied().collect();
-            let Some(line) = fit(&window, place).filter(|line| line.slope * bracket[1].side > 0.0) else { break };
+            let sets: Vec<Placed<'_>> = all.iter().filter(|set| near(set, place)).copied().collect();
+            let Some(line) = fit(&sets, place).filter(|line| line.slope * bracket[1].side > 0.0) else { break };
             place = line.crossing.clamp(bracket[0].row as f64, bracket[1].row as f64);
         }
         let above = all.partition_point(|set| set.row as f64 <= place).clamp(1, all.len() - 1);
         let (low, high) = (all[above - 1].row, all[above].row);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two rows")]
         let nearest = place.round() as u64;
-        let wanted_row = (high - low > WINDOW).then(|| nearest.clamp(low + WINDOW - 1, high - (WINDOW - 1)));
+        let window = window(place);
+        let inner = window.saturating_sub(1).max(1);
+        let wanted_row = (high - low > window).then(|| nearest.clamp(low + inner, high - inner));
         let sets: Vec<Placed<'_>> =
             all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
         let Fit { crossing, interval, .. } = fit(&sets, place)?;
@@ -240,7 +245,13 @@ pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64,
         rows_of.entry(rows).or_default().push((row, set));
     }
     let to = if refinement.is_log { libm::log1p(refinement.to) } else { refinement.to };
-    let width = scale(sweep, refinement).map_or(f64::NAN, |(_, step)| to / step);
+    let (first, step) = scale(sweep, refinement).unwrap_or((f64::NAN, f64::NAN));
+    let width = to / step;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 3")]
+    let window = |place: f64| {
+        let value = if refinement.is_log { 1.0 } else { (first + step * place).abs() };
+        (LARGEST_SHARE * value / step).clamp(1.0, WINDOW) as u64
+    };
     let line = |rows: &Vec<u64>, sets: &Vec<(u64, &'a SetOfEdges)>, statistic: usize| {
         // Without a value, a set says nothing.
         let sample = |&(row, set): &(u64, &'a SetOfEdges)| {
@@ -250,7 +261,7 @@ pub fn lines<'a>(sweep: &Sweep, refinement: &Refinement, sets: &'a BTreeMap<u64,
         let known: Vec<Placed<'_>> = sets.iter().filter_map(sample).collect();
         let clear: Vec<usize> = (0..known.len()).filter(|&index| known[index].side != 0.0).collect();
         let opposite = clear.windows(2).filter(|pair| known[pair[0]].side != known[pair[1]].side);
-        let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width)).collect();
+        let edges = opposite.filter_map(|pair| Edge::between(&known, [pair[0], pair[1]], width, window)).collect();
         Line { rows: rows.clone(), statistic: refinement.by[statistic], sets: sets.clone(), edges }
     };
     let statistics = 0..refinement.by.len();
