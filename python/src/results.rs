@@ -4,8 +4,8 @@ use crate::errors::Error;
 use crate::table::Table;
 use crate::watched::watched;
 use arrow_array::cast::AsArray;
-use arrow_array::{Array, ArrayRef, RecordBatch, UInt32Array};
-use arrow_schema::{Schema, SchemaRef};
+use arrow_array::{Array, ArrayRef, RecordBatch, UInt32Array, new_null_array};
+use arrow_schema::{Field, Schema, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
 use pyo3::exceptions::PyValueError;
@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stickslip::reduce::{BackboneBin, EdgeRow, HistogramBin, Point, SetInRounds, SetRow, renew};
 use stickslip::results::layout::Layout;
 use stickslip::results::parts::committed_files;
-use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, PrecursorRow, SLIPS, SlipRow};
+use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, SLIPS, recorded_schema};
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::arrow::schema;
 use stickslip::table::columns::Table as TableRow;
@@ -63,25 +63,15 @@ pub fn read(
     join: bool,
 ) -> PyResult<Table> {
     let layout = Layout::new(&Disk, &directory);
-    let own = match table {
-        SetRow::NAME if Results::read(&layout).map_err(Error::from)?.round().is_some() => {
-            (SetRow::NAME, schema::<SetInRounds>())
-        }
-        SLIPS => (SLIPS, schema::<SlipRow<'_>>()),
-        PRECURSORS => (PRECURSORS, schema::<PrecursorRow<'_>>()),
-        JOBS => (JOBS, schema::<JobRow>()),
-        _ => reduced_schema(table).ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))?,
+    let results = Results::read(&layout).map_err(Error::from)?;
+    let known = [SLIPS, PRECURSORS, JOBS].into_iter().find(|known| *known == table);
+    let own = match known {
+        Some(known) => (known, recorded_schema(known, results.sweep().recording())),
+        None if table == SetRow::NAME && results.round().is_some() => (SetRow::NAME, schema::<SetInRounds>()),
+        None => reduced_schema(table).ok_or_else(|| PyValueError::new_err(format!("there is no table {table}")))?,
     };
     let wanted = Wanted::new(own, columns.as_deref(), join)?;
-    let found = watched::<_, ()>(
-        py,
-        |stop, _| {
-            let results = Results::read(&layout)?;
-            wanted.read(&results, stop)
-        },
-        |()| (),
-        |_| Ok(()),
-    );
+    let found = watched::<_, ()>(py, |stop, _| wanted.read(&results, stop), |()| (), |_| Ok(()));
     Ok(found?)
 }
 
@@ -163,14 +153,17 @@ impl Wanted {
             let batch = batch?;
             let damaged = |problem: String| DatasetError::damaged(&batch.path)(problem);
             let rows = jobs.as_ref().map(|jobs| jobs.rows(&batch.rows)).transpose().map_err(damaged)?;
-            let column = |name: &String| -> Result<ArrayRef, Error> {
+            let column = |field: &Field| -> Result<ArrayRef, Error> {
+                let name = field.name();
                 match (batch.rows.column_by_name(name), &jobs, &rows) {
                     (Some(column), ..) => Ok(Arc::clone(column)),
-                    (None, Some(jobs), Some(rows)) => jobs.take(name, rows),
+                    (None, Some(jobs), Some(rows)) if !self.own.contains(name) => jobs.take(name, rows),
+                    // Programs of other versions had other columns.
+                    _ if field.is_nullable() => Ok(new_null_array(field.data_type(), batch.rows.num_rows())),
                     _ => Err(damaged(format!("there is no column {name}")).into()),
                 }
             };
-            let columns = self.schema.fields().iter().map(|field| column(field.name()));
+            let columns = self.schema.fields().iter().map(|field| column(field));
             let columns = columns.collect::<Result<Vec<ArrayRef>, Error>>()?;
             batches.push(RecordBatch::try_new(SchemaRef::clone(&self.schema), columns)?);
         }

@@ -66,7 +66,7 @@ pub fn simulate<'py>(
             let Records { trace: samples, map: cells, profile: blocks, contacts: events } = records;
             let mut tables = BTreeMap::new();
             let slips = measured.slips.iter().map(|slip| -> SlipRow<'_> { (&names, slip) });
-            tables.insert("slips", Table::of_rows(slips)?);
+            tables.insert("slips", Table::without(&sweep.recording().left_out(), slips)?);
             if sweep.recording().precursors {
                 let rows = measured.precursors.iter().map(|precursor| -> PrecursorRow<'_> { (&names, precursor) });
                 tables.insert("precursors", Table::of_rows(rows)?);

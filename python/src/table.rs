@@ -8,6 +8,7 @@ use arrow_schema::{DataType, Field, SchemaRef};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
+use std::borrow::Cow;
 use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
 use stickslip::table::columns::Table as TableRow;
 
@@ -29,7 +30,12 @@ impl Table {
 
     /// A table of rows in memory.
     pub fn of_rows<R: TableRow>(rows: impl Iterator<Item = R>) -> Result<Self, Error> {
-        let mut buffer = RowBuffer::new::<R>();
+        Self::without(&[], rows)
+    }
+
+    /// The same without the columns of these names.
+    pub fn without<R: TableRow>(left_out: &[Cow<'static, str>], rows: impl Iterator<Item = R>) -> Result<Self, Error> {
+        let mut buffer = RowBuffer::new::<R>().without(left_out);
         rows.for_each(|row| buffer.push(&row));
         let batch = buffer.take()?;
         Ok(Self::new(R::NAME, batch.schema(), vec![batch]))

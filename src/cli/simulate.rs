@@ -174,12 +174,12 @@ pub fn simulate(arguments: &Arguments) -> Result<Exit> {
     let footer = Footer::default().with_sweep(sweep.name(), sweep.text()).with("parameters", &as_json(parameters));
     let label = tables::label::<DriveAndSeed>(&sweep, parameters);
     let TableFlags { trace, map, profile, contacts, slip_table, .. } = &arguments.tables;
-    write_table(trace.as_deref(), &footer, recorded.trace.iter().copied())?;
-    write_table(map.as_deref(), &footer, recorded.map.iter().copied())?;
-    write_table(profile.as_deref(), &footer, recorded.profile.iter().copied())?;
-    write_table(contacts.as_deref(), &footer, recorded.contacts.iter().map(ContactRow::from))?;
+    write_table(trace.as_deref(), &footer, &[], recorded.trace.iter().copied())?;
+    write_table(map.as_deref(), &footer, &[], recorded.map.iter().copied())?;
+    write_table(profile.as_deref(), &footer, &[], recorded.profile.iter().copied())?;
+    write_table(contacts.as_deref(), &footer, &[], recorded.contacts.iter().map(ContactRow::from))?;
     let slips = result.slips.iter().map(|slip| -> SlipRow<'_> { (&label, slip) });
-    write_table(slip_table.as_deref(), &footer, slips)?;
+    write_table(slip_table.as_deref(), &footer, &sweep.recording().left_out(), slips)?;
     write_pictures(arguments, parameters, &recorded, &result.slips)?;
     report(arguments.json, &label.0.job_id, &result, wall)?;
     Ok(Exit::Done)

@@ -34,7 +34,7 @@ pub struct Arguments {
 const FORMAT: u32 = 2;
 
 pub fn status(arguments: &Arguments) -> Result<Exit> {
-    let results = Results::read(&Layout::new(&Disk, &arguments.directory))?;
+    let results = Results::read_plan(&Layout::new(&Disk, &arguments.directory))?;
     let status = crate::run::status(&results)?;
     let overview = status.overview;
     if arguments.json {

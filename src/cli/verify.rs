@@ -52,7 +52,7 @@ pub fn verify(arguments: &Arguments) -> Result<Exit> {
     let layout = &Layout::new(&Disk, &arguments.directory);
     if arguments.directory.is_file() {
         // Says what it is instead.
-        Results::read(layout)?;
+        Results::read_plan(layout)?;
     }
     let verification = if arguments.repair { Results::repair(layout)? } else { Results::verify(layout)? };
     let repaired = arguments.repair && verification.wants_repair();

@@ -1,6 +1,6 @@
 //! Axes: range, scale, and where ticks go.
 
-use crate::sweep::three_digits;
+use crate::sweep::{power_of_ten, typeset};
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,11 +83,7 @@ impl Axis {
 
     /// The same axis with a number at each of these values and no other tick.
     pub(super) fn with_ticks_at(self, label: &str, values: impl Iterator<Item = f64>) -> Self {
-        let number = |value: f64| match three_digits(value).split_once('e') {
-            Some((mantissa, power)) => power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0)),
-            None => three_digits(value).replace('-', "−"),
-        };
-        let ticks = values.map(|value| (value, number(value))).collect();
+        let ticks = values.map(|value| (value, typeset(value))).collect();
         Self { label: label.to_owned(), power: None, ticks, minor: Vec::new(), ..self }
     }
 
@@ -323,13 +319,6 @@ fn plain_power(mantissa: f64, power: i32) -> String {
     number(mantissa * libm::exp10(f64::from(power)), usize::try_from(more - power).unwrap_or(0))
 }
 
-fn power_of_ten(mantissa: f64, power: i32) -> String {
-    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raised = |character: char| character.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
-    let power: String = power.to_string().chars().map(raised).collect();
-    if mantissa == 1.0 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
-}
-
 fn halves_of_pi(angle: f64) -> String {
     #[expect(clippy::cast_possible_truncation, reason = "a few halves")]
     let halves = (angle / FRAC_PI_2).round() as i64;
@@ -419,8 +408,8 @@ mod tests {
     fn numbers_with_many_zeros_are_over_a_power_of_ten_that_the_label_shows() {
         let axis = Axis::linear("Amplitude Δ (m)", 0.0, 4e-6);
         assert_eq!((axis.label.as_str(), labels(&axis)), ("Amplitude Δ (10⁻⁶ m)", vec!["0", "1", "2", "3", "4"]));
-        let axis = Axis::linear("Kd (N/m)", 0.0, 4e7);
-        assert_eq!((axis.label.as_str(), labels(&axis)), ("Kd (10⁶ N/m)", vec!["0", "10", "20", "30", "40"]));
+        let axis = Axis::linear("K_d (N/m)", 0.0, 4e7);
+        assert_eq!((axis.label.as_str(), labels(&axis)), ("K_d (10⁶ N/m)", vec!["0", "10", "20", "30", "40"]));
         assert_eq!(Axis::linear("share", 0.0, 1e-5).label, "share (10⁻⁶)");
         let axis = Axis::linear("Period T (s)", 0.0, 0.05);
         assert_eq!((axis.label.as_str(), labels(&axis)[1]), ("Period T (s)", "0.01"));

@@ -88,7 +88,7 @@ mod tests {
             let svg = intervals(points, &Look::default()).unwrap().svg();
             texts.iter().all(|text| svg.contains(&format!(">{text}<")))
         };
-        assert!(texts(&points, &["V₀ = 1e-4 m/s", "slips of sets without a phase", "τ = nT", "4", "12"]));
+        assert!(texts(&points, &["V₀ = 10⁻⁴ m/s", "slips of sets without a phase", "τ = nT", "4", "12"]));
         let first = points[0];
         points.extend((1..9).map(|step| Point { drive_velocity: 1e-6 * f64::from(1 << step), ..first }));
         assert!(texts(&points, &["V₀ (m/s)", "slips of sets with a phase", "slips of sets without a phase"]));

@@ -404,7 +404,7 @@ impl<'a> Chart<'a> {
         let alone = if has_lines { Mark::Line(drive_alone(BLACK)) } else { Mark::Dot(Dot::solid(GREY, SMALL_RADIUS)) };
         entries.extend(has_drive.then(|| entry(alone, "by the drive alone")));
         let is_reduced = self.ys.iter().any(|y| self.reduction(y).is_some());
-        let stripe = "Kd Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
+        let stripe = "K_d Δ = 0.2 to 0.3 of the peak force: friction falls, says the paper";
         entries.extend(is_reduced.then(|| entry(Mark::Patch(STRIPE), stripe)));
         entries
     }
@@ -424,6 +424,9 @@ impl<'a> Chart<'a> {
     }
 }
 
+/// Values of a statistic from which on one alone says nothing of its scale.
+const FEW_VALUES: usize = 8;
+
 impl Asked<'_> {
     pub(super) fn of(rows: &[SetRow], option: &'static str, name: &str) -> Result<Self, BadOption> {
         let column = Swept::of(rows, name).map_err(|problem| BadOption::new(option, name, &problem))?;
@@ -437,9 +440,12 @@ impl Asked<'_> {
         let symbol = parameter(name);
         let is_log = match (symbol, &column.distinct[..]) {
             (Some(_), _) => column.is_logarithmic(),
-            (None, [least, .., largest]) => {
+            (None, values @ [least, .., _]) => {
                 let low = column.values.intervals.iter().flatten().map(|(low, _)| *low).fold(*least, f64::min);
-                !column.values.is_worded() && low > 0.0 && is_wide((*least, *largest))
+                // One set of its own, such as the only one that slides, changes no scale.
+                let alone = usize::from(values.len() >= FEW_VALUES);
+                let ends = (values[alone], values[values.len() - 1 - alone]);
+                !column.values.is_worded() && low > 0.0 && is_wide(ends)
             }
             _ => false,
         };

@@ -1,6 +1,7 @@
 //! Pictures: what is drawn, as SVG, PNG and PDF. The same data give the same bytes.
 
 use super::BadOption;
+use super::font;
 use super::pdf::pdf;
 use super::style::{BLACK, HALF_DIGIT, Look, Size, Style};
 use crate::table::shown::shown_text;
@@ -14,6 +15,11 @@ use kuva::render::render::{Primitive, Scene};
 
 /// Fonts with the Greek letters and superscripts of the labels first. The PNG has DejaVu Sans built in.
 const FONTS: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
+
+/// Symbols whose subscripts are no letters of their own; size of these, in tenths, and how far below the line they stand.
+const SUBSCRIPTED: [&str; 2] = ["K_d", "F_N"];
+const SMALL: u32 = 7;
+const LOWER: f64 = 0.2;
 
 /// Most pixels of a PNG, of 4 bytes each in memory: those of 420 mm x 420 mm in print.
 const MAX_PIXELS: f64 = 1e8;
@@ -179,7 +185,7 @@ impl Picture {
     pub(super) fn texts(&self) -> Vec<(f64, f64, String)> {
         let text = |primitive: &Primitive| {
             let Primitive::Text { x, content, size, anchor, .. } = primitive else { return None };
-            let width = super::font::width(content, *size);
+            let width = font::width(content, *size);
             let start = match anchor {
                 Anchor::Start => *x,
                 Anchor::Middle => x - 0.5 * width,
@@ -255,7 +261,22 @@ impl Picture {
     ) {
         // An SVG may hold no control characters.
         let content = shown_text(text).to_string();
-        self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
+        let Some((before, (lower, after))) = subscript(&content) else {
+            self.scene.add(Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color });
+            return;
+        };
+        let small = SMALL * size / 10;
+        let parts = [(before, size, y), (lower, small, y + LOWER * f64::from(size)), (after, size, y)];
+        let width: f64 = parts.iter().map(|(part, size, _)| font::width(part, *size)).sum();
+        let mut start = match anchor {
+            Anchor::Start => x,
+            Anchor::Middle => x - 0.5 * width,
+            Anchor::End => x - width,
+        };
+        for (part, size, y) in parts {
+            self.coloured_text((start, y), part, size, Anchor::Start, color.clone());
+            start += font::width(part, size);
+        }
     }
 
     /// A text with the middle of its digits at this height.
@@ -274,6 +295,13 @@ impl Picture {
         draw(self);
         self.scene.add(Primitive::ClipEnd);
     }
+}
+
+/// What stands before the first symbol with a subscript such as `K_d`, that subscript, and what follows it.
+fn subscript(text: &str) -> Option<(&str, (&str, &str))> {
+    let place = SUBSCRIPTED.into_iter().filter_map(|symbol| text.find(symbol)).min()?;
+    let (before, rest) = text.split_at_checked(place + 1)?;
+    Some((before, rest.get(1..)?.split_at_checked(1)?))
 }
 
 /// Cuts a line into dashes.
@@ -313,6 +341,12 @@ fn dashed(points: &[(f64, f64)], dash: f64, gap: f64) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn symbols_are_split_before_their_subscripts_and_names_are_not() {
+        assert_eq!(subscript("K = 1, K_d = 2, F_N"), Some(("K = 1, K", ("d", " = 2, F_N"))));
+        assert_eq!(subscript("my_sweep, T_to, K"), None);
+    }
 
     #[test]
     fn dashes_run_on_across_the_points_of_a_line() {

@@ -147,7 +147,7 @@ pub(super) mod tests {
         other.blocks = 9;
         let all = [set(1e-6, 0.02, 4.0).parameters.parameters, other];
         let found = common(all.iter()).replace('\u{a0}', " ");
-        assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 1e8 N/m, Kd = 4e7 N/m"), "{found}");
+        assert!(found.starts_with("Nₛ = 20, M = 11.5 kg, K = 10⁸ N/m, K_d = 4·10⁷ N/m"), "{found}");
         assert!(found.contains("Δfₛ = 0.0069 N") && found.contains("Δ = 1 µm, T = 20 ms"), "{found}");
         assert!(!found.contains("N = ") && !found.contains("seed") && common([].iter()).is_empty());
         let symbols = [Symbol::RampTime, Symbol::Seed, Symbol::TauR, Symbol::V0].map(symbol_of);

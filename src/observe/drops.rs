@@ -14,7 +14,7 @@ columns! {
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Drops {
         before as "drops_before": Option<u64> = "",
-            "drops of the shear force since the previous slip; null unless the sweep records drops, as what follows";
+            "drops of the shear force since the previous slip; not there unless the sweep records drops, as what follows";
         largest_before as "largest_drop_before": Option<f64> = "N", "the largest of them; null without any";
         during as "drop_during": Option<f64> = "N",
             "the largest drop under way during the slip; null if the slip is not seen as a drop";

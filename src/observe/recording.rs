@@ -3,6 +3,9 @@
 use crate::model::Parameters;
 use crate::model::fields::fields;
 use crate::model::theory::typical_interval;
+use crate::observe::{Drops, Energies};
+use crate::table::columns::Row;
+use std::borrow::Cow;
 
 fields! {
     /// What a job records: how many slips, from where, and which tables.
@@ -42,6 +45,13 @@ impl Recording {
             return GIVE_UP_INTERVALS * typical_interval(parameters) + GIVE_UP_PERIODS * longest;
         };
         distance / parameters.drive_velocity
+    }
+
+    /// Names of the columns of slips that are not recorded.
+    pub fn left_out(&self) -> Vec<Cow<'static, str>> {
+        let energies = (!self.energies).then(Energies::columns);
+        let drops = self.drop_size.is_none().then(Drops::columns);
+        energies.into_iter().chain(drops).flatten().map(|column| column.name).collect()
     }
 }
 

@@ -44,11 +44,11 @@ impl Modulation {
 }
 
 columns! {
-    /// What the drive put in from the previous slip's last break to the slip's own, and where it was lost; null unless
-    /// recorded.
+    /// What the drive put in from the previous slip's last break to the slip's own, and where it was lost; not in
+    /// tables unless recorded.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Energies {
-        work as "drive_work": Option<f64> = "J", "work of the drive since the last break of the previous slip";
+        work as "drive_work": Option<f64> = "J", "work of the drive since the last break of the previous slip; not there unless the sweep records energies, as what follows";
         damping as "damping_loss": Option<f64> = "J", "loss in damping in that time";
         broken as "break_loss": Option<f64> = "J", "energy of the contacts that broke in that time";
     }

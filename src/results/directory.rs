@@ -1,4 +1,4 @@
-//! A results directory that fits this program: opened once, valid from then on.
+//! A results directory as it was found: opened once, valid from then on. Any version is read; only this one is run.
 
 use crate::results::commit::Commit;
 use crate::results::error::{ErrorKind, ResultsError};
@@ -79,13 +79,16 @@ impl<'a> Results<'a> {
         if found.is_of(sweep) { Ok(found) } else { Ok(found.extended(sweep, &found.done_parts()?)) }
     }
 
-    /// Reads a directory as it is.
+    /// Reads a directory as it is, of whatever versions: what it holds is there, and can be read.
     pub fn read(layout: &Layout<'a>) -> Result<Self, ResultsError> {
         let results = Self::new(layout, extension_file::read(layout)?)?;
-        if results.records.is_empty() {
-            return Err(layout.no_results());
-        }
-        results.refuse(&results.version_differences(), "use the program that wrote it")?;
+        if results.records.is_empty() { Err(layout.no_results()) } else { Ok(results) }
+    }
+
+    /// Reads a directory whose plan is that of this program: it can be told what is missing.
+    pub fn read_plan(layout: &Layout<'a>) -> Result<Self, ResultsError> {
+        let results = Self::read(layout)?;
+        results.refuse(&results.version_differences(), "use the program that wrote it; `stickslip show` reads it")?;
         Ok(results)
     }
 
@@ -293,8 +296,7 @@ impl<'a> Results<'a> {
 
     /// Names of the tables, that of the jobs last.
     pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
-        let precursors = self.sweep().recording().precursors.then_some(tables::PRECURSORS);
-        [Some(tables::SLIPS), precursors, Some(tables::JOBS)].into_iter().flatten()
+        tables::tables_of(self.sweep().recording())
     }
 
     /// The id of a job of a part.

@@ -6,15 +6,15 @@
 
 use crate::results::directory::Results;
 use crate::results::error::ResultsError;
+use crate::results::layout::PartName;
 use crate::results::parts::row_count;
 use crate::results::tables::{self, JobRow};
-use crate::sweep::Outline;
 use crate::table::arrow::{schema, schema_of};
-use crate::table::file::{Batch, Dataset, DatasetError, RowCount};
+use crate::table::file::{Batch, Dataset, DatasetError};
 use crate::table::formats::{Format, RowWriter};
 use crate::table::storage::Storage;
 use arrow_array::cast::AsArray;
-use arrow_array::{ArrayRef, RecordBatch, UInt32Array};
+use arrow_array::{RecordBatch, UInt32Array, new_null_array};
 use arrow_schema::{ArrowError, Field, SchemaRef};
 use arrow_select::concat::concat_batches;
 use arrow_select::take::take;
@@ -75,31 +75,31 @@ impl Results<'_> {
         progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Exported, ResultsError> {
         let (storage, done) = (self.layout().storage, self.done_parts()?);
-        let mut exported = Exported::default();
-        let mut parts = Vec::new();
-        for part in self.plan().outlines() {
-            let (parts_so_far, jobs) = if done.has(&part) {
-                (&mut exported.parts, &mut exported.jobs)
-            } else {
-                (&mut exported.parts_missing, &mut exported.jobs_missing)
-            };
-            *parts_so_far += 1;
-            *jobs += part.job_count as u64;
-            parts.extend(done.has(&part).then_some(part));
+        let mut parts: Vec<PartName> = done.0.iter().copied().collect();
+        parts.sort_unstable();
+        let mut exported = Exported { parts: parts.len() as u64, ..Exported::default() };
+        // Programs of other versions had other parts.
+        let planned = self.version_differences().is_empty().then(|| self.plan().outlines());
+        for part in planned.into_iter().flatten().filter(|part| !done.has(part)) {
+            exported.parts_missing += 1;
+            exported.jobs_missing += part.job_count as u64;
         }
         let names: Vec<&str> = self.tables().collect();
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {
             let name = format!("{table}.{}", format.extension());
             let file = storage.create(&to.join(&name))?;
-            let schema = schema_of(self.joined(&tables::schema_of(table)));
+            let schema = schema_of(self.joined(&tables::recorded_schema(table, self.sweep().recording())));
             let mut writer = RowWriter::new(file, format, &schema, &self.footer_of_all())?;
             let mut rows = 0;
-            for (done, part) in parts.iter().enumerate() {
+            for (done, &part) in parts.iter().enumerate() {
                 progress((number * parts.len() + done) as u64, total);
                 rows += self.copy_part(table, part, &schema, &mut writer)?;
             }
             writer.finish()?;
+            if table == tables::JOBS {
+                exported.jobs = rows;
+            }
             let bytes = storage.length(&to.join(&name))?;
             exported.files.push(ExportedFile { name, rows, bytes });
         }
@@ -122,20 +122,20 @@ impl Results<'_> {
     fn copy_part(
         &self,
         table: &str,
-        part: &Outline,
+        part: PartName,
         schema: &SchemaRef,
         writer: &mut RowWriter,
     ) -> Result<u64, ResultsError> {
         let storage = self.layout().storage;
-        let path = self.part_file(tables::JOBS, part);
-        let expected = RowCount { least: part.job_count as u64, may_exceed: false };
-        let dataset = || Dataset::of_known_rows(storage, vec![(path.clone(), Some(expected))]);
+        let file = |table| self.layout().table(table).join(part.file());
+        let path = file(tables::JOBS);
+        let dataset = || Dataset::new(storage, vec![path.clone()]);
         let jobs = Jobs::read(dataset(), &path)?;
         let rows = if table == tables::JOBS {
             dataset()
         } else {
             let count = row_count(dataset(), table)?;
-            Dataset::of_known_rows(storage, vec![(self.part_file(table, part), Some(count))])
+            Dataset::of_known_rows(storage, vec![(file(table), Some(count))])
         };
         let mut copied = 0;
         for batch in rows.batches() {
@@ -188,14 +188,15 @@ impl Jobs {
         let jobs: Option<Vec<u32>> = ids.ok_or_else(|| missing(JOB_ID))?.iter().map(job).collect();
         let jobs =
             UInt32Array::from(jobs.ok_or_else(|| ArrowError::SchemaError("it has rows of other jobs".to_owned()))?);
-        let of_jobs = |name: &str| -> Result<ArrayRef, ArrowError> {
-            take(self.rows.column_by_name(name).ok_or_else(|| missing(name))?, &jobs, None)
-        };
-        let column_of = |name: &str| match rows.column_by_name(name) {
-            Some(column) => Ok(Arc::clone(column)),
-            None => of_jobs(name),
-        };
-        let columns = schema.fields().iter().map(|field| column_of(field.name())).collect::<Result<Vec<_>, _>>()?;
+        let column_of =
+            |field: &Arc<Field>| match (rows.column_by_name(field.name()), self.rows.column_by_name(field.name())) {
+                (Some(column), _) => Ok(Arc::clone(column)),
+                (None, Some(column)) => take(column, &jobs, None),
+                // Programs of other versions had other columns.
+                (None, None) if field.is_nullable() => Ok(new_null_array(field.data_type(), rows.num_rows())),
+                (None, None) => Err(missing(field.name())),
+            };
+        let columns = schema.fields().iter().map(column_of).collect::<Result<Vec<_>, _>>()?;
         RecordBatch::try_new(Arc::clone(schema), columns)
     }
 }

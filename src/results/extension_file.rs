@@ -8,16 +8,15 @@
 //! as another model, solver, recording or version, is refused before anything is written.
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
 use crate::results::error::ResultsError;
 use crate::results::layout::Layout;
 use crate::results::settled::settled;
-use crate::results::tables::{JOBS, JobRow, PrecursorRow, SlipRow};
+use crate::results::tables::{JOBS, recorded_schema, tables_of};
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
-use crate::table::columns::Table;
 use crate::table::file::{Footer, PROGRAM};
 use crate::table::shown::shown_text;
 use serde::{Deserialize, Serialize};
@@ -67,11 +66,11 @@ struct Format {
 
 /// Names of the columns of each table of a sweep.
 fn columns_of(sweep: &Sweep) -> BTreeMap<String, Vec<String>> {
-    fn columns<T: Table>() -> (String, Vec<String>) {
-        (T::NAME.to_owned(), T::columns().into_iter().map(|column| column.name.into_owned()).collect())
-    }
-    let precursors = sweep.recording().precursors.then(columns::<PrecursorRow<'_>>);
-    [columns::<SlipRow<'_>>(), columns::<JobRow>()].into_iter().chain(precursors).collect()
+    let columns = |table: &str| {
+        let schema = recorded_schema(table, sweep.recording());
+        (table.to_owned(), schema.fields().iter().map(|field| field.name().clone()).collect())
+    };
+    tables_of(sweep.recording()).map(columns).collect()
 }
 
 impl Record {
@@ -243,7 +242,9 @@ pub(super) fn extensions(layout: &Layout<'_>, records: &[Record]) -> Result<Vec<
             Some(Extension { sweep, .. }) if sweep.text() == record.sweep => sweep.clone(),
             _ => {
                 let path = layout.extension(number);
-                Sweep::parse(&record.sweep, &path).map_err(|error| ResultsError::damaged(&path, error.to_string()))?
+                let sweep = Sweep::parse(&record.sweep, &path);
+                let sweep = sweep.map_err(|error| ResultsError::damaged(&path, error.to_string()))?;
+                sweep.with_ids_of(record.model_version, &record.rng_scheme)
             }
         };
         if sweep.rounds().is_some() != record.round.is_some() {

@@ -5,7 +5,7 @@
 //! commit.rs                   files that appear whole or not at all
 //! layout.rs                   where everything lies, and what names say
 //! extension_file.rs           which sweeps the tables belong to
-//! directory.rs                a directory that fits this program
+//! directory.rs                a directory as it was found
 //!   parts.rs                  the rows of a part, in all tables at once
 //!   pending.rs                what runs again
 //!   rounds.rs                 what a sweep that decides for itself runs next
@@ -35,3 +35,5 @@ pub mod workers;
 
 pub use directory::Results;
 pub use error::{ErrorKind, ResultsError};
+#[cfg(test)]
+pub(crate) use extension_file::tests::of_other_versions;

@@ -142,7 +142,8 @@ impl Results<'_> {
             storage.ensure_folder_below(&above, folder)?;
         }
         let kept = KeptRows::read(Dataset::new(storage, from.map(place).into_iter().collect()))?;
-        let mut writer = TableWriter::new(commit.stage(&target)?, &self.footer(part.extension))?;
+        let left_out = self.extensions()[part.extension].sweep.recording().left_out();
+        let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &self.footer(part.extension))?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,

@@ -4,9 +4,9 @@
 
 use crate::model::selected::{Selected, Selection};
 use crate::model::{Parameters, Symbol};
-use crate::observe::{Measurements, Precursor, Regime, Slip};
+use crate::observe::{Measurements, Precursor, Recording, Regime, Slip};
 use crate::sweep::Sweep;
-use crate::table::arrow::schema;
+use crate::table::arrow::RowBuffer;
 use crate::table::columns::{Table, columns, tables};
 use crate::table::value::words;
 use arrow_schema::SchemaRef;
@@ -82,13 +82,19 @@ pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
 pub const PRECURSORS: &str = <PrecursorRow<'_> as Table>::NAME;
 pub const JOBS: &str = JobRow::NAME;
 
-/// The columns of the table of this name, with units and meanings.
-pub(super) fn schema_of(table: &str) -> SchemaRef {
-    match table {
-        SLIPS => schema::<SlipRow<'_>>(),
-        PRECURSORS => schema::<PrecursorRow<'_>>(),
-        _ => schema::<JobRow>(),
-    }
+/// Names of the tables of a recording, that of the jobs last.
+pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
+    [Some(SLIPS), recording.precursors.then_some(PRECURSORS), Some(JOBS)].into_iter().flatten()
+}
+
+/// The columns of the table of this name, with units and meanings, as a recording has it.
+pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
+    let buffer = match table {
+        SLIPS => RowBuffer::new::<SlipRow<'_>>(),
+        PRECURSORS => RowBuffer::new::<PrecursorRow<'_>>(),
+        _ => RowBuffer::new::<JobRow>(),
+    };
+    SchemaRef::clone(buffer.without(&recording.left_out()).schema())
 }
 
 /// The label of a job of a sweep.

@@ -333,7 +333,8 @@ fn misplacement(
     if ["sweep", "extension"].into_iter().any(differs) {
         return Some(("it is of another sweep".to_owned(), Remedy::Part));
     }
-    (!has_columns(texts, &tables::schema_of(table))).then(|| ("it is of another table".to_owned(), Remedy::Part))
+    let schema = tables::recorded_schema(table, results.extensions()[part.extension].sweep.recording());
+    (!has_columns(texts, &schema)).then(|| ("it is of another table".to_owned(), Remedy::Part))
 }
 
 /// Holds the rows of all tables of a part against each other, and against the plan.

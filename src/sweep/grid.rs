@@ -123,6 +123,12 @@ impl Sweep {
         self.identity.set(parameters)
     }
 
+    /// The same with the ids that a program of other versions gave.
+    pub fn with_ids_of(mut self, model_version: u32, rng_scheme: &str) -> Self {
+        self.identity = Identity::of_versions(model_version, rng_scheme, self.solver, &self.recording);
+        self
+    }
+
     /// In what another sweep differs besides axes and conditions: name, model, recording, solver, each as section and key
     /// with the value before and after. Parameters that an axis of either sets are left out, as an axis may be added,
     /// changed or dropped.

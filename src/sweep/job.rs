@@ -67,8 +67,13 @@ pub struct Identity {
 impl Identity {
     /// The identity of jobs with this solver and recording.
     pub fn new(solver: Solver, recording: &Recording) -> Self {
+        Self::of_versions(MODEL_VERSION, RNG_SCHEME, solver, recording)
+    }
+
+    /// The same of a program with another version of the model or scheme of random numbers.
+    pub fn of_versions(model_version: u32, rng_scheme: &str, solver: Solver, recording: &Recording) -> Self {
         let mut shared = Sha256::new();
-        shared.update(format!("model={MODEL_VERSION}\nrng={RNG_SCHEME}\n"));
+        shared.update(format!("model={model_version}\nrng={rng_scheme}\n"));
         let defaults: Vec<_> = settings(Solver::default(), &Recording::default()).collect();
         for (key, value) in settings(solver, recording).filter(|setting| !defaults.contains(setting)) {
             shared.update(format!("{key}={value}\n"));

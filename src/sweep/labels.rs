@@ -116,10 +116,10 @@ impl Label {
         with_unit(&self.symbol, unit)
     }
 
-    /// The symbol and a value, in SI.
+    /// The symbol and a value, in the unit in which it is read best.
     pub fn setting(&self, value: f64) -> String {
         let (factor, unit) = if value == 0.0 { (1.0, "") } else { self.scale(value.abs()) };
-        format!("{} = {} {unit}", self.symbol, three_digits(factor * value)).trim_end().to_owned()
+        format!("{} = {} {unit}", self.symbol, typeset(factor * value)).trim_end().to_owned()
     }
 }
 
@@ -134,9 +134,10 @@ pub fn symbol_of(symbol: Symbol) -> String {
     match name.split_once('_') {
         Some((letter, "s")) => format!("{letter}ₛ"),
         Some((letter, "r")) => format!("{letter}ᵣ"),
-        // There is no letter for other subscripts.
+        Some((letter, "to")) => format!("{letter}ₜₒ"),
         Some(_) if description.symbol.is_empty() => name.replace('_', " "),
-        _ => name.replace('_', "").replace("V0", "V₀"),
+        // There is no letter for other subscripts: figures set them lower.
+        _ => name.replace("V0", "V₀"),
     }
 }
 
@@ -155,6 +156,21 @@ pub fn three_digits(value: f64) -> String {
     if (1e-3..1e5).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
+/// The same as in print: with a power of ten that is one, and a minus that is no hyphen.
+pub fn typeset(value: f64) -> String {
+    match three_digits(value).split_once('e') {
+        Some((mantissa, power)) => power_of_ten(mantissa.parse().unwrap_or(1.0), power.parse().unwrap_or(0)),
+        None => three_digits(value).replace('-', "−"),
+    }
+}
+
+pub fn power_of_ten(mantissa: f64, power: i32) -> String {
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |character: char| character.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
+    let power: String = power.to_string().chars().map(raised).collect();
+    if mantissa == 1.0 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,7 +184,8 @@ mod tests {
         for column in columns {
             let Label { symbol, what, unit } = label(&column.name);
             let is_plain = !what.contains('_') || Symbol::from_key(&column.name).is_some();
-            assert!(!symbol.contains('_') && is_plain, "{}: {symbol}, {what}", column.name);
+            let has_key = symbol.contains('_') && !matches!(&*symbol, "K_d" | "F_N");
+            assert!(!has_key && is_plain, "{}: {symbol}, {what}", column.name);
             assert_eq!(unit, column.unit);
         }
     }
@@ -179,9 +196,9 @@ mod tests {
         assert_eq!((scaled("tau_mean", 0.1), scaled("tau_mean", 13.0)), ((1e3, "ms"), (1.0, "s")));
         assert_eq!((scaled("Delta", 1e-6), scaled("V0", 1e-6)), ((1e6, "µm"), (1.0, "m/s")));
         assert_eq!(label("tau_sd / (2 * tau_mean)").symbol, "σ(τ) / (2 * ⟨τ⟩)");
-        let settings = [("Delta", 1e-6), ("Delta", 0.0), ("T", 0.034), ("V0", 1e-4)];
+        let settings = [("Delta", 1e-6), ("Delta", 0.0), ("T", 0.034), ("V0", 1e-4), ("T_to", 0.01)];
         let settings = settings.map(|(column, value)| label(column).setting(value));
-        assert_eq!(settings, ["Δ = 1 µm", "Δ = 0", "T = 34 ms", "V₀ = 1e-4 m/s"]);
+        assert_eq!(settings, ["Δ = 1 µm", "Δ = 0", "T = 34 ms", "V₀ = 10⁻⁴ m/s", "Tₜₒ = 10 ms"]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use arrow_array::types::{Float64Type, Int64Type};
 use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use serde_json::{Map, Value as Json, json};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -81,6 +82,8 @@ pub struct RowBuffer {
 }
 
 enum Cells {
+    /// Of a column that is left out.
+    None,
     Real(Vec<Option<f64>>),
     Count(Vec<Option<i64>>),
     Flag(Vec<Option<bool>>),
@@ -97,6 +100,18 @@ impl RowBuffer {
             Kind::Text => Cells::Text(Vec::new()),
         });
         Self { schema: schema::<R>(), cells: cells.collect(), rows: 0 }
+    }
+
+    /// The same without the columns of these names.
+    pub fn without(mut self, left_out: &[Cow<'static, str>]) -> Self {
+        let has = |field: &Field| !left_out.iter().any(|name| name == field.name());
+        for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
+            if !has(field) {
+                *cells = Cells::None;
+            }
+        }
+        self.schema = schema_of(self.schema.fields().iter().map(|field| Field::clone(field)).filter(has).collect());
+        self
     }
 
     pub const fn len(&self) -> usize {
@@ -124,7 +139,8 @@ impl RowBuffer {
 
     /// Appends some rows of a batch of the same table.
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
-        for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
+        let there = self.cells.iter_mut().filter(|cells| !matches!(cells, Cells::None));
+        for (field, cells) in self.schema.fields().iter().zip(there) {
             let array = column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
             cells.extend(&array.slice(rows.start, rows.len()));
         }
@@ -135,7 +151,7 @@ impl RowBuffer {
     /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
-        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().map(Cells::take).collect())
+        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().filter_map(Cells::take).collect())
     }
 }
 
@@ -143,6 +159,7 @@ impl Cells {
     fn push(&mut self, cell: Value<'_>) {
         // What is of no kind is a missing value; a cell of another kind than its column does not exist.
         match self {
+            Self::None => (),
             Self::Real(cells) => cells.push(if let Value::Real(real) = cell { Some(real) } else { None }),
             Self::Count(cells) => cells.push(u64::from_value(cell).map(u64::cast_signed)),
             Self::Flag(cells) => cells.push(bool::from_value(cell)),
@@ -153,6 +170,7 @@ impl Cells {
     /// Appends the cells of an array of the column's type.
     fn extend(&mut self, array: &dyn Array) {
         match self {
+            Self::None => (),
             Self::Real(cells) => cells.extend(array.as_primitive::<Float64Type>()),
             Self::Count(cells) => cells.extend(array.as_primitive::<Int64Type>()),
             Self::Flag(cells) => cells.extend(array.as_boolean()),
@@ -160,13 +178,14 @@ impl Cells {
         }
     }
 
-    fn take(&mut self) -> ArrayRef {
-        match self {
+    fn take(&mut self) -> Option<ArrayRef> {
+        Some(match self {
+            Self::None => return None,
             Self::Real(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>()),
             Self::Count(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>()),
             Self::Flag(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>()),
             Self::Text(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>()),
-        }
+        })
     }
 }
 
@@ -187,17 +206,21 @@ fn cell(array: &dyn Array, kind: Kind, row: usize) -> Value<'_> {
     }
 }
 
-/// The rows of a batch. Columns that the row does not have are passed over.
+/// The rows of a batch. Columns that the row does not have are passed over; those that may be null may be missing.
 pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
     let columns = R::columns();
     let arrays = columns.iter().map(|described| {
+        if described.nullable && batch.column_by_name(&described.name).is_none() {
+            return Ok(None);
+        }
         let array = column(batch, &described.name, &data_type(described.kind))?;
-        Ok((array.as_ref(), described.kind))
+        Ok(Some((array.as_ref(), described.kind)))
     });
-    let arrays = arrays.collect::<Result<Vec<(&dyn Array, Kind)>, String>>()?;
+    let arrays = arrays.collect::<Result<Vec<Option<(&dyn Array, Kind)>>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter();
-        R::from_cells(&mut || columns.next().map_or(Value::Null, |&(array, kind)| cell(array, kind, row)))
+        let mut next = || columns.next().copied().flatten();
+        R::from_cells(&mut || next().map_or(Value::Null, |(array, kind)| cell(array, kind, row)))
     };
     (0..batch.num_rows()).map(row).collect()
 }
@@ -239,6 +262,22 @@ mod tests {
         assert_eq!(rows::<Readings>(&batch()).unwrap(), readings());
         let alone: Vec<Reading> = readings().map(|(reading, _)| reading).to_vec();
         assert_eq!(rows::<Reading>(&batch()).unwrap(), alone);
+    }
+
+    #[test]
+    fn columns_that_are_left_out_read_back_as_nulls_if_they_may_be_null() {
+        let without = |name: &'static str| {
+            let mut buffer = RowBuffer::new::<Readings>().without(&[name.into()]);
+            for row in &readings() {
+                buffer.push(row);
+            }
+            buffer.take().unwrap()
+        };
+        let [(first, of_first), (second, of_second)] = readings();
+        let expected = [(first, of_first), (Reading { phase: None, ..second }, of_second)];
+        assert_eq!(without("phase").num_columns(), 8);
+        assert_eq!(rows::<Readings>(&without("phase")).unwrap(), expected);
+        assert_eq!(rows::<Readings>(&without("force")).unwrap_err(), "there is no column force");
     }
 
     #[test]

@@ -115,7 +115,12 @@ pub struct TableWriter<R> {
 impl<R: Row> TableWriter<R> {
     /// Writes into this file, which is empty.
     pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
-        let buffer = RowBuffer::new::<R>();
+        Self::without(&[], file, footer)
+    }
+
+    /// The same without the columns of these names.
+    pub fn without(left_out: &[Cow<'static, str>], file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
+        let buffer = RowBuffer::new::<R>().without(left_out);
         let writer = footer
             .properties(buffer.schema())
             .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))

@@ -208,20 +208,48 @@ fn every_sweep_has_a_figure_without_raw_names_and_without_an_empty_panel() {
         let text = format!("name = \"s\"\n[model]\n{model}Ns = 5\n[axes]\n{axes}\n[record]\nslips = 4\n");
         folder.write("sweep.toml", &text);
         folder.ends(0, &format!("run sweep.toml --out r{index}"));
-        let figures = folder.contents(&format!("r{index}/figures"));
-        let svgs: Vec<String> = figures
-            .iter()
-            .filter(|(path, _)| path.extension().is_some_and(|extension| extension == "svg"))
-            .map(|(_, bytes)| String::from_utf8(bytes.clone().unwrap()).unwrap())
-            .collect();
-        assert!(!svgs.is_empty(), "{axes}");
-        for svg in svgs {
-            let texts = svg.split("<text").skip(1).map(|text| text.split(['>', '<']).nth(1).unwrap());
-            assert_eq!(texts.filter(|text| text.contains('_')).collect::<Vec<_>>(), [""; 0], "{axes}");
-            // What is drawn inside a frame comes between the clip and its end, dots after it.
-            for panel in svg.split("clip-path=\"").skip(1) {
-                assert!(["<circle", "<rect"].iter().any(|mark| panel.contains(mark)), "{axes}");
-            }
+        assert!(panels_are_full(&folder, &format!("r{index}"), &axes) > 0, "{axes}");
+    }
+}
+
+/// The number of figures of a directory. None has the name of a column in it, or a panel where nothing is drawn.
+fn panels_are_full(folder: &Folder, directory: &str, sweep: &str) -> usize {
+    let figures = folder.contents(&format!("{directory}/figures"));
+    let svgs: Vec<String> = figures
+        .iter()
+        .filter(|(path, _)| path.extension().is_some_and(|extension| extension == "svg"))
+        .map(|(_, bytes)| String::from_utf8(bytes.clone().unwrap()).unwrap())
+        .collect();
+    for svg in &svgs {
+        let texts = svg.split("<text").skip(1).map(|text| text.split(['>', '<']).nth(1).unwrap());
+        let names = texts.filter(|text| text.contains('_') && !text.starts_with("Sweep"));
+        assert_eq!(names.collect::<Vec<_>>(), [""; 0], "{sweep}");
+        // What is drawn inside a frame comes between the clip and its end, dots after it.
+        for panel in svg.split("clip-path=\"").skip(1) {
+            assert!(["<circle", "<rect", "<polyline"].iter().any(|mark| panel.contains(mark)), "{sweep}");
         }
+    }
+    svgs.len()
+}
+
+/// With a slider of five blocks, four slips and two seeds of each set of a sweep in rounds.
+#[test]
+fn the_sweeps_of_this_project_have_figures_if_anything_slips() {
+    let folder = Folder::new();
+    for file in fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/sweeps")).unwrap() {
+        let path = file.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let text = fs::read_to_string(&path).unwrap();
+        let has = |key: &str| text.lines().any(|line| line.split([' ', '=']).next() == Some(key));
+        let smaller = text.lines().map(|line| match line.split_once(" = ") {
+            Some(("seeds   " | "seeds", _)) => "seeds = { from = 2, to = 2 }",
+            _ => line,
+        });
+        folder.write("sweep.toml", &smaller.collect::<Vec<_>>().join("\n"));
+        let settings = [("N", !has("N"), 5), ("Ns", true, 5), ("slips", has("slips"), 4)];
+        let settings = settings.into_iter().filter(|(_, is_set, _)| *is_set);
+        let settings: Vec<String> = settings.map(|(key, _, value)| format!("--set {key}={value}")).collect();
+        folder.ends(0, &format!("run sweep.toml {} --out {name}", settings.join(" ")));
+        assert_eq!(panels_are_full(&folder, &name, &name) == 0, name == "eq1", "{name}");
     }
 }

@@ -14,6 +14,7 @@ use crate::table::file::{Footer, TableWriter};
 use crate::table::shown::shown;
 use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// What could not be written is refused before anything runs.
@@ -56,10 +57,15 @@ pub(super) fn check_outputs(arguments: &Arguments, sweep: &Sweep, parameters: &P
 }
 
 /// Writes a table, if it was asked for.
-pub(super) fn write_table<R: Table>(path: Option<&Path>, footer: &Footer, rows: impl Iterator<Item = R>) -> Result<()> {
+pub(super) fn write_table<R: Table>(
+    path: Option<&Path>,
+    footer: &Footer,
+    left_out: &[Cow<'static, str>],
+    rows: impl Iterator<Item = R>,
+) -> Result<()> {
     let Some(path) = path else { return Ok(()) };
     replace(path, |draft| {
-        let mut writer = TableWriter::new(Disk.create(draft)?, footer)?;
+        let mut writer = TableWriter::without(left_out, Disk.create(draft)?, footer)?;
         for row in rows {
             writer.push(&row)?;
         }

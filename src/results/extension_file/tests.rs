@@ -51,6 +51,14 @@ fn contents(folder: &Path) -> BTreeSet<(PathBuf, Vec<u8>)> {
 const TWO_SEEDS: &str = "[axes]\nseed = [0, 1]\n";
 const THREE_SEEDS: &str = "[axes]\nseed = [0, 1, 2]\n";
 
+/// The text of the file of an extension of a program with other versions, and without a column of the jobs.
+pub(crate) fn of_other_versions(text: &str, column: &str) -> String {
+    let mut record: Record = checksum::from_json(text).unwrap();
+    (record.model_version, record.plan_version) = (0, 0);
+    record.tables.get_mut(JOBS).unwrap().retain(|other| other != column);
+    record.text()
+}
+
 #[test]
 fn a_directory_is_begun_resumed_extended_and_narrowed() {
     let root = tempfile::tempdir().unwrap();

@@ -1,0 +1,76 @@
+//! Directories of programs of other versions: what is there is read, and nothing is run in them.
+
+use super::{fine, options, run_all, sweep};
+use crate::reduce::{SetRow, read_reduced, reduce};
+use crate::results::layout::Layout;
+use crate::results::tables::{JobRow, Names};
+use crate::results::{ErrorKind, Results, of_other_versions};
+use crate::run::run;
+use crate::table::file::{Dataset, Footer, TableWriter};
+use crate::table::formats::Format;
+use crate::table::storage::{Disk, Storage};
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+const SEEDS: u64 = 3;
+/// A column that another version did not have.
+const MISSING: &str = "grid_steps";
+
+/// Makes a directory that of another version of the model and the plan, without a column.
+fn make_older(root: &Path) {
+    let path = root.join("run/extension-000.json");
+    fs::write(&path, of_other_versions(&fs::read_to_string(&path).unwrap(), MISSING)).unwrap();
+    for file in Layout::new(&Disk, root).dataset("jobs").unwrap().files().cloned().collect::<Vec<_>>() {
+        let batches: Vec<_> = Dataset::new(&Disk, vec![file.clone()]).batches().map(Result::unwrap).collect();
+        fs::remove_file(&file).unwrap();
+        let created = Disk.create(&file).unwrap();
+        let mut writer = TableWriter::<JobRow>::without(&[MISSING.into()], created, &Footer::default()).unwrap();
+        for batch in &batches {
+            writer.copy(batch, 0..batch.rows.num_rows()).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+}
+
+#[test]
+fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run() {
+    let root = tempfile::tempdir().unwrap();
+    run_all(root.path(), &sweep(SEEDS, ""), &fine);
+    let layout = Layout::new(&Disk, root.path());
+    let sets = || {
+        reduce(&Results::read(&layout).unwrap()).unwrap();
+        read_reduced::<SetRow>(&layout).unwrap()
+    };
+    let expected = sets();
+    make_older(root.path());
+    assert_eq!(sets(), expected);
+    let (own, out) = (Results::read(&layout).unwrap(), tempfile::tempdir().unwrap());
+    let exported = own.export(out.path(), Format::Csv, &mut |_, _| ()).unwrap();
+    assert_eq!((exported.jobs, exported.jobs_missing), (2 * SEEDS, 0));
+    let jobs = fs::read_to_string(out.path().join("jobs.csv")).unwrap();
+    let place = jobs.lines().next().unwrap().split(',').position(|column| column == MISSING).unwrap();
+    assert!(jobs.lines().skip(1).all(|row| row.split(',').nth(place) == Some("")), "{jobs}");
+    let errors = [
+        Results::read_plan(&layout).unwrap_err(),
+        run(&layout, &sweep(SEEDS, ""), options(&AtomicBool::new(false), 2), &fine, &mut |_| ()).unwrap_err(),
+    ];
+    for error in errors {
+        let differences = ["model version: 0 -> ", "plan version: 0 -> ", "with [\"grid_steps\"]"];
+        let text = error.to_string();
+        assert!(error.kind == ErrorKind::Refused && differences.iter().all(|words| text.contains(words)), "{text}");
+    }
+    // Ids of its jobs are those of its version.
+    let ids: Vec<String> = layout
+        .dataset("jobs")
+        .unwrap()
+        .rows::<Names>()
+        .flat_map(|names| names.unwrap())
+        .map(|names| names.job_id)
+        .collect();
+    let own_ids = |sweep: &crate::sweep::Sweep| {
+        sweep.jobs().map(|job| sweep.job_id(&job.parameters).to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(own_ids(&sweep(SEEDS, "")), ids);
+    assert!(own_ids(own.sweep()).iter().all(|id| !ids.contains(id)));
+}
