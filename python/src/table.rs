@@ -4,10 +4,12 @@ use crate::errors::Error;
 use arrow_array::ffi::FFI_ArrowSchema;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{RecordBatch, RecordBatchIterator};
+use arrow_ipc::reader::StreamReader;
+use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{DataType, Field, SchemaRef};
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyTuple};
 use std::borrow::Cow;
 use stickslip::table::arrow::{DESCRIPTION, RowBuffer, UNIT};
 use stickslip::table::columns::Table as TableRow;
@@ -18,14 +20,14 @@ use stickslip::table::columns::Table as TableRow;
 /// `polars.DataFrame(slips)`, `duckdb.sql("from slips")`. All quantities are in SI units.
 #[pyclass(frozen, module = "stickslip")]
 pub struct Table {
-    name: &'static str,
+    name: String,
     schema: SchemaRef,
     batches: Vec<RecordBatch>,
 }
 
 impl Table {
-    pub fn new(name: &'static str, schema: SchemaRef, batches: Vec<RecordBatch>) -> Self {
-        Self { name, schema, batches }
+    pub fn new(name: &str, schema: SchemaRef, batches: Vec<RecordBatch>) -> Self {
+        Self { name: name.to_owned(), schema, batches }
     }
 
     /// A table of rows in memory.
@@ -70,7 +72,7 @@ impl Table {
     /// Name of the table.
     #[getter]
     fn name(&self) -> &str {
-        self.name
+        &self.name
     }
 
     /// Names of the columns.
@@ -131,6 +133,26 @@ impl Table {
     fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
         let schema = FFI_ArrowSchema::try_from(self.schema.as_ref()).map_err(Error::from)?;
         PyCapsule::new_with_value(py, schema, c"arrow_schema")
+    }
+
+    /// Pickled, it is a stream of Arrow IPC.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let stream = || -> Result<Vec<u8>, Error> {
+            let mut writer = StreamWriter::try_new(Vec::new(), &self.schema)?;
+            self.batches.iter().try_for_each(|batch| writer.write(batch))?;
+            Ok(writer.into_inner()?)
+        };
+        let arguments = (&self.name, PyBytes::new(py, &stream()?)).into_pyobject(py)?;
+        Ok((py.get_type::<Self>().getattr(intern!(py, "_of_stream"))?, arguments))
+    }
+
+    #[staticmethod]
+    fn _of_stream(name: &str, bytes: &[u8]) -> PyResult<Self> {
+        let read = || -> Result<Self, Error> {
+            let reader = StreamReader::try_new(bytes, None)?;
+            Ok(Self::new(name, reader.schema(), reader.collect::<Result<_, _>>()?))
+        };
+        Ok(read()?)
     }
 
     /// The table as a `pyarrow.Table`; units and meanings are in the metadata of its fields.

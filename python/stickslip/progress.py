@@ -34,6 +34,8 @@ def display(progress: bool | Callable[[Progress], object]) -> "_Display":
     """A display: `True` for a bar or lines, `False` for none, or a callback."""
     if callable(progress):
         return _Display(progress)
+    if not isinstance(progress, bool):
+        raise TypeError(f"progress = {progress!r}: must be True, False or a function of a Progress")
     if not progress:
         return _Display(None)
     try:

@@ -6,7 +6,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import _stickslip
+from . import _stickslip, arguments
 from ._stickslip import Table
 
 if TYPE_CHECKING:
@@ -97,5 +97,8 @@ class Results:
         return Plot(self)
 
     def _table(self, name: str, columns: Sequence[str] | None, join: bool = False) -> Table:
-        columns = None if columns is None else [columns] if isinstance(columns, str) else list(columns)
-        return _stickslip.read(self.directory, name, columns, join)
+        if columns is not None:
+            columns = [columns] if isinstance(columns, str) else list(columns)
+            if not columns or len(set(columns)) < len(columns) or not all(isinstance(one, str) for one in columns):
+                raise ValueError(f"columns = {columns!r}: must be names of columns, each once, at least one")
+        return _stickslip.read(self.directory, name, columns, arguments.flag("join", join))

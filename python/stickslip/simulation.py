@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from . import _stickslip, toml
+from . import _stickslip, arguments, toml
 from ._stickslip import SimulationError, Table
 
 _KEYS = _stickslip.keys()
@@ -91,8 +91,10 @@ def simulate(
     elif isinstance(sweep, Mapping):
         source, text = "sweep", toml.dumps(sweep)
     else:
-        file = sweep
-    job, text, warned, tables = _stickslip.simulate(file, text, source, sample, trace, map, profile, contacts)
+        file = arguments.path("sweep", sweep)
+    recorded = {"trace": trace, "map": map, "profile": profile, "contacts": contacts}
+    flags = (arguments.flag(name, given) for name, given in recorded.items())
+    job, text, warned, tables = _stickslip.simulate(file, text, source, arguments.seconds("sample", sample), *flags)
     for warning in warned:
         warnings.warn(warning, stacklevel=2)
     return Simulation(job, text, tables)

@@ -6,7 +6,7 @@ from datetime import timedelta
 from os import PathLike
 from typing import Any
 
-from . import _stickslip, toml
+from . import _stickslip, arguments, toml
 from .progress import Progress, display
 from .results import Results
 
@@ -57,8 +57,11 @@ def run(
     ... })
     >>> results.sets().to_pandas()[["T", "tau_mean", "locking_index"]]
     """
-    file, text = (None, toml.dumps(sweep)) if isinstance(sweep, Mapping) else (sweep, "")
-    walltime = walltime if walltime is None or isinstance(walltime, timedelta) else timedelta(seconds=walltime)
+    file, text = (None, toml.dumps(sweep)) if isinstance(sweep, Mapping) else (arguments.path("sweep", sweep), "")
+    if file is None and not text:
+        raise TypeError("sweep = None: must be a path or a dict")
+    out, threads, walltime = arguments.path("out", out), arguments.threads(threads), arguments.walltime(walltime)
+    retry_failed, reduce = arguments.flag("retry_failed", retry_failed), arguments.flag("reduce", reduce)
     shown = display(progress)
     try:
         directory, warned = _stickslip.run(file, text, out, threads, retry_failed, walltime, reduce, shown)

@@ -8,6 +8,8 @@ from typing import Any
 from ._stickslip import SweepError
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+# Sweep files nest four deep.
+_DEEPEST = 16
 
 
 def dumps(sweep: Mapping[str, Any]) -> str:
@@ -19,26 +21,30 @@ def dumps(sweep: Mapping[str, Any]) -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def value(key: str, given: Any) -> str:
-    """One value as TOML. Arrays of numpy and the like are lists."""
+def value(key: str, given: Any, depth: int = 0) -> str:
+    """One value as TOML. Arrays of numpy and the like are lists, members of an enumeration their values."""
+    if depth > _DEEPEST:
+        raise SweepError(f"{key}: lists and dicts lie within each other {_DEEPEST} deep; nothing in a sweep does")
     if hasattr(given, "tolist"):
         given = given.tolist()
     match given:
         case bool():
             return "true" if given else "false"
-        case int() | float():
-            return repr(given)
+        case int():
+            return int.__repr__(given)
+        case float():
+            return float.__repr__(given)
         case str():
             return json.dumps(given, ensure_ascii=False).replace("\x7f", "\\u007f")
         case Mapping():
-            return "{ " + ", ".join(_line(inner, of) for inner, of in given.items()) + " }"
+            return "{ " + ", ".join(_line(inner, of, depth + 1) for inner, of in given.items()) + " }"
         case list() | tuple() | range():
-            return "[" + ", ".join(value(key, one) for one in given) + "]"
+            return "[" + ", ".join(value(key, one, depth + 1) for one in given) + "]"
     raise SweepError(f"{key} = {given!r}: must be a number, a text, true or false, a list or a dict")
 
 
-def _line(key: str, given: Any) -> str:
-    return f"{_key(key)} = {value(key, given)}"
+def _line(key: str, given: Any, depth: int = 0) -> str:
+    return f"{_key(key)} = {value(key, given, depth)}"
 
 
 def _key(key: str) -> str:

@@ -1,8 +1,12 @@
 """The module stickslip: the same bits as the command line, tables that every library takes, and no way to hang or crash."""
 
 import ast
+import enum
 import inspect
+import math
+import multiprocessing
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -11,6 +15,8 @@ import sys
 import threading
 import time
 import tomllib
+from concurrent.futures import ProcessPoolExecutor
+from datetime import timedelta
 from operator import attrgetter
 from pathlib import Path
 from zipfile import ZipFile
@@ -199,8 +205,6 @@ def test_mistakes_have_the_words_of_the_command(program, tmp_path):
     with pytest.raises(module.ResultsError) as found:
         module.open(tmp_path)
     assert str(found.value) == command("status", tmp_path)
-    with pytest.raises(module.SweepError, match="sample 0: must be a finite number > 0, in s"):
-        module.simulate(sample=0)
     assert issubclass(module.SweepError, ValueError)
 
 
@@ -292,9 +296,66 @@ def test_ctrl_c_ends_a_simulation():
     assert "KeyboardInterrupt" in errors and child.returncode == -signal.SIGINT
 
 
-def test_too_many_threads_are_refused(tmp_path):
-    with pytest.raises(module.ResultsError, match="1 to 1024"):
-        module.run({"name": "a"}, out=tmp_path / "a", threads=2**62)
+TINY = {"name": "a", "model": {"N": 3, "Ns": 4}, "axes": {"seed": [1, 2]}, "record": {"slips": 2}}
+ENDLESS = []
+ENDLESS.append(ENDLESS)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        *(({"threads": given}, "threads = .*: must be a whole number from 1 to 1024") for given in (0, -1, 2**62, 1.5, "2", True)),
+        *(({"walltime": given}, "walltime = .*: must be a finite number > 0, in s") for given in (math.nan, -1, "1 h", math.inf)),
+        ({"walltime": timedelta(seconds=-1)}, "walltime = -1.0: must be a finite number > 0, in s"),
+        ({"progress": "no"}, "progress = 'no': must be True, False or a function"),
+        ({"retry_failed": "no"}, "retry_failed = 'no': must be True or False"),
+        ({"reduce": None}, "reduce = None: must be True or False"),
+        ({"out": 3}, "out = 3: must be a path"),
+        ({"sweep": 3}, "sweep = 3: must be a path"),
+        ({"sweep": None}, "sweep = None: must be a path or a dict"),
+        ({"sweep": TINY | {"model": {"N": {1, 2}}}}, "N = {1, 2}: must be a number"),
+        ({"sweep": TINY | {"axes": {"V0": ENDLESS}}}, "V0: lists and dicts lie within each other 16 deep"),
+        ({"sweep": TINY | {"axes": {"seed": [2**70]}}}, "seed"),
+    ],
+)
+def test_arguments_that_are_refused_are_named_with_what_is_allowed(tmp_path, call, words):
+    with pytest.raises((TypeError, ValueError), match=words):
+        module.run(**{"sweep": TINY, "out": tmp_path / "a"} | call)
+    assert not (tmp_path / "a").exists()
+
+
+def test_what_a_simulation_and_a_table_cannot_take_is_named(opened):
+    for sample in (0, math.nan, "1", None):
+        with pytest.raises(ValueError, match=f"sample = {sample!r}: must be a finite number > 0, in s"):
+            module.simulate(sample=sample)
+    with pytest.raises(TypeError, match="trace = 1: must be True or False"):
+        module.simulate(trace=1)
+    for columns in ([], ["onset", "onset"], [3]):
+        with pytest.raises(ValueError, match="must be names of columns, each once, at least one"):
+            opened.slips(columns)
+
+
+def test_numbers_of_other_libraries_and_enumerations_are_values(tmp_path):
+    class Size(enum.IntEnum):
+        SMALL = 3
+
+    model = {"N": Size.SMALL, "Ns": np.int64(4), "V0": np.float32(2.0**-13), "Delta": np.array(0.0)}
+    options = {"threads": np.int64(1), "walltime": np.float64(60), "reduce": np.True_, "progress": False}
+    results = module.run(TINY | {"model": model}, tmp_path / "a", **options)
+    assert 'N = 3\nNs = 4\nV0 = 0.0001220703125\nDelta = 0.0' in results.sweep and len(results.jobs()) == 2
+
+
+def test_simulations_and_tables_come_back_from_other_processes(opened):
+    one = module.simulate(**KEYS, trace=True)
+    other = pickle.loads(pickle.dumps(one))
+    assert other.job == one.job and other.slips().units == one.slips().units
+    for table in (one.slips(), one.trace(), opened.slips(), opened.sets(), opened.histograms(["count"])):
+        copy = pickle.loads(pickle.dumps(table))
+        assert pa.table(copy).equals(pa.table(table), check_metadata=True) and copy.name == table.name
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        sweeps = [{"name": "a", "record": {"slips": slips}} for slips in (1, 2)]
+        lengths = [len(one.slips()) for one in pool.map(module.simulate, sweeps)]
+    assert lengths == [1, 2]
 
 
 def test_other_threads_run_meanwhile():
