@@ -112,16 +112,20 @@ class Explorer {
 
   /** Saves the chart as it is seen. */
   saves() {
+    const background = () => getComputedStyle(document.body).backgroundColor;
+    const { name } = this.report.status;
     const picture = () => {
       const { base } = this.free;
       const copy = Object.assign(document.createElement("canvas"), { width: base.width, height: base.height });
       const ctx = copy.getContext("2d");
-      ctx.fillStyle = getComputedStyle(document.body).backgroundColor;
+      ctx.fillStyle = background();
       ctx.fillRect(0, 0, copy.width, copy.height);
       ctx.drawImage(base, 0, 0);
-      copy.toBlob((blob) => save(`${this.report.status.name}.png`, blob));
+      copy.toBlob((blob) => save(`${name}.png`, blob));
     };
-    return make("button", { type: "button", onclick: picture }, "Save as PNG");
+    const drawing = () => save(`${name}.svg`, new Blob([this.free.svg(background())], { type: "image/svg+xml" }));
+    const button = (words, onclick) => make("button", { type: "button", onclick }, words);
+    return make("span", {}, button("Save as PNG", picture), " ", button("Save as SVG", drawing));
   }
 
   /** The column of an axis of the free chart. */
