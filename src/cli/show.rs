@@ -245,11 +245,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     let mut add = |head: String, cell: &dyn Fn(&EdgeRow) -> String| {
         columns.add(true, std::iter::once(head).chain(edges.iter().map(cell)).collect());
     };
-    add("edge of".to_owned(), &|edge| {
-        let statistic = edge.statistic.split(' ').next().unwrap_or_default();
-        let symbol = if statistic == edge.statistic { label(statistic).symbol } else { edge.statistic.clone() };
-        format!("{symbol} = {}", three_digits(edge.threshold))
-    });
+    add("edge of".to_owned(), &EdgeRow::crossed);
     add(of_axis.short(unit), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
     add("95 %".to_owned(), &|edge| match edge.edge_interval {
         Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),

@@ -9,8 +9,6 @@ use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, ascending};
-use crate::sweep::label;
-use crate::table::value::Shortest;
 use std::collections::BTreeSet;
 
 /// A parameter of a row, or the frequency.
@@ -44,12 +42,7 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let (mut legend, mut layers) = (Vec::new(), Vec::new());
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);
-        let threshold = Shortest(of_it().next()?.threshold);
-        let what = match statistic.split_once(" = ") {
-            Some((_, n)) => format!("share of n = {n} is"),
-            None => format!("{} =", label(statistic).symbol),
-        };
-        legend.push(entry(Mark::Bar(dot(ink)), format!("{what} {threshold}, 95 %")));
+        legend.push(entry(Mark::Bar(dot(ink)), format!("{}, 95 %", of_it().next()?.crossed())));
         layers.push(Layer::Bars(of_it().filter_map(bar).collect(), Stroke::solid(ink, BAR_WIDTH)));
         layers.push(Layer::Dots(of_it().filter_map(place).collect(), Dot::solid(ink, 0.7 * RADIUS)));
     }

@@ -16,7 +16,7 @@ use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::results::Results;
-use crate::sweep::{AllButSeed, Interval, Refinement, Statistic, Sweep};
+use crate::sweep::{AllButSeed, Interval, Refinement, Statistic, Sweep, label, three_digits};
 use crate::table::columns::{columns, tables};
 use crate::table::file::DatasetError;
 use crate::table::value::words;
@@ -65,6 +65,17 @@ columns! {
 }
 
 tables! { EdgeRow = "edges", "One row per edge, and per row of sets without one, if the sweep has `[refine]`"; }
+
+impl EdgeRow {
+    /// What is crossed, in symbols.
+    pub fn crossed(&self) -> String {
+        let what = match self.statistic.split_once(" = ") {
+            Some((_, n)) => format!("share of n = {n} is"),
+            None => format!("{} =", label(&self.statistic).symbol),
+        };
+        format!("{what} {}", three_digits(self.threshold))
+    }
+}
 
 /// A statistic less its threshold, and what each group of seeds adds to it.
 #[derive(Clone, Debug)]

@@ -25,6 +25,7 @@ mod moved;
 mod program;
 mod ramp;
 mod regimes;
+mod released;
 mod report;
 mod rounds;
 mod runs;

@@ -413,13 +413,28 @@ def test_figures_show_the_data(results, opened):
     assert heights == pytest.approx([1, 1])
 
 
-def test_a_wheel_holds_the_package_alone(tmp_path):
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
     maturin = Path(sys.executable).with_name("maturin")
-    subprocess.run([maturin, "build", "--release", "--locked", "--quiet", "--out", tmp_path], cwd=ROOT, check=True)
-    with ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
-        files = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    subprocess.run([maturin, "build", "--release", "--locked", "--quiet", "--out", folder], cwd=ROOT, check=True)
+    return next(folder.glob("*.whl"))
+
+
+def test_a_wheel_holds_the_package_alone(wheel):
+    with ZipFile(wheel) as archive:
+        files = {name for name in archive.namelist() if ".dist-info/" not in name}
     sources = ROOT / "python" / "stickslip"
     assert files == {f"stickslip/{path.name}" for path in sources.iterdir() if path.name != "__pycache__"}
+
+
+def test_two_commands_lead_from_a_wheel_to_a_figure_without_rust(wheel, tmp_path):
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
+    environment = {"PATH": f"{tmp_path}/venv/bin:/usr/bin:/bin", "HOME": str(tmp_path)}
+    for command in (["pip", "install", "--no-index", wheel], ["stickslip", "run", "--preset", "velocity", "--set", "N=9", "-o", "r"]):
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "r" / "figures" / "overview.png").stat().st_size > 10_000 and "⟨τ⟩" in done.stdout
 
 
 def test_importing_it_imports_no_other_library():
