@@ -78,9 +78,10 @@ def compare(folder: Path) -> bool:
     error = (width[""] ** 2 + width["_theirs"] ** 2) ** 0.5 / (2 * 1.96)
     sets["off"] = (sets["value_theirs"] - sets["value"]) / error
     most = sets.loc[sets["off"].abs().idxmax()]
+    where = ", ".join(f"{key} = {most[key]:.4g}" for key in PARAMETERS if pandas.notna(most[key]))
     print(
         f"statistics: {len(sets)} of {count}, off by {most['off']:+.1f} standard errors at most: {most['statistic']} of "
-        f"{most['figure']} at {most['frequency']:.4g} Hz is {most['value_theirs']:.5g}, not {most['value']:.5g}"
+        f"{most['figure']} at {where} is {most['value_theirs']:.5g}, not {most['value']:.5g}"
     )
     return len(sets) == count and abs(most["off"]) <= LARGEST
 
