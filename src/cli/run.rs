@@ -123,8 +123,9 @@ impl Arguments {
         let is_own = |results: Results<'_>| results.sweep().text() == sweep.text();
         if !changes.is_empty() && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own) {
             let root = shown(&root);
-            let problem =
-                format!("--set, --axis: make another sweep than that of {root}; name its directory with --out DIR");
+            let problem = format!(
+                "--set, --axis: make another sweep than that of {root}; name its directory with --out DIR, {root} to extend that"
+            );
             return Err(UsageError(problem).into());
         }
         Ok((sweep, root))

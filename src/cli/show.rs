@@ -9,7 +9,7 @@ use crate::reduce::{
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{label, three_digits};
-use crate::table::columns::Table;
+use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
 use crate::table::storage::Disk;
@@ -77,17 +77,30 @@ const FOUND: [&str; 9] = [
 pub fn show(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &arguments.directory);
     let results = Results::read(&layout)?;
+    let is_text = !arguments.json && !arguments.csv;
     if let Some(other) = &arguments.other {
-        let columns = compare(&results, &Results::read(&Layout::new(&Disk, other))?)?;
-        if columns.is_empty() {
+        let others = Results::read(&Layout::new(&Disk, other))?;
+        let columns = compare(&results, &others)?;
+        if columns.first().is_none_or(|values| values.numbers.is_empty()) {
             let problem = "no set agrees with one of the first in all parameters that either varies";
             return Err(UsageError(format!("{}: {problem}", shown(other))).into());
+        }
+        if is_text {
+            output::print(&format!("A is {}, B is {}\n", shown(&arguments.directory), shown(other)))?;
+            let differences = results.sweep().differences(others.sweep());
+            let mut differences = differences.iter().filter(|difference| !difference.starts_with("name"));
+            differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
         }
         return print(arguments, &columns, &[]);
     }
     let mut rows = sets(&results, usize::MAX)?;
+    let (usual, count) = (usual_names(&rows), rows.len());
     if let Some(condition) = &arguments.condition {
         rows = sets_where(rows, condition).map_err(|problem| UsageError(format!("--where {condition}: {problem}")))?;
+        if rows.is_empty() && is_text {
+            output::print(&format!("no set of {count}\n"))?;
+            return Ok(Exit::Done);
+        }
     }
     if let Some(column) = &arguments.sort {
         sort(&mut rows, column)?;
@@ -95,12 +108,16 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     let asked =
         |name: &String| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}")));
     let asked: Vec<Values> = arguments.columns.iter().map(asked).collect::<Result<_, _>>()?;
-    let columns = if asked.is_empty() { usual_columns(&rows) } else { asked };
-    if !arguments.json && !arguments.csv {
+    let columns = if asked.is_empty() { usual_columns(usual, &rows) } else { asked };
+    if is_text {
+        if let Some((_, missing @ 1..)) = results.missing()? {
+            let (jobs, root) = (output::count(missing, "job"), output::quoted_path(&arguments.directory));
+            output::print(&format!("so far: {jobs} missing; stickslip run {root} goes on with them\n\n"))?;
+        }
         output::print(&edges(&results)?)?;
     }
     print(arguments, &columns, &rows)?;
-    if !arguments.json && !arguments.csv {
+    if is_text {
         for note in notes(&results, &rows) {
             output::print(&format!("{note}\n"))?;
         }
@@ -125,7 +142,7 @@ fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<E
 /// The first of the `count` sets of a directory, and what ended otherwise. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let rows = sets(results, MAX_READ)?;
-    let columns = usual_columns(&rows);
+    let columns = usual_columns(usual_names(&rows), &rows);
     let mut notes = notes(results, &rows);
     if let Some(more) = count.checked_sub(FIRST as u64).filter(|more| *more > 0) {
         let root = output::quoted_path(results.layout().root());
@@ -154,10 +171,15 @@ const fn key_of(symbol: Symbol) -> &'static str {
     if matches!(symbol, Symbol::T) { FREQUENCY } else { symbol.key() }
 }
 
-/// The parameters in which sets differ, and what was found of them.
-fn usual_columns(rows: &[SetRow]) -> Vec<Values> {
+/// The parameters in which sets differ.
+fn usual_names(rows: &[SetRow]) -> Vec<&'static str> {
     let mut names: Vec<&str> = differing(&rows.iter()).into_iter().map(key_of).collect();
     names.extend(names.contains(&FREQUENCY).then_some("eta"));
+    names
+}
+
+/// Parameters of these names, and what was found of sets.
+fn usual_columns(names: Vec<&'static str>, rows: &[SetRow]) -> Vec<Values> {
     let columns = names.into_iter().chain(FOUND).filter_map(|name| Values::of(rows, name).ok());
     columns.filter(|values| values.numbers.iter().any(Option::is_some)).collect()
 }
@@ -182,7 +204,12 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     for values in columns {
         let name = &values.column.name;
         let word = values.numbers[set].filter(|_| values.is_worded()).and_then(|value| values.word(value));
-        let value = word.map_or_else(|| Json::from(values.numbers[set]), Json::from);
+        let number = || match values.numbers[set] {
+            #[expect(clippy::cast_possible_truncation, reason = "a count")]
+            Some(number) if values.column.kind == Kind::Count => Json::from(number as i64),
+            number => Json::from(number),
+        };
+        let value = word.map_or_else(number, Json::from);
         record.push((name.to_string(), value));
         if values.intervals.iter().any(Option::is_some) {
             let (low, high) = values.intervals[set].unzip();
@@ -303,6 +330,18 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
         let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
         notes.push(format!(
             "{jobs} of {sets} without slips: they slide, or give_up_after is too short for their slips; the first: {command}"
+        ));
+    }
+    let recording = sweep.recording();
+    let is_cut = |row: &&SetRow| {
+        row.slips < row.finished_jobs.saturating_sub(row.jobs_without_slips).saturating_mul(recording.slips)
+    };
+    let cut: Vec<&SetRow> = rows.iter().filter(is_cut).collect();
+    if let Some(time) = recording.max_time.filter(|_| !cut.is_empty()) {
+        let (sets, slips) = (output::count(cut.len() as u64, "set"), cut.iter().map(|row| row.slips).sum::<u64>());
+        let wanted = cut.iter().map(|row| row.finished_jobs).sum::<u64>().saturating_mul(recording.slips);
+        notes.push(format!(
+            "{sets} with jobs that ended at max_time = {time} s: {slips} of {wanted} slips; a longer one, here, runs them again"
         ));
     }
     let failed: u64 = rows.iter().map(|row| row.failed_jobs).sum();

@@ -45,6 +45,8 @@ pub fn status(arguments: &Arguments) -> Result<Exit> {
             (_, Some(seconds)) => format!("{} at the pace so far", output::duration(seconds)),
             (_, None) => format!("{} of CPU time predicted", output::duration(overview.predicted_cost_missing)),
         };
+        let goes_on = status.rounds.as_ref().is_some_and(|rounds| !rounds.is_over) && overview.jobs_missing > 0;
+        let left = if goes_on { format!("{left}, of this round") } else { left };
         let kept = match overview.jobs_kept {
             0 => String::new(),
             kept => format!(", {kept} of them kept of values that the sweep no longer has"),

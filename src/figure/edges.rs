@@ -9,7 +9,6 @@ use super::sets::axis_of;
 use super::style::{BAR_WIDTH, INKS, Look, RADIUS, dot};
 use crate::model::Symbol;
 use crate::reduce::{EdgeRow, FREQUENCY, ascending};
-use std::collections::BTreeSet;
 
 /// A parameter of a row, or the frequency.
 fn value(key: &str, edge: &EdgeRow) -> Option<f64> {
@@ -38,7 +37,12 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
     let x = Axis::of_data(&x_label, places().map(|place| place.0))?;
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
-    let statistics: BTreeSet<&str> = edges.iter().map(|edge| edge.statistic.as_str()).collect();
+    let mut statistics: Vec<&str> = Vec::new();
+    for EdgeRow { statistic, .. } in edges {
+        if !statistics.contains(&&**statistic) {
+            statistics.push(statistic);
+        }
+    }
     let (mut legend, mut layers) = (Vec::new(), Vec::new());
     for (statistic, ink) in statistics.into_iter().zip(INKS) {
         let of_it = || edges.iter().filter(|edge| edge.statistic == statistic);

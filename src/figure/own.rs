@@ -409,7 +409,7 @@ impl<'a> Chart<'a> {
         entries
     }
 
-    /// What is not there.
+    /// What bars are, and what is not there.
     fn note(&self, inside: &[usize], levels: usize) -> String {
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
         let is_still = |set: &usize| shows_intervals && self.slides(*set) && self.rows[*set].tau_mean.is_none();
@@ -420,7 +420,12 @@ impl<'a> Chart<'a> {
         let still = (!still.is_empty()).then(|| format!("{} of {count} sets slide: no intervals", still.len()));
         let left_out = (left_out > 0)
             .then(|| format!("not shown: {left_out} of {count} sets, without a value or outside the axes"));
-        [still, left_out].into_iter().flatten().collect::<Vec<_>>().join("; ")
+        let bars = self
+            .ys
+            .iter()
+            .any(|y| inside.iter().any(|&set| y.interval(set).is_some()))
+            .then(|| "bars: 95 %".to_owned());
+        [bars, still, left_out].into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 }
 

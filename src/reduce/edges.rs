@@ -40,6 +40,7 @@ words! {
         Width = "width",
         Seeds = "seeds",
         Jobs = "jobs",
+        Open = "open",
         #[default]
         NoCrossing = "no crossing",
     }
@@ -60,7 +61,7 @@ columns! {
         bracket_low: f64 = "", "the nearest value clearly on one side; the least of the row if it has no edge";
         bracket_high: f64 = "", "the nearest clearly on the other; the largest of the row if it has no edge";
         ended: Ended = "",
-            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run, or the run is not over; `no crossing` between the values of the row";
+            "`width`: the interval is as narrow as is wanted; `seeds`: its sets have the most; `jobs`: no more may run; `open`: the rounds go on; `no crossing` between the values of the row";
     }
 }
 
@@ -293,6 +294,7 @@ fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
 pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, DatasetError> {
     let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
     let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
+    let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
     let value = |place: f64| if refinement.is_log { libm::exp(first + step * place) } else { first + step * place };
     let mut found = Vec::new();
     for Line { statistic: Statistic { key, .. }, sets, edges, .. } in lines(sweep, refinement, &sets) {
@@ -317,7 +319,8 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
                     None => Ended::NoCrossing,
                     Some(edge) if edge.is_done() => Ended::Width,
                     Some(edge) if edge.wanted_row.is_none() && edge.seeds()[0] >= sweep.seed_count() => Ended::Seeds,
-                    Some(_) => Ended::Jobs,
+                    Some(_) if is_over => Ended::Jobs,
+                    Some(_) => Ended::Open,
                 },
             })
         };

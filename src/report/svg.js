@@ -2,33 +2,35 @@
 
 class SvgContext {
   constructor(width, height, background) {
-    this.parts = [];
-    this.size = [width, height];
-    Object.assign(this, { fillStyle: "#000", strokeStyle: "#000", lineWidth: 1, globalAlpha: 1, dash: [], place: "" });
-    this.stack = [];
-    this.clips = 0;
-    this.clipped = "";
+    // The parser knows the name space.
+    const outer = make("div");
+    outer.innerHTML = "<svg>";
+    this.root = this.parent = outer.firstChild;
+    const sides = { width, height, viewBox: `0 0 ${width} ${height}` };
+    for (const [key, value] of Object.entries({ ...sides, "font-family": "system-ui, sans-serif", "font-size": 12 }))
+      this.root.setAttribute(key, value);
+    Object.assign(this, { lineWidth: 1, globalAlpha: 1, dash: [], place: "", stack: [] });
     this.fillStyle = background;
     this.fillRect(0, 0, width, height);
   }
 
   text() {
-    const [width, height] = this.size;
-    const head = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}"`;
-    return `${head} font-family="system-ui, sans-serif" font-size="12">${this.parts.join("")}</svg>\n`;
+    return new XMLSerializer().serializeToString(this.root);
   }
 
   /** An element with what holds for all: opacity, clip, place. */
   add(name, attributes, content = "") {
-    const common = { opacity: this.globalAlpha === 1 ? "" : this.globalAlpha, transform: this.place, "clip-path": this.clipped };
-    const all = Object.entries({ ...attributes, ...common }).filter(([, value]) => value !== "");
-    const shown = all.map(([key, value]) => ` ${key}="${typeof value === "number" ? +value.toFixed(2) : escaped(value)}"`);
-    this.parts.push(`<${name}${shown.join("")}>${content}</${name}>`);
+    const common = { opacity: this.globalAlpha === 1 ? "" : this.globalAlpha, transform: this.place };
+    const element = document.createElementNS(this.root.namespaceURI, name);
+    for (const [key, value] of Object.entries({ ...attributes, ...common }))
+      if (value !== "") element.setAttribute(key, typeof value === "number" ? +value.toFixed(2) : value);
+    element.textContent = content;
+    return this.parent.appendChild(element);
   }
 
   save() {
-    const { place, clipped } = this;
-    this.stack.push({ place, clipped });
+    const { place, parent } = this;
+    this.stack.push({ place, parent });
   }
 
   restore() {
@@ -56,7 +58,7 @@ class SvgContext {
   }
 
   rect(x, y, width, height) {
-    this.path += `M${x} ${y}h${width}v${height}h${-width}z`;
+    this.box = [x, y, width, height];
   }
 
   /** A whole circle. */
@@ -65,10 +67,10 @@ class SvgContext {
     this.path += `M${left.toFixed(2)} ${y.toFixed(2)}a${radius} ${radius} 0 1 0 ${across} 0a${radius} ${radius} 0 1 0 ${-across} 0`;
   }
 
+  /** To the rectangle of the path: an inner image shows nothing outside. */
   clip() {
-    this.clips++;
-    this.parts.push(`<clipPath id="clip-${this.clips}"><path d="${this.path}"/></clipPath>`);
-    this.clipped = `url(#clip-${this.clips})`;
+    const [x, y, width, height] = this.box;
+    this.parent = this.add("svg", { x, y, width, height, viewBox: this.box.join(" ") });
   }
 
   fill() {
@@ -96,12 +98,10 @@ class SvgContext {
     const anchor = { left: "start", center: "middle", right: "end" }[this.textAlign] ?? "start";
     // Not every program knows dominant-baseline.
     const down = { top: 10, middle: 4, bottom: -3 }[this.textBaseline] ?? 0;
-    this.add("text", { x, y: y + down, fill: this.fillStyle, "text-anchor": anchor }, escaped(text));
+    this.add("text", { x, y: y + down, fill: this.fillStyle, "text-anchor": anchor }, text);
   }
 
   drawImage(image, x, y, width, height) {
     this.add("image", { x, y, width, height, href: image.toDataURL() });
   }
 }
-
-const escaped = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);

@@ -224,6 +224,16 @@ impl<'a> Results<'a> {
         Ok(DoneParts(parts.into_iter().reduce(|done, parts| &done & &parts).unwrap_or_default()))
     }
 
+    /// Parts and jobs that are asked for and not there; `None` in a directory of another version, which had other parts.
+    pub fn missing(&self) -> Result<Option<(u64, u64)>, ResultsError> {
+        let done = self.done_parts()?;
+        let outlines = self.version_differences().is_empty().then(|| self.plan().outlines());
+        Ok(outlines.map(|parts| {
+            let missing = parts.filter(|part| !done.has(part));
+            missing.fold((0, 0), |(parts, jobs), part| (parts + 1, jobs + part.job_count as u64))
+        }))
+    }
+
     /// Refuses files of parts that are none of these, which are all: their jobs would be there twice.
     pub fn refuse_strangers(&self, parts: &[Outline]) -> Result<(), ResultsError> {
         let planned: HashSet<PartName> = parts.iter().map(PartName::from).collect();

@@ -77,13 +77,8 @@ impl Results<'_> {
         let (storage, done) = (self.layout().storage, self.done_parts()?);
         let mut parts: Vec<PartName> = done.0.iter().copied().collect();
         parts.sort_unstable();
-        let mut exported = Exported { parts: parts.len() as u64, ..Exported::default() };
-        // Programs of other versions had other parts.
-        let planned = self.version_differences().is_empty().then(|| self.plan().outlines());
-        for part in planned.into_iter().flatten().filter(|part| !done.has(part)) {
-            exported.parts_missing += 1;
-            exported.jobs_missing += part.job_count as u64;
-        }
+        let (parts_missing, jobs_missing) = self.missing()?.unwrap_or_default();
+        let mut exported = Exported { parts: parts.len() as u64, parts_missing, jobs_missing, ..Exported::default() };
         let names: Vec<&str> = self.tables().collect();
         let total = (names.len() * parts.len()) as u64;
         for (number, table) in names.into_iter().enumerate() {

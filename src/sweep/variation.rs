@@ -16,6 +16,9 @@ pub struct Change {
 const AXES: &str = "axes";
 const SECTIONS: [&str; 4] = ["model", AXES, "record", "solver"];
 const SOLVER: [&str; 4] = ["method", "tolerance", "resolve", "dt"];
+/// Keys of a sweep in rounds, and the sections that they may stand in.
+const ROUNDS: [&str; 8] = ["of", "relative", "absolute", "by", "threshold", "to", "seeds", "jobs"];
+const OF_ROUNDS: [&str; 2] = ["refine", "precision"];
 
 impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
@@ -23,6 +26,7 @@ impl Change {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
         let known: Vec<&str> = Quantity::all().map(Quantity::key).chain(recording).chain(SOLVER).collect();
         let section = match nearest(key, &known) {
+            _ if ROUNDS.contains(&key) => OF_ROUNDS[0],
             Some(known) if recording.contains(&known) => "record",
             Some(known) if SOLVER.contains(&known) => "solver",
             _ => "model",
@@ -54,6 +58,8 @@ fn scalar(text: &str) -> String {
         (_, Ok(real)) if real.is_nan() => "nan".to_owned(),
         (_, Ok(real)) => format!("{real:?}"),
         _ if matches!(text, "true" | "false") => text.to_owned(),
+        // A list or a table, if it is one.
+        _ if text.starts_with(['[', '{']) && text.parse::<Value>().is_ok() => text.to_owned(),
         _ => format!("{text:?}"),
     }
 }
@@ -74,11 +80,13 @@ pub fn varied(text: &str, changes: &[Change]) -> String {
         }
     }
     for Change { section, key, value } in changes {
+        let is_there = |section: &&str| document.contains_key(section);
+        let section = OF_ROUNDS.into_iter().filter(|_| OF_ROUNDS.contains(section)).find(is_there).unwrap_or(section);
         let table = document.entry(section).or_insert_with(toml_edit::table);
         let Ok(mut value) = value.parse::<Value>() else { continue };
         // The old comment may be about the old value.
         if table.is_table() {
-            value.decor_mut().set_suffix(if *section == AXES { "  # --axis" } else { "  # --set" });
+            value.decor_mut().set_suffix(if section == AXES { "  # --axis" } else { "  # --set" });
         }
         let Some(table) = table.as_table_like_mut() else { continue };
         if let Some(place) = table.get_mut(key) {

@@ -80,7 +80,7 @@ fn each_option_of_a_figure_changes_what_it_says() {
         ("--colour frequency", ">1/T = 90 Hz<"),
         ("--colour V0", ">V₀ (m/s)<"),
         ("--panels Delta", ">(b)<"),
-        ("--xlim 1e-5:1e-4", "not shown: 10 of 16 sets"),
+        ("--xlim 1e-5:1e-4", "not shown: 10"),
         ("--xlabel speed", ">speed<"),
         ("--ylabel τ", ">τ<"),
         ("--ylabel \u{7}", r">\u{7}<"),
