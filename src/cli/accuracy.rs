@@ -44,7 +44,7 @@ Examples:
   stickslip accuracy --set Kd=1e8 --set V0=1e-5
   stickslip accuracy my.toml --seeds 16      all sets of a sweep file, 12 at most, and its solver")]
 pub struct Arguments {
-    /// Sweep file whose sets and solver are studied in place of the paper's
+    /// Sweep file, or results directory, whose sets and solver are studied in place of the paper's
     #[arg(value_name = "SWEEP.toml")]
     sweep: Option<PathBuf>,
     #[command(flatten)]

@@ -25,7 +25,7 @@ Examples:
   stickslip plan sweeps/fig3.toml --out /scratch/fig3
   stickslip plan sweeps/fig3.toml --set slips=100 --axis V0=log:1e-5:1e-3:9")]
 pub struct Arguments {
-    /// Sweep file
+    /// Sweep file, or results directory
     #[arg(value_name = "SWEEP.toml", required_unless_present = "preset")]
     sweep: Option<PathBuf>,
     #[command(flatten)]

@@ -109,14 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
 impl Arguments {
     fn sweep_and_root(&self) -> Result<(Sweep, PathBuf)> {
         let changes = sweep::changes(&self.variation)?;
-        let (sweep, root) = if let Some(directory) = self.sweep.as_deref().filter(|path| path.is_dir()) {
-            let own = Results::read(&Layout::new(&Disk, directory))?.sweep().clone();
-            (sweep::vary(own, &changes)?, directory.to_owned())
-        } else {
-            let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset, &changes)?;
-            let root = Layout::default_root(&sweep);
-            (sweep, root)
-        };
+        let sweep = sweep::read(self.sweep.as_deref(), self.preset.preset, &changes)?;
+        let own = self.sweep.as_deref().filter(|path| path.is_dir());
+        let root = own.map_or_else(|| Layout::default_root(&sweep), Path::to_owned);
         if let Some(out) = &self.out {
             return Ok((sweep, out.clone()));
         }

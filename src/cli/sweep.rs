@@ -1,8 +1,11 @@
 //! The sweep that a command is about: a file, or a preset, one of the files of the folder `sweeps/`.
 
 use super::exit::UsageError;
+use crate::results::Results;
+use crate::results::layout::Layout;
 use crate::simulate as single;
 use crate::sweep::{Change, Sweep, SweepError, varied};
+use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
@@ -93,9 +96,11 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
     Ok(changes)
 }
 
-/// Reads a sweep file, or takes a preset, as varied; without either, a sweep with one point, of what is set.
+/// Reads a sweep file or the sweep of a results directory, or takes a preset, as varied; without either, a sweep with one point, of what is set.
 pub fn read(file: Option<&Path>, preset: Option<Preset>, changes: &[Change]) -> Result<Sweep> {
     let sweep = match (file, preset) {
+        // A results directory, of which it is that asked for last.
+        (Some(folder), _) if folder.is_dir() => Ok(Results::read(&Layout::new(&Disk, folder))?.sweep().clone()),
         (Some(file), _) => Sweep::from_file(file),
         (None, Some(preset)) => preset.sweep(),
         (None, None) => return of_flags(&single::sweep_text(changes)),
