@@ -122,7 +122,7 @@ fn bad_flags_of_every_command_are_refused_and_nothing_is_written() {
         // Files that cannot be read.
         ("plan", &["<SWEEP.toml>"]),
         ("plan missing.toml", &["missing.toml: cannot be read", "check the path"]),
-        ("plan empty", &["empty: cannot be read", "check the path"]),
+        ("plan empty", &["empty: is no results directory", "such as results/"]),
         ("plan binary.toml", &["binary.toml: cannot be read", "UTF-8"]),
         ("plan good.toml --threads 2", &["--threads"]),
         ("run", &["<SWEEP.toml|DIR>"]),
