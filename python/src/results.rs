@@ -124,6 +124,7 @@ impl Wanted {
 
     fn read(&self, results: &Results<'_>, stop: &AtomicBool) -> Result<Table, Error> {
         let layout = results.layout();
+        let renewed;
         let files = match self.table {
             JOBS => layout.dataset(JOBS)?,
             SLIPS | PRECURSORS => {
@@ -138,8 +139,8 @@ impl Wanted {
                 return Err(ResultsError::refused(layout.root(), problem).into());
             }
             _ => {
-                renew(results)?;
-                Dataset::new(&Disk, vec![layout.reduced_file(self.table)])
+                renewed = renew(results)?;
+                Dataset::new(&Disk, vec![renewed.layout().reduced_file(self.table)])
             }
         };
         let mut own = self.own.clone();

@@ -70,8 +70,7 @@ pub fn plot(arguments: &Arguments) -> Result<Exit> {
         list()?;
     }
     let Some(directory) = &arguments.directory else { return Ok(Exit::Done) };
-    let results = Results::read(&Layout::new(&Disk, directory))?;
-    renew(&results)?;
+    let results = renew(&Results::read(&Layout::new(&Disk, directory))?)?;
     let (layout, look) = (results.layout(), arguments.look(&results));
     let files = if arguments.own.x.is_none() {
         draw_all(layout, &look, arguments.formats())?

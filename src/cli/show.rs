@@ -76,7 +76,7 @@ const FOUND: [&str; 9] = [
 
 pub fn show(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &arguments.directory);
-    let results = Results::read(&layout)?;
+    let results = renew(&Results::read(&layout)?)?;
     let is_text = !arguments.json && !arguments.csv;
     if let Some(other) = &arguments.other {
         let others = Results::read(&Layout::new(&Disk, other))?;
@@ -141,6 +141,7 @@ fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<E
 
 /// The first of the `count` sets of a directory, and what ended otherwise. Memory: [`MAX_READ`] sets.
 pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
+    let results = &*renew(results)?;
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(usual_names(&rows), &rows);
     let mut notes = notes(results, &rows);
@@ -154,7 +155,6 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
 
 /// The first of the reduced sets, controls left out.
 fn sets(results: &Results<'_>, most: usize) -> Result<Vec<SetRow>> {
-    renew(results)?;
     let file = results.layout().reduced_file(SetRow::NAME);
     let mut sets = Vec::new();
     for batch in Dataset::new(results.layout().storage, vec![file]).rows::<SetRow>() {

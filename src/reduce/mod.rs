@@ -43,7 +43,7 @@ pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
-pub use source::renew;
+pub use source::{Renewed, renew};
 pub use swept::{Swept, ascending, differing, has_even_steps, is_same, swept};
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 

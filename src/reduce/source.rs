@@ -5,10 +5,13 @@ use super::{BackboneBin, HistogramBin, Point, SetRow, reduce};
 use crate::results::Results;
 use crate::results::tables::JOBS;
 use crate::table::columns::Table;
-use crate::table::file::footer;
+use crate::table::file::{DatasetError, footer};
 use crate::table::storage::StorageError;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use sha2::{Digest, Sha256};
+use std::io::ErrorKind;
+use std::ops::Deref;
+use tempfile::TempDir;
 
 /// The footer's key of the source.
 pub(super) const SOURCE: &str = "reduced_from";
@@ -24,12 +27,27 @@ pub(super) fn source(results: &Results<'_>) -> Result<String, StorageError> {
     Ok(digest.finalize().iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")))
 }
 
+/// A directory whose reduced data are of its tables. They lie elsewhere, as long as this lives, where nothing can be written.
+pub struct Renewed<'a> {
+    results: Results<'a>,
+    _elsewhere: Option<TempDir>,
+}
+
+impl<'a> Deref for Renewed<'a> {
+    type Target = Results<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.results
+    }
+}
+
 /// Reduces the tables unless the reduced data are of the tables as they are, or there are no tables any more.
-pub fn renew(results: &Results<'_>) -> Result<()> {
+pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
+    let renewed = Renewed { results: results.clone(), _elsewhere: None };
     let layout = results.layout();
     let is_there = layout.storage.exists(&layout.reduced_file(SetRow::NAME))?;
     if is_there && !layout.storage.exists(&layout.table(JOBS))? {
-        return Ok(());
+        return Ok(renewed);
     }
     let source = source(results)?;
     let is_of_it = |table: &&str| {
@@ -37,12 +55,28 @@ pub fn renew(results: &Results<'_>) -> Result<()> {
         footer.is_some_and(|footer| footer.get(SOURCE) == Some(&source))
     };
     if [SetRow::NAME, HistogramBin::NAME, BackboneBin::NAME, Point::NAME].iter().all(is_of_it) {
-        return Ok(());
+        return Ok(renewed);
     }
-    let reduced = reduce(results).map(drop);
-    if is_there {
-        reduced.context("the reduced data are not of the tables as they are, and must be made again")
-    } else {
-        reduced
+    match reduce(results) {
+        Ok(_) => Ok(renewed),
+        Err(error) if is_read_only(&error) => {
+            let elsewhere = tempfile::tempdir()?;
+            let results = results.reduced_to(elsewhere.path());
+            reduce(&results)?;
+            Ok(Renewed { results, _elsewhere: Some(elsewhere) })
+        }
+        Err(error) if is_there => {
+            Err(error.context("the reduced data are not of the tables as they are, and must be made again"))
+        }
+        Err(error) => Err(error),
     }
+}
+
+/// Whether something failed as nothing may be written.
+fn is_read_only(error: &anyhow::Error) -> bool {
+    let kind = error.downcast_ref().map(StorageError::kind).or_else(|| match error.downcast_ref()? {
+        DatasetError::Storage(error) => Some(error.kind()),
+        _ => None,
+    });
+    matches!(kind, Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem))
 }

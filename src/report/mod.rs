@@ -29,8 +29,8 @@ const ADVICE: &str = "`stickslip verify` says what to do about damage";
 ///
 /// With `refresh`, the page says that a run goes on, and reloads itself after about this time.
 pub fn page(results: &Results<'_>, refresh: Option<Duration>) -> Result<String> {
-    renew(results)?;
-    page::html(&content::content(results, refresh)?).context("the report cannot be encoded")
+    let results = renew(results)?;
+    page::html(&content::content(&results, refresh)?).context("the report cannot be encoded")
 }
 
 /// Writes the report of a directory to `report.html` in it, over an earlier one, and returns its path.

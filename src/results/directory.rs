@@ -12,6 +12,7 @@ use crate::table::storage::StorageError;
 use std::collections::HashSet;
 use std::io;
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// A results directory: where it lies, and which sweeps it belongs to. What of it is done is looked up when it is asked
 /// for, since other processes may be at work on it.
@@ -269,6 +270,11 @@ impl<'a> Results<'a> {
     pub fn publish(&self, commit: Commit<'_>) -> Result<(), ResultsError> {
         self.check_place()?;
         Ok(commit.publish()?)
+    }
+
+    /// The same with reduced data in another folder, which is there.
+    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+        Self { layout: self.layout.reduced_to(elsewhere), ..self.clone() }
     }
 
     /// Where it and everything in it lie.

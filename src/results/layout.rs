@@ -36,6 +36,8 @@ const EXTENSION: &str = "extension-";
 pub struct Layout<'a> {
     pub storage: &'a dyn Storage,
     root: PathBuf,
+    /// Where what is made from the tables lies, if not in the directory.
+    elsewhere: Option<PathBuf>,
 }
 
 impl fmt::Debug for Layout<'_> {
@@ -46,7 +48,17 @@ impl fmt::Debug for Layout<'_> {
 
 impl<'a> Layout<'a> {
     pub fn new(storage: &'a dyn Storage, root: &Path) -> Self {
-        Self { storage, root: root.to_owned() }
+        Self { storage, root: root.to_owned(), elsewhere: None }
+    }
+
+    /// The same with reduced data in another folder, which is there.
+    pub fn reduced_to(&self, elsewhere: &Path) -> Self {
+        Self { elsewhere: Some(elsewhere.to_owned()), ..self.clone() }
+    }
+
+    /// What reduced data lie below.
+    fn maker(&self) -> &Path {
+        self.elsewhere.as_deref().unwrap_or(&self.root)
     }
 
     /// The directory of a sweep, unless another is chosen.
@@ -96,7 +108,15 @@ impl<'a> Layout<'a> {
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
     pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.storage.ensure_folder_below(&self.root, folder)
+        self.storage.ensure_folder_below(self.maker(), folder)
+    }
+
+    pub fn reduced(&self) -> PathBuf {
+        self.maker().join("reduced")
+    }
+
+    pub fn locks(&self) -> PathBuf {
+        self.maker().join("run/lock")
     }
 
     pub fn reduced_file(&self, table: &str) -> PathBuf {
@@ -125,7 +145,7 @@ impl<'a> Layout<'a> {
 
     /// Where one writer, known by a name of its own, prepares files.
     pub fn staging(&self, writer: &str) -> PathBuf {
-        self.run().join("staging").join(writer)
+        self.maker().join("run/staging").join(writer)
     }
 }
 
@@ -143,13 +163,11 @@ macro_rules! places {
 
 places! {
     tables = "tables";
-    reduced = "reduced";
     figures = "figures";
     report = "report.html";
     /// Everything that is no result.
     run = RUN;
     claims = "run/claims";
-    locks = "run/lock";
     logs = "run/log";
     /// What a repair took away, as it was damaged.
     quarantine = "run/quarantine";
