@@ -56,8 +56,8 @@ impl<'a> Layout<'a> {
         Self { elsewhere: Some(elsewhere.to_owned()), ..self.clone() }
     }
 
-    /// What reduced data lie below.
-    fn maker(&self) -> &Path {
+    /// What reduced data, and what it takes to make them, lie below.
+    fn reduced_root(&self) -> &Path {
         self.elsewhere.as_deref().unwrap_or(&self.root)
     }
 
@@ -108,15 +108,15 @@ impl<'a> Layout<'a> {
 
     /// Creates a folder of the directory. The directory itself must be there: one that was moved away is not begun again.
     pub fn ensure_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.storage.ensure_folder_below(self.maker(), folder)
+        self.storage.ensure_folder_below(self.reduced_root(), folder)
     }
 
     pub fn reduced(&self) -> PathBuf {
-        self.maker().join("reduced")
+        self.reduced_root().join("reduced")
     }
 
     pub fn locks(&self) -> PathBuf {
-        self.maker().join("run/lock")
+        self.reduced_root().join("run/lock")
     }
 
     pub fn reduced_file(&self, table: &str) -> PathBuf {
@@ -145,7 +145,7 @@ impl<'a> Layout<'a> {
 
     /// Where one writer, known by a name of its own, prepares files.
     pub fn staging(&self, writer: &str) -> PathBuf {
-        self.maker().join("run/staging").join(writer)
+        self.reduced_root().join("run/staging").join(writer)
     }
 }
 
