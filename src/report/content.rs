@@ -10,7 +10,7 @@ use crate::reduce::advise;
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::run::{RunEvent, status_with};
-use crate::sweep::PLAN_VERSION;
+use crate::sweep::{PLAN_VERSION, Sweep};
 use crate::table::file::PROGRAM;
 use crate::table::shown::shown;
 use crate::table::storage::StorageError;
@@ -53,6 +53,7 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         // Set while a run goes on; times in s, `written` since 1970 UTC.
         "live": refresh.map(|refresh| json!({ "refresh": refresh.as_secs_f64(), "written": written })),
         "status": status_with(results, MAX_FAILURES)?,
+        "asked": asked(sweep),
         // Keys that each axis moves, and its number of values.
         "axes": sweep.axes().collect::<Vec<_>>(),
         "sweeps": results.extensions().iter().map(|extension| extension.sweep.text()).collect::<Vec<_>>(),
@@ -70,6 +71,14 @@ pub(super) fn content(results: &Results<'_>, refresh: Option<Duration>) -> Resul
         "cost": cost,
         "runs": runs,
     }))
+}
+
+/// The statistics that a sweep in rounds decides by.
+fn asked(sweep: &Sweep) -> Vec<&'static str> {
+    let rounds = sweep.rounds();
+    let precision = rounds.and_then(|rounds| rounds.precision.as_ref()).map(|precision| &precision.statistics);
+    let refinement = rounds.and_then(|rounds| rounds.refinement.as_ref()).map(|refinement| &refinement.by);
+    precision.or(refinement).into_iter().flatten().map(|statistic| statistic.key).collect()
 }
 
 /// The standing figures as SVG, by name: those that are small.
