@@ -63,7 +63,7 @@ pub fn read(
     join: bool,
 ) -> PyResult<Table> {
     let layout = Layout::new(&Disk, &directory);
-    let results = Results::read(&layout).map_err(Error::from)?;
+    let results = py.detach(|| Results::read(&layout)).map_err(Error::from)?;
     let known = [SLIPS, PRECURSORS, JOBS].into_iter().find(|known| *known == table);
     let own = match known {
         Some(known) => (known, recorded_schema(known, results.sweep().recording())),

@@ -76,7 +76,7 @@ const FOUND: [&str; 9] = [
 
 pub fn show(arguments: &Arguments) -> Result<Exit> {
     let layout = Layout::new(&Disk, &arguments.directory);
-    let results = renew(&Results::read(&layout)?)?;
+    let results = Results::read(&layout)?;
     let is_text = !arguments.json && !arguments.csv;
     if let Some(other) = &arguments.other {
         let others = Results::read(&Layout::new(&Disk, other))?;
@@ -93,6 +93,7 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         }
         return print(arguments, &columns, &[]);
     }
+    let results = renew(&results)?;
     let mut rows = sets(&results, usize::MAX)?;
     let (usual, count) = (usual_names(&rows), rows.len());
     if let Some(condition) = &arguments.condition {
