@@ -11,6 +11,7 @@ import polars
 import pyarrow
 
 __all__ = [
+    "MAX_THREADS",
     "ResultsError",
     "SimulationError",
     "SweepError",
@@ -26,6 +27,9 @@ __all__ = [
     "sweep_of",
     "sweep_text",
 ]
+
+MAX_THREADS: int
+"""Most threads of a run."""
 
 VERSION: str
 """Version of the program and of the module."""

@@ -6,6 +6,8 @@ from datetime import timedelta
 from os import PathLike
 from typing import Any
 
+from ._stickslip import MAX_THREADS
+
 
 def flag(name: str, given: Any) -> bool:
     """True or False, also numpy's."""
@@ -27,8 +29,8 @@ def threads(given: Any) -> int | None:
         count = None if given is None or isinstance(given, bool) else operator.index(given)
     except TypeError:
         count = 0
-    if isinstance(given, bool) or (count is not None and not 1 <= count <= 1024):
-        raise ValueError(f"threads = {given!r}: must be a whole number from 1 to 1024, or None")
+    if isinstance(given, bool) or (count is not None and not 1 <= count <= MAX_THREADS):
+        raise ValueError(f"threads = {given!r}: must be a whole number from 1 to {MAX_THREADS}, or None")
     return count
 
 

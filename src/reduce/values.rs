@@ -137,15 +137,20 @@ fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
     let place = columns.iter().position(|column| column.name == name).ok_or_else(|| unknown(name, columns))?;
     match columns[place].kind {
-        Kind::Text | Kind::Flag => Err(format!("{name} holds words; a number is needed here")),
+        Kind::Text | Kind::Flag => {
+            Err(format!("{name} holds words; a number is needed here, such as slip_share for regimes"))
+        }
         _ => Ok(place),
     }
 }
 
 fn unknown(name: &str, columns: &[Column]) -> String {
     let names: Vec<&str> = columns.iter().map(|column| &*column.name).collect();
-    match nearest(name, &names) {
-        Some(near) => format!("no such column; did you mean {near}? `stickslip plot --list` shows all"),
+    let is_longer = |known: &&str| known.starts_with(name) && !known.ends_with("_low") && !known.ends_with("_high");
+    let longer: Vec<&str> = names.iter().copied().filter(is_longer).collect();
+    let meant = if longer.is_empty() { nearest(name, &names).map(str::to_owned) } else { Some(longer.join(", ")) };
+    match meant {
+        Some(meant) => format!("no such column; did you mean {meant}? `stickslip plot --list` shows all"),
         None => format!("no such column; there are {}", names.join(", ")),
     }
 }
@@ -201,6 +206,7 @@ mod tests {
     fn an_unknown_column_is_named_with_the_nearest() {
         let error = |name: &str| Values::of(&[], name).unwrap_err();
         assert!(error("tau_men").contains("did you mean tau_mean?"));
+        assert!(error("resultant").contains("did you mean resultant_length, resultant_drive, resultant_excess?"));
         assert!(error("colour").contains("there are set_id, N, Ns"), "{}", error("colour"));
     }
 }

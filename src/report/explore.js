@@ -27,9 +27,10 @@ class Explorer {
     const numeric = report.sets.swept.filter(([key]) => isNumeric(report.columns.get(key)));
     const [first] = numeric.map(([key]) => key);
     const colour = report.sets.swept.map(([key]) => key).find((key) => key !== first) ?? "";
-    // What the sweep decides by, or what there is.
+    // What the sweep decides by, what its controls are for, or what the paper asks of the amplitude; else what there is.
     const hasValues = (key) => report.columns.get(key)?.values.some((value) => value !== null);
-    const y = [...report.asked, "tau_mean", "mean_friction"].find(hasValues) ?? "tau_mean";
+    const answer = hasValues("resultant_drive") ? "resultant_length" : first === "Delta" ? "mean_friction" : "tau_mean";
+    const y = [...report.asked, answer, "tau_mean", "mean_friction"].find(hasValues) ?? "tau_mean";
     this.usual = { colour, of: "sets", x: first ?? "tau_mean", y: first ? y : "mean_friction" };
   }
 
