@@ -1,7 +1,8 @@
 //! Pages and tables in `docs/` that follow from the code: the tests hold them against it, and write them with
 //! `UPDATE_DOCS=1`.
 
-use crate::model::{Description, Symbol, Value};
+use crate::model::{Description, Parameters, Symbol, Value};
+use crate::observe::{Recording, RecordingKey};
 use crate::table::columns::{Column, Kind, Table};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub(crate) fn assert_documented(page: &str, text: &str) {
 }
 
 /// Asserts that the first table below a heading of a page describes these fields with their defaults.
-pub(crate) fn assert_table_documented(page: &str, heading: &str, fields: &[(Description, Value)]) {
+fn assert_table_documented(page: &str, heading: &str, fields: &[(Description, Value)]) {
     assert_rows_documented(page, heading, &table(fields));
 }
 
@@ -84,6 +85,18 @@ pub(crate) fn markdown<T: Table>() -> String {
 const LOWER_END: &str = "lower end of";
 
 /// How the pages of tables show units and kinds.
-#[cfg(feature = "sweeps")]
 pub(crate) const UNITS: &str = "Quantities are SI reals in the unit given (1: a pure number), `count` (a signed 64-bit integer), `flag` or `text`.\n\
     A `?` marks columns that may be null.\n";
+
+#[test]
+fn documented_parameters_are_those_of_the_model() {
+    let defaults = Parameters::default();
+    let rows = Symbol::ALL.map(|symbol| (symbol.description(), defaults.get(symbol)));
+    assert_table_documented("model.md", "## Parameters", &rows);
+}
+
+#[test]
+fn documented_keys_are_those_of_a_recording() {
+    let rows = RecordingKey::ALL.map(|key| (key.description(), Recording::default().get(key)));
+    assert_table_documented("sweeps.md", "## [record]", &rows);
+}

@@ -3,16 +3,17 @@
 //!
 //! ```text
 //! sweep file -> plan -> jobs -> measurements -> tables -> reduced data -> figures, report
-//!     sweep/             run/   solver/         results/   reduce/         figure/  report/
-//!                               observe/        table/
-//!                               model/
+//!     sweep/             run/   physics/        results/   reduce/         figure/  report/
+//!                                 solver/       table/
+//!                                 observe/
+//!                                 model/
 //! ```
 //!
-//! Imports run one way: `table` <- `model` <- `solver` <- `observe` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
+//! Imports run one way: `physics` <- `table` <- `sweep` <- `results` <- `reduce` <- `rounds` <- `run`;
 //! `reduce` <- `figure`; `run`, `figure` <- `report`.
-//! Values and rows are described in `table`, which knows no physics but its versions; its files and all folders but `model`,
-//! `solver` and `observe` need the feature `sweeps`. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from the model
-//! to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
+//! `physics/` is a crate of its own, which others can depend on: model, solvers and measurements, with the columns of their
+//! rows; it knows no file. `simulate` runs one job with all its records. `accuracy` holds the solvers against each other, from
+//! the model to figures. Only `cli` prints, which is the command line; `python/` makes a Python module of the library.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -33,29 +34,18 @@
 //! | claim | which worker runs a part |
 //! | shard | a share of the parts, run into a directory of its own |
 
-#[cfg(feature = "sweeps")]
 pub mod accuracy;
-#[cfg(feature = "sweeps")]
 pub mod cli;
 #[cfg(test)]
 mod documented;
-#[cfg(feature = "sweeps")]
 pub mod figure;
-pub mod model;
-pub mod observe;
-#[cfg(feature = "sweeps")]
 pub mod reduce;
-#[cfg(feature = "sweeps")]
 pub mod report;
-#[cfg(feature = "sweeps")]
 pub mod results;
-#[cfg(feature = "sweeps")]
 pub mod rounds;
-#[cfg(feature = "sweeps")]
 pub mod run;
-#[cfg(feature = "sweeps")]
 pub mod simulate;
-pub mod solver;
-#[cfg(feature = "sweeps")]
 pub mod sweep;
 pub mod table;
+
+pub use stickslip_physics::{model, observe, solver};

@@ -3,12 +3,21 @@
 use crate::model::theory::typical_interval;
 use crate::model::{ContactEvent, Parameters};
 use crate::observe::{
-    AttachedMap, ContactLog, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, SlipObserver, Trace,
-    TraceRow,
+    AttachedMap, ContactLog, ContactRow, MapRow, Measurements, Observers, Profile, ProfileRow, Recording, SlipObserver,
+    Trace, TraceRow,
 };
 use crate::solver::{self, Observer, SimulationError};
 use crate::sweep::{Change, Job, Mistake, Sweep};
+use crate::table::columns::tables;
 use std::sync::atomic::AtomicBool;
+
+// The tables that one simulation writes on request.
+tables! {
+    TraceRow = "trace", "One row per sample of a simulation";
+    MapRow = "map", "One row per sample and block";
+    ProfileRow = "profile", "One row per block, at the end of a simulation";
+    ContactRow = "contacts", "One row per contact event, in order; with the initial attachment";
+}
 
 /// More samples than this, of 24 bytes each, are a mistake.
 const MAX_SAMPLES: f64 = 1e8;

@@ -1,7 +1,7 @@
 //! Confidence intervals: they contain the true value in 95 of 100 repetitions.
 
 use super::sequence::Estimate;
-use crate::sweep::Interval;
+use crate::table::columns::Interval;
 use std::f64::consts::PI;
 
 /// Share of repetitions in which an interval contains the true value.
@@ -14,10 +14,8 @@ const LONG: f64 = 0.5;
 /// heavy tails. Measured, as all coverage: docs/coverage.md.
 const OF_SQUARES: f64 = 0.25;
 
-impl Interval {
-    fn about(mean: f64, half: f64) -> Self {
-        Self { low: mean - half, high: mean + half }
-    }
+const fn about(mean: f64, half: f64) -> Interval {
+    Interval { low: mean - half, high: mean + half }
 }
 
 impl Estimate<1> {
@@ -29,7 +27,7 @@ impl Estimate<1> {
     /// Of the mean; `None` for fewer than two values.
     pub(super) fn interval(&self) -> Option<Interval> {
         let [mean] = self.mean()?;
-        Some(Interval::about(mean, self.half(1.0)?))
+        Some(about(mean, self.half(1.0)?))
     }
 
     /// Standard deviation (n - 1) of the values whose squared deviations from their mean these are, and its interval, of equal
@@ -95,7 +93,7 @@ impl Estimate<2> {
         let (direction, (length, _, across)) = (self.direction(top)?, self.polar()?);
         let sine = student(self.freedom(1.0)?) * across.sqrt();
         let half = if sine < length { libm::asin(sine / length) } else { PI };
-        Some(Interval::about(direction, half))
+        Some(about(direction, half))
     }
 }
 

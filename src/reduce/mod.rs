@@ -25,7 +25,8 @@ mod statistic;
 mod swept;
 mod values;
 
-pub use crate::sweep::{Interval, SetRow};
+pub use crate::sweep::SetRow;
+pub use crate::table::columns::Interval;
 pub use backbone::BackboneBin;
 pub use compare::compare;
 #[cfg(test)]

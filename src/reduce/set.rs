@@ -12,8 +12,8 @@ use crate::model::selected::Selected;
 use crate::model::theory::{finite_resultant, random_load_mean};
 use crate::observe::{Averages, Regime, Slip};
 use crate::results::tables::JobOutcome;
-use crate::sweep::Interval;
 pub use crate::sweep::SetRow;
+use crate::table::columns::Interval;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 

@@ -45,7 +45,7 @@ pub use job::{Id, Identity, Job};
 pub use labels::{Label, capitalised, label, power_of_ten, symbol_of, three_digits, typeset};
 pub use plan::{Extension, Outline, PART_COST, PART_JOBS, PLAN_VERSION, Part, Plan, Totals};
 pub use rounds::{Bounds, MIN_SEEDS, Precision, Refinement, Round, Rounds, Standing, Target, merged};
-pub use set::{AllButSeed, Interval, STATISTICS, SetRow, Statistic};
+pub use set::{AllButSeed, STATISTICS, SetRow, Statistic};
 pub use source::{Mistake, SweepError, nearest};
 pub use variation::{Change, varied};
 

@@ -4,44 +4,9 @@
 use crate::model::Symbol;
 use crate::model::selected::{Selected, Selection};
 use crate::observe::Regime;
-use crate::table::columns::{Column, Kind, Part, Row, Value, columns, tables};
+use crate::table::columns::{Column, Interval, Kind, Row, columns, tables};
 use std::borrow::Cow;
 use std::sync::LazyLock;
-
-/// The ends of a 95 % confidence interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    pub low: f64,
-    pub high: f64,
-}
-
-/// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
-impl Part for Option<Interval> {
-    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        [("_low", meaning), ("_high", "upper end")]
-            .map(|(end, meaning)| Column {
-                name: format!("{name}{end}").into(),
-                unit,
-                meaning,
-                kind: Kind::Real,
-                nullable: true,
-            })
-            .to_vec()
-    }
-
-    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
-        give(self.map_or(Value::Null, |interval| Value::Real(interval.low)));
-        give(self.map_or(Value::Null, |interval| Value::Real(interval.high)));
-    }
-
-    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
-        match (next(), next()) {
-            (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
-            (Value::Null, Value::Null) => Ok(None),
-            _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
-        }
-    }
-}
 
 /// All parameters but the seed, which a set has not.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Parameters as columns of a row.
 
 use super::{Description, Parameters, Symbol};
-use crate::table::columns::{Column, FromRow, Row, Value, part};
+use crate::columns::{Column, FromRow, Row, Value, part};
 use std::marker::PhantomData;
 use std::ops::Deref;
 

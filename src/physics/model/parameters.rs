@@ -5,7 +5,7 @@
 
 use super::fields::fields;
 use super::theory::{eta, typical_interval};
-use crate::table::value::{Value, words};
+use crate::value::{Value, words};
 use std::f64::consts::TAU;
 
 words! {
@@ -99,7 +99,7 @@ impl Parameters {
     }
 
     /// Checks the rules between parameters, each of which is in its range.
-    pub(crate) fn check_rules(&self) -> Result<(), ParameterError> {
+    pub fn check_rules(&self) -> Result<(), ParameterError> {
         let is_modulated = self.modulation_amplitude > 0.0;
         let can_ramp = is_modulated && self.ramp_time > 0.0;
         let rules = [
@@ -194,7 +194,6 @@ impl Parameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_table_documented;
 
     #[test]
     fn keys_are_distinct_and_read_back() {
@@ -218,13 +217,6 @@ mod tests {
             copy.set(symbol, original.get(symbol)).unwrap();
         }
         assert_eq!(copy, original);
-    }
-
-    #[test]
-    fn documented_parameters_are_those_of_the_model() {
-        let defaults = Parameters::default();
-        let rows = Symbol::ALL.map(|symbol| (symbol.description(), defaults.get(symbol)));
-        assert_table_documented("model.md", "## Parameters", &rows);
     }
 
     #[test]

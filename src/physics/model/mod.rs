@@ -3,7 +3,7 @@
 mod disorder;
 mod drive;
 pub mod equation;
-pub(crate) mod fields;
+pub mod fields;
 mod interface;
 mod lanes;
 mod parameters;
@@ -20,7 +20,7 @@ pub(crate) use lanes::{LANES, Row};
 pub use parameters::{BreakOn, ParameterError, Parameters, Symbol};
 
 /// The value of a parameter, in a file, on an axis or in a table.
-pub type Value = crate::table::value::Value<'static>;
+pub type Value = crate::value::Value<'static>;
 
 /// Version of equations, definitions and defaults; part of every job id. Raised when the same parameters, or a file that leaves
 /// them out, give other results.

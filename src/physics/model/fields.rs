@@ -18,7 +18,7 @@
 //! | `Variant` | the field as a value of the enum behind `by` |
 //! | `"key"` | its name in files, flags and tables |
 //! | `"symbol"` | its symbol in the paper; may be left out, and figures name it in small print only away from its default |
-//! | `type` | a [`Field`](crate::table::value::Field); an `Option` where the value may be missing |
+//! | `type` | a [`Field`](crate::value::Field); an `Option` where the value may be missing |
 //! | `"unit"` | in SI; empty for a pure number, a flag or a word |
 //! | `RANGE` | one of [`Range`]: the values that the field can take by itself |
 //! | `"rule"` | what else must hold, beside other fields; the struct checks it in code; may be left out |
@@ -27,7 +27,7 @@
 //! Each row yields the field with its documentation, its default, its [`Description`], access by key, and a row of the
 //! table in `docs/`, which the tests write with `UPDATE_DOCS=1`.
 
-use crate::table::value::Kind;
+use crate::value::Kind;
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 
 #[derive(Clone, Copy, Debug)]
@@ -115,7 +115,7 @@ macro_rules! fields {
             }
         }
 
-        $crate::table::value::words! {
+        $crate::words! {
             #[doc = concat!("A field of [`", stringify!($Struct), "`].")]
             #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
             pub enum $Key {$(
@@ -135,8 +135,8 @@ macro_rules! fields {
                         meaning: $meaning,
                         range: $crate::model::fields::Range::$range,
                         rule: concat!($($rule)?),
-                        kind: <$type as $crate::table::value::Field>::KIND,
-                        nullable: <$type as $crate::table::value::Field>::NULLABLE,
+                        kind: <$type as $crate::value::Field>::KIND,
+                        nullable: <$type as $crate::value::Field>::NULLABLE,
                     },
                 )+}
             }
@@ -152,8 +152,8 @@ macro_rules! fields {
             }
 
             /// The canonical form of a value that the field can take by itself: equal values have equal bits.
-            pub fn checked(self, value: $crate::table::value::Value<'_>) -> Option<$crate::model::Value> {
-                use $crate::table::value::{Field, Value};
+            pub fn checked(self, value: $crate::value::Value<'_>) -> Option<$crate::model::Value> {
+                use $crate::value::{Field, Value};
                 use std::ops::RangeBounds;
                 let value = match self {$(
                     Self::$variant => <$type as Field>::from_value(value)?.value(),
@@ -171,15 +171,14 @@ macro_rules! fields {
             /// The value of a field.
             pub fn get(&self, field: $Key) -> $crate::model::Value {
                 match field {$(
-                    $Key::$variant => $crate::table::value::Field::value(&self.$field),
+                    $Key::$variant => $crate::value::Field::value(&self.$field),
                 )+}
             }
 
             /// Sets a field, in or out of its range; none if the kind of value does not fit.
-            #[cfg_attr(not(feature = "sweeps"), allow(dead_code, reason = "some structs are read from files only"))]
-            pub(crate) fn put(&mut self, field: $Key, value: $crate::table::value::Value<'_>) -> Option<()> {
+            pub fn put(&mut self, field: $Key, value: $crate::value::Value<'_>) -> Option<()> {
                 match field {$(
-                    $Key::$variant => self.$field = $crate::table::value::Field::from_value(value)?,
+                    $Key::$variant => self.$field = $crate::value::Field::from_value(value)?,
                 )+}
                 Some(())
             }

@@ -6,6 +6,7 @@ use std::fmt;
 const MAX_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
 
 /// Defines an enum whose values are words in files and tables, each written once behind its variant.
+#[macro_export]
 macro_rules! words {
     (
         $(#[$about:meta])*
@@ -34,20 +35,20 @@ macro_rules! words {
             }
         }
 
-        impl $crate::table::value::Field for $Enum {
-            const KIND: $crate::table::value::Kind = $crate::table::value::Kind::Text;
+        impl $crate::value::Field for $Enum {
+            const KIND: $crate::value::Kind = $crate::value::Kind::Text;
 
-            fn value(&self) -> $crate::table::value::Value<'static> {
-                $crate::table::value::Value::Text(self.word())
+            fn value(&self) -> $crate::value::Value<'static> {
+                $crate::value::Value::Text(self.word())
             }
 
-            fn from_value(value: $crate::table::value::Value<'_>) -> Option<Self> {
-                if let $crate::table::value::Value::Text(word) = value { Self::from_word(word) } else { None }
+            fn from_value(value: $crate::value::Value<'_>) -> Option<Self> {
+                if let $crate::value::Value::Text(word) = value { Self::from_word(word) } else { None }
             }
         }
     };
 }
-pub(crate) use words;
+pub use words;
 
 words! {
     /// What a field holds.
@@ -96,7 +97,6 @@ impl fmt::Display for Value<'_> {
     }
 }
 
-#[cfg(feature = "sweeps")]
 impl serde::Serialize for Value<'_> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -110,7 +110,7 @@ impl serde::Serialize for Value<'_> {
 }
 
 /// A double in the shortest decimal form that reads back to the same bits, with an exponent where that is shorter.
-pub(crate) struct Shortest(pub f64);
+pub struct Shortest(pub f64);
 
 impl fmt::Display for Shortest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,6 +1,6 @@
 //! Averages of a job over time, and the regime that they show.
 
-use crate::table::value::words;
+use crate::value::words;
 
 /// What a job measures as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,9 +5,9 @@
 //! between these two instants does not count: a drop is a fall that is deeper than that by the drop size. Nothing is
 //! sampled: the force is followed from one turning point to the next.
 
+use crate::columns::columns;
 use crate::model::{Drive, Parameters};
 use crate::solver::Segment;
-use crate::table::columns::columns;
 
 columns! {
     /// Drops before and during a slip; none of the values where drops are not recorded.

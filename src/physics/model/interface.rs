@@ -9,7 +9,7 @@ use super::lanes::{LANES, Row};
 use super::reattachments::{Due, Reattachments};
 use super::simd::{Simd, Vector};
 use super::{BreakOn, Disorder, Parameters};
-use crate::table::value::words;
+use crate::value::words;
 use pulp::Scalar512b;
 use std::array;
 

@@ -1,10 +1,10 @@
 //! What a job records: one struct, each field described once.
 
+use crate::columns::Row;
 use crate::model::Parameters;
 use crate::model::fields::fields;
 use crate::model::theory::typical_interval;
 use crate::observe::{Drops, Energies};
-use crate::table::columns::Row;
 use std::borrow::Cow;
 
 fields! {
@@ -58,7 +58,6 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::documented::assert_table_documented;
     use crate::observe::{Precursor, Slip};
 
     #[test]
@@ -72,11 +71,5 @@ mod tests {
                 .words
                 .contains("10000000: a job holds them in memory, 320 bytes each")
         );
-    }
-
-    #[test]
-    fn documented_keys_are_those_of_a_recording() {
-        let rows = RecordingKey::ALL.map(|key| (key.description(), Recording::default().get(key)));
-        assert_table_documented("sweeps.md", "## [record]", &rows);
     }
 }

@@ -18,7 +18,7 @@ pub use segment::{CubicStep, Extremes, ForcePath, Segment};
 use self::ledger::Audit;
 use crate::model::equation::stability_limit;
 use crate::model::{ContactEvent, Parameters};
-use crate::table::value::words;
+use crate::value::words;
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
 

@@ -1,8 +1,8 @@
 //! Records on request: traces, space-time maps and the contact log of one job. A sweep holds none of these.
 
+use crate::columns::columns;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
-use crate::table::columns::{columns, tables};
 
 /// Several observers of one run; the first decides when it has seen enough.
 pub struct Observers<'a> {
@@ -234,14 +234,6 @@ impl From<&ContactEvent> for ContactRow {
             stiffness,
         }
     }
-}
-
-// The tables that one simulation writes on request.
-tables! {
-    TraceRow = "trace", "One row per sample of a simulation";
-    MapRow = "map", "One row per sample and block";
-    ProfileRow = "profile", "One row per block, at the end of a simulation";
-    ContactRow = "contacts", "One row per contact event, in order; with the initial attachment";
 }
 
 /// An observer that keeps every contact event in order.

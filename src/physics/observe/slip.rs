@@ -9,10 +9,10 @@ use super::drops::{DropDetector, Drops};
 use super::phase::phase;
 use super::regime::Averages;
 use super::rupture::{Rupture, advance_speed};
+use crate::columns::columns;
 use crate::model::theory::eta;
 use crate::model::{Change, ContactEvent, Drive, Parameters};
 use crate::solver::{Observer, Segment, Spent};
-use crate::table::columns::columns;
 use std::f64::consts::TAU;
 
 columns! {

@@ -1,0 +1,257 @@
+//! Columns: name, unit, meaning and value of each written once, in the row type that holds them.
+//!
+//! ```ignore
+//! columns! {
+//!     /// What one row is.
+//!     #[derive(Clone, Copy, Debug)]
+//!     pub struct Reading {
+//!         /// (docs of a field follow from its unit and meaning)
+//!         force: f64 = "N", "shear force";
+//!         phase: Option<f64> = "rad", "phase of the onset, null without modulation";
+//!         number as "slip": u64 = "", "number of the slip";
+//!     }
+//! }
+//! ```
+//!
+//! From this follow the struct and its documentation, the columns with their types, a writer and a reader. `name as "key"` is
+//! for a field that is called otherwise than its column. A field without unit and meaning holds the columns of another row
+//! type, or is a projection: it reads a column that another row type describes. Rows side by side are tuples. Nothing here
+//! knows Arrow, files or JSON. No derive that exists fits: serde_arrow 0.15 has no place for units and meanings beside a
+//! field, typed-arrow 0.8 ends at Arrow 59 and would bind the physics to it, parquet_derive 60 writes no Arrow schema.
+
+pub use super::value::{Field, Kind, Value};
+use std::borrow::Cow;
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    pub name: Cow<'static, str>,
+    /// SI unit; empty for a pure number or a text.
+    pub unit: &'static str,
+    /// One line, without a full stop.
+    pub meaning: &'static str,
+    pub kind: Kind,
+    pub nullable: bool,
+}
+
+/// A type whose values are rows, or parts of rows.
+pub trait Row {
+    /// Its columns, in order.
+    fn columns() -> Vec<Column>;
+
+    /// Gives the cells of a row, in the order of the columns.
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>));
+}
+
+/// A row that can be read back.
+pub trait FromRow: Row + Sized {
+    /// The row with these cells, in the order of the columns.
+    fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
+}
+
+/// A field of a row type: one cell, several that belong together, or all the cells of another row. What the macro `columns` is built on.
+pub trait Part: Sized {
+    /// The columns of a field with this name, unit and meaning.
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column>;
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>));
+
+    /// Reads the cells of a field with this name.
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String>;
+}
+
+impl<T: Field> Part for T {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: T::KIND, nullable: T::NULLABLE }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.value());
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        let cell = next();
+        T::from_value(cell).ok_or_else(|| format!("column {name} cannot hold {cell:?}"))
+    }
+}
+
+/// A text of a row's own is no [`Field`]: its value does not outlive the row.
+impl Part for String {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: false }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(Value::Text(self));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        <Option<Self> as Part>::take(name, next)?.ok_or_else(|| format!("column {name} cannot hold {:?}", Value::Null))
+    }
+}
+
+impl Part for Option<String> {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        vec![Column { name: name.into(), unit, meaning, kind: Kind::Text, nullable: true }]
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.as_deref().map_or(Value::Null, Value::Text));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        match next() {
+            Value::Null => Ok(None),
+            Value::Text(text) => Ok(Some(text.to_owned())),
+            value => Err(format!("column {name} cannot hold {value:?}")),
+        }
+    }
+}
+
+/// The ends of a 95 % confidence interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
+impl Part for Option<Interval> {
+    fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
+        [("_low", meaning), ("_high", "upper end")]
+            .map(|(end, meaning)| Column {
+                name: format!("{name}{end}").into(),
+                unit,
+                meaning,
+                kind: Kind::Real,
+                nullable: true,
+            })
+            .to_vec()
+    }
+
+    fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.low)));
+        give(self.map_or(Value::Null, |interval| Value::Real(interval.high)));
+    }
+
+    fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+        match (next(), next()) {
+            (Value::Real(low), Value::Real(high)) => Ok(Some(Interval { low, high })),
+            (Value::Null, Value::Null) => Ok(None),
+            _ => Err(format!("column {name}_low or {name}_high: one end of an interval is missing")),
+        }
+    }
+}
+
+/// Row types as fields of other row types.
+#[macro_export]
+macro_rules! part {
+    ($row:ty $(where $($parameter:ident: $bound:path),*)?) => {
+        impl $(<$($parameter: $bound),*>)? $crate::columns::Part for $row {
+            fn columns_as(_: &'static str, _: &'static str, _: &'static str) -> Vec<$crate::columns::Column> {
+                <Self as $crate::columns::Row>::columns()
+            }
+
+            fn give(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
+                $crate::columns::Row::cells(self, give);
+            }
+
+            fn take<'a>(
+                _: &str,
+                next: &mut dyn FnMut() -> $crate::columns::Value<'a>,
+            ) -> Result<Self, String> {
+                $crate::columns::FromRow::from_cells(next)
+            }
+        }
+    };
+}
+pub use part;
+
+/// Describes the columns of a row type: see the head of `columns.rs`.
+#[macro_export]
+macro_rules! columns {
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $name:literal) => { $name };
+    (@text) => { "" };
+    (@text $text:tt) => { $text };
+    (@in) => { "" };
+    (@in "") => { "" };
+    (@in $unit:tt) => { concat!(", in ", $unit) };
+    ($(#[$attribute:meta])* $visibility:vis struct $row:ident {
+        $($field:ident $(as $name:literal)? : $type:ty $(= $unit:tt, $meaning:tt)?;)*
+    }) => {
+        $(#[$attribute])*
+        #[allow(rustdoc::invalid_html_tags, reason = "meanings are plain text")]
+        $visibility struct $row {
+            $(
+                #[doc = concat!($crate::columns!(@text $($meaning)?), $crate::columns!(@in $($unit)?), ".")]
+                $visibility $field: $type,
+            )*
+        }
+
+        impl $crate::columns::Row for $row {
+            fn columns() -> Vec<$crate::columns::Column> {
+                [$(<$type as $crate::columns::Part>::columns_as(
+                    $crate::columns!(@name $field $($name)?),
+                    $crate::columns!(@text $($unit)?),
+                    $crate::columns!(@text $($meaning)?),
+                )),*].concat()
+            }
+
+            fn cells(&self, give: &mut dyn FnMut($crate::columns::Value<'_>)) {
+                $($crate::columns::Part::give(&self.$field, give);)*
+            }
+        }
+
+        impl $crate::columns::FromRow for $row {
+            fn from_cells<'a>(
+                next: &mut dyn FnMut() -> $crate::columns::Value<'a>,
+            ) -> Result<Self, String> {
+                $(let $field = $crate::columns::Part::take(
+                    $crate::columns!(@name $field $($name)?),
+                    next,
+                )?;)*
+                Ok(Self { $($field),* })
+            }
+        }
+
+        $crate::part!($row);
+    };
+}
+pub use columns;
+
+impl<T: Row> Row for &T {
+    fn columns() -> Vec<Column> {
+        T::columns()
+    }
+
+    fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
+        (*self).cells(give);
+    }
+}
+
+/// Rows side by side are a row.
+macro_rules! side_by_side {
+    ($($part:ident),*) => {
+        impl<$($part: Row),*> Row for ($($part,)*) {
+            fn columns() -> Vec<Column> {
+                [$($part::columns()),*].concat()
+            }
+
+            #[allow(non_snake_case, reason = "a part is called as its type")]
+            fn cells(&self, give: &mut dyn FnMut(Value<'_>)) {
+                let ($($part,)*) = self;
+                $($part.cells(give);)*
+            }
+        }
+
+        impl<$($part: FromRow),*> FromRow for ($($part,)*) {
+            fn from_cells<'a>(next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
+                Ok(($($part::from_cells(next)?,)*))
+            }
+        }
+    };
+}
+
+side_by_side!(A, B);
+side_by_side!(A, B, C);
+side_by_side!(A, B, C, D);
