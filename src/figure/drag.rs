@@ -12,6 +12,8 @@ use crate::sweep::label;
 
 /// Space right of the frames for the numbers of lines.
 const NUMBERS: f64 = 66.0;
+/// Middle of the numbers of lines that leave through the top, below it.
+const BELOW_TOP: f64 = 14.0;
 const LAYOUT: Layout = Layout { right: NUMBERS, ..Layout::column(520.0) };
 /// The stages of the ramp, their names and inks.
 const STAGES: [(RampStage, &str, Ink); 2] = [(RampStage::Up, "there", INKS[0]), (RampStage::Down, "back", INKS[1])];
@@ -58,11 +60,17 @@ pub(super) fn drag(points: &[Point], look: &Look) -> Option<Picture> {
     let dots = slips.iter().map(|&(stage, x, tau, _)| {
         Layer::Dots(vec![(x, tau)], Dot { ink: STAGES[stage].2, radius: 2.0, opacity: 0.45 })
     });
-    let ends_of_lines: Vec<_> =
-        multiples().map(|n| (n, line(n)[1])).filter(|(_, end)| (taus.0..taus.1).contains(&end.1)).collect();
+    // Where lines leave the frame: at its right, or through its top.
+    let end = |n: f64| {
+        let [(_, first), (right, last)] = line(n);
+        let share = ((taus.1 - first) / (last - first)).min(1.0);
+        (first < taus.1 && last > taus.0).then(|| (n, (low + share * (right - low), last.min(taus.1))))
+    };
+    let ends_of_lines: Vec<_> = multiples().filter_map(end).collect();
     let numbers = Layer::Drawn(Box::new(move |sheet, frame| {
         for (n, end) in ends_of_lines {
             let (x, y) = frame.place(end);
+            let y = y.max(frame.top + BELOW_TOP);
             sheet.centred_text((x + 6.0, y), &format!("n = {n}"), LEGEND_TEXT, Anchor::Start);
         }
     }));

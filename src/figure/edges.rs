@@ -3,6 +3,7 @@
 use super::axis::Axis;
 use super::frame::Layout;
 use super::legend::{Mark, entry};
+use super::own::MAX_TICKS;
 use super::panel::{self, Layer, Panel};
 use super::picture::{Dot, Picture, Stroke};
 use super::sets::axis_of;
@@ -35,7 +36,9 @@ pub(super) fn edges(edges: &[EdgeRow], look: &Look) -> Option<Picture> {
     };
     let places = || edges.iter().filter_map(place);
     let ends = edges.iter().filter_map(bar).flat_map(|(_, ends)| [ends.0, ends.1]);
-    let x = Axis::of_data(&x_label, places().map(|place| place.0))?;
+    let known = ascending(places().map(|place| place.0));
+    let x = Axis::of_data(&x_label, known.iter().copied())?;
+    let x = if known.len() > MAX_TICKS { x } else { x.with_ticks_at(&x_label, known.into_iter()) };
     let y = Axis::of_data(&y_label, places().map(|place| place.1).chain(ends))?;
     let mut statistics: Vec<&str> = Vec::new();
     for EdgeRow { statistic, .. } in edges {

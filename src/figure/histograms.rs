@@ -136,13 +136,16 @@ fn legend(panels: &[Panel<'_>]) -> Vec<Entry> {
 fn draw_multiples(sheet: &mut Picture, frame: &Frame, multiples: Vec<f64>, period: f64) {
     let mut free = f64::NEG_INFINITY;
     for multiple in multiples {
-        let (x, n) = (frame.x_of(multiple), (multiple / period).round());
-        let text = if free == f64::NEG_INFINITY { format!("n = {n}") } else { format!("{n}") };
-        let half = 0.5 * font::width(&text, LEGEND_TEXT);
+        let (x, n) = (frame.x_of(multiple), format!("{}", (multiple / period).round()));
+        let half = 0.5 * font::width(&n, LEGEND_TEXT);
+        // Before the first number, where there is room.
+        let is_led = free == f64::NEG_INFINITY && x - half - font::width("n = ", LEGEND_TEXT) > frame.left + 4.0;
+        let lead = if is_led { "n = " } else { "" };
         let mut top = frame.top;
         if x - half > free.max(frame.left + 4.0) && x + half < frame.right() - 4.0 {
             top += NUMBERS - 2.0;
-            sheet.centred_text((x, frame.top + 0.5 * NUMBERS + 1.0), &text, LEGEND_TEXT, Anchor::Middle);
+            let place = (x + half, frame.top + 0.5 * NUMBERS + 1.0);
+            sheet.centred_text(place, &format!("{lead}{n}"), LEGEND_TEXT, Anchor::End);
             free = x + half + 4.0;
         }
         sheet.line(vec![(x, frame.bottom()), (x, top)], REFERENCE);

@@ -38,7 +38,7 @@ const PANEL_GAP: f64 = 26.0;
 /// Between columns, for the labels of their axes.
 const LABEL_GAP: f64 = 16.0;
 /// Values of a parameter up to which each has its tick.
-const MAX_TICKS: usize = 6;
+pub(super) const MAX_TICKS: usize = 6;
 const MAX_WORDS: usize = 12;
 /// Lines between sets; more would be a net.
 const MAX_LINES: usize = 24;
