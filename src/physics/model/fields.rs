@@ -1,4 +1,4 @@
-//! Structs whose fields are each described once, in a row of [`fields!`]:
+//! Structs whose fields are each described once, in a row of `fields!`:
 //!
 //! ```text
 //! fields! {
