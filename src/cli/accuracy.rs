@@ -126,7 +126,7 @@ fn sets_of(sweep: &Sweep) -> Result<Vec<(Parameters, u64)>> {
         }
         if sets.len() > MAX_SETS {
             let problem = format!(
-                "sweep {} has more than {MAX_SETS} sets; keep the values that matter in a copy, or name one set with --set",
+                "sweep {} has more than {MAX_SETS} sets; choose one by the values of its axes, such as --set V0=1e-5 --set N=35",
                 sweep.name()
             );
             return Err(UsageError(problem).into());

@@ -185,7 +185,8 @@ fn ending(report: &RunReport, root: &Path, arguments: &Arguments) -> Exit {
             Some(_) if report.jobs_run == 0 => "No part ended in this time: give a longer --walltime.",
             _ => "The same command resumes.",
         };
-        output::report(&format!("stopped with {left} left; finished jobs are kept. {hint}"));
+        let of_round = if report.rounds.is_some() { " of this round" } else { "" };
+        output::report(&format!("stopped with {left} left{of_round}; finished jobs are kept. {hint}"));
         // One that could start nothing would start nothing the next time, either.
         let has_worked = report.jobs_run + report.jobs_spilled > 0;
         return if arguments.worker && has_worked && !signals::is_cancelled() { Exit::Done } else { Exit::Stopped };

@@ -147,11 +147,13 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
     let rows = sets(results, MAX_READ)?;
     let columns = usual_columns(usual_names(&rows), &rows);
     let mut notes = notes(results, &rows);
-    if let Some(more) = count.checked_sub(FIRST as u64).filter(|more| *more > 0) {
+    // A line that says how many more there are is as long as one of these.
+    let first = if count <= FIRST as u64 + 1 { FIRST + 1 } else { FIRST };
+    if let Some(more) = count.checked_sub(first as u64).filter(|more| *more > 0) {
         let root = output::quoted_path(results.layout().root());
         notes.insert(0, format!("… {more} more: stickslip show {root}"));
     }
-    let text = edges(results)? + &aligned(&columns, &rows, FIRST);
+    let text = edges(results)? + &aligned(&columns, &rows, first);
     Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
 }
 

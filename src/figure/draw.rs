@@ -1,8 +1,9 @@
 //! All figures that fit the reduced data of a sweep, written together, and figures of one's own.
 
+use super::style::INKS;
 use super::{BadOption, Format, Look, OwnFigure, Picture};
 use super::{backbone, drag, edges, histograms, intervals, map, own, sets};
-use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets};
+use crate::reduce::{EdgeRow, SetRow, WRITER, advise, read_reduced, read_sets, swept};
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::layout::Layout;
 use crate::table::columns::{FromRow, Table};
@@ -27,12 +28,14 @@ pub fn draw_all(layout: &Layout<'_>, look: &Look, formats: &[Format]) -> Result<
     pictures.extend(drag::drag(&points, look));
     // Under a ramp a set has no one period.
     if sets.iter().all(|set| set.parameters.ramp_time == 0.0) {
-        let maps = [map::map, own::staircase].map(|map| map(&sets, look));
-        // Where a map shows all, it would be a net of lines; of a single set it would be a dot.
-        if sets.len() > 1 && maps.iter().all(Option::is_none) {
+        let [map, staircase] = [map::map, own::staircase].map(|map| map(&sets, look));
+        // More values than colours would be a net of lines, which a map shows better; a single set would be a dot.
+        let is_net = || swept(&sets).get(1).is_some_and(|second| second.distinct.len() > INKS.len());
+        if sets.len() > 1 && staircase.is_none() && !(map.is_some() && is_net()) {
             pictures.extend(own::overview(&sets, look));
         }
-        pictures.extend(maps.into_iter().flatten());
+        pictures.extend(map);
+        pictures.extend(staircase);
     }
     if layout.storage.exists(&layout.reduced_file(EdgeRow::NAME))? {
         pictures.extend(edges::edges(&read(layout)?, look));

@@ -70,10 +70,10 @@ pub struct OwnFigure {
     /// Logarithmic axes [default: where it was swept so, or values lie decades apart]
     #[arg(long, value_name = "AXES", requires = "x", value_parser = ["x", "y", "xy", "none"])]
     pub log: Option<String>,
-    /// Ends of the x axis; either may be left out
+    /// Ends of the x axis, in SI; either may be left out
     #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
     pub xlim: Option<Limits>,
-    /// Ends of the y axis
+    /// Ends of the y axis, in SI
     #[arg(long, value_name = "LOW:HIGH", requires = "x", value_parser = limits, allow_hyphen_values = true)]
     pub ylim: Option<Limits>,
     /// Label of the x axis [default: meaning, name and unit of the column]
@@ -670,7 +670,7 @@ pub(super) mod tests {
             (OwnFigure { x: Some("v0".into()), ..figure() }, "--x v0: no such column; did you mean V0?"),
             (
                 OwnFigure { colour: Some("colour".into()), ..figure() },
-                "--colour colour: no such column; there are set_id",
+                "--colour colour: no such column; `stickslip plot --list`",
             ),
             (
                 OwnFigure { x: Some("break_on".into()), log: Some("x".into()), ..figure() },

@@ -137,9 +137,9 @@ fn evaluate(expression: &Expression<usize>, row: &SetRow) -> f64 {
 fn number_column(name: &str, columns: &[Column]) -> Result<usize, String> {
     let place = columns.iter().position(|column| column.name == name).ok_or_else(|| unknown(name, columns))?;
     match columns[place].kind {
-        Kind::Text | Kind::Flag => {
-            Err(format!("{name} holds words; a number is needed here, such as slip_share for regimes"))
-        }
+        Kind::Text | Kind::Flag => Err(format!(
+            "{name} holds words; a number is needed here, such as slip_share, which is 0.95 or more where sets slide"
+        )),
         _ => Ok(place),
     }
 }
@@ -151,7 +151,7 @@ fn unknown(name: &str, columns: &[Column]) -> String {
     let meant = if longer.is_empty() { nearest(name, &names).map(str::to_owned) } else { Some(longer.join(", ")) };
     match meant {
         Some(meant) => format!("no such column; did you mean {meant}? `stickslip plot --list` shows all"),
-        None => format!("no such column; there are {}", names.join(", ")),
+        None => "no such column; `stickslip plot --list` shows all".to_owned(),
     }
 }
 
@@ -207,6 +207,6 @@ mod tests {
         let error = |name: &str| Values::of(&[], name).unwrap_err();
         assert!(error("tau_men").contains("did you mean tau_mean?"));
         assert!(error("resultant").contains("did you mean resultant_length, resultant_drive, resultant_excess?"));
-        assert!(error("colour").contains("there are set_id, N, Ns"), "{}", error("colour"));
+        assert!(error("colour").contains("plot --list` shows all"), "{}", error("colour"));
     }
 }

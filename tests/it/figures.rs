@@ -131,7 +131,7 @@ fn mistakes_in_a_figure_are_refused_with_what_to_do_and_nothing_is_written() {
         ("--x V0", &["--y <COLUMN>"]),
         ("--colour V0", &["--x <COLUMN>"]),
         ("--x v0 --y tau_mean", &["--x v0: no such column; did you mean V0?", "--list"]),
-        ("--x V0 --y nothing_like_it", &["--y nothing_like_it: no such column; there are set_id, N, Ns"]),
+        ("--x V0 --y nothing_like_it", &["--y nothing_like_it: no such column; `stickslip plot --list` shows all"]),
         ("--x regime --y tau_mean --log x", &["--log x: regime holds words"]),
         ("--x V0 --y T_to", &["--y T_to: no set has a value of both V0 and T_to"]),
         ("--x V0 --y tau_mean --xlim 1:2", &["none of 12 sets lies within --xlim and --ylim"]),
