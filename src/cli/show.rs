@@ -280,8 +280,7 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(of_axis.short(unit), &|edge| edge.edge.map_or_else(|| "none".to_owned(), number));
     add("95 %".to_owned(), &|edge| match edge.edge_interval {
         Some(Interval { low, high }) => format!("{} to {}", number(low), number(high)),
-        None if edge.edge.is_none() => format!("from {} to {}", number(edge.bracket_low), number(edge.bracket_high)),
-        None => "–".to_owned(),
+        None => format!("from {} to {}", number(edge.bracket_low), number(edge.bracket_high)),
     });
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());

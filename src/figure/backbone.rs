@@ -41,7 +41,7 @@ pub(super) fn backbone(points: &[Point], bins: &[BackboneBin], sets: &[SetRow], 
     let (low, high) = bounds(cells.iter().flat_map(|cell| [cell.0.0.0, cell.0.0.1]))?;
     let averages = averages(bins, sets);
     let entries = [
-        entry(Mark::Bar(AVERAGE), "mean of sets with a phase, 95 %"),
+        entry(Mark::Bar(AVERAGE), "mean of all sets with a phase in a bin of η, 95 %"),
         entry(Mark::Line(ASYMPTOTE), "−2√(π/η)"),
         entry(Mark::Line(EXACT), "φₘᵢₙ of Eq. 2"),
         entry(Mark::Line(REFERENCE), "η = 1"),
@@ -118,7 +118,12 @@ fn columns(etas: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
     values.dedup_by(|next, value| *next <= *value * SAME);
     if values.len() <= MAX_COLUMNS {
         let cells = Grid::logarithmic_cells(values.clone()).into_iter().zip(values);
-        return cells.map(|((low, high), eta)| (low.max(eta / WIDEST), high.min(eta * WIDEST))).collect();
+        let clipped = |((low, high), eta): ((f64, f64), f64)| {
+            let (low, high) = (low.max(eta / WIDEST), high.min(eta * WIDEST));
+            // None reaches over η = 1, where the load begins to fall in each period.
+            (if eta > SAME { low.max(1.0) } else { low }, if eta * SAME < 1.0 { high.min(1.0) } else { high })
+        };
+        return cells.map(clipped).collect();
     }
     let place = |eta: f64| libm::log10(eta) * COLUMNS_PER_DECADE;
     #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
@@ -141,6 +146,8 @@ mod tests {
         let sample = columns(etas.iter().copied());
         assert!(sample.len() < 50 && sample[0].0 <= etas[0] && sample[sample.len() - 1].1 > etas[999]);
         assert!(sample.windows(2).all(|pair| pair[0].1 == pair[1].0));
+        let [low, high] = [[0.5, 1.09], [0.9, 2.0]].map(|etas| columns(etas.into_iter()));
+        assert_eq!((low[1].0, high[0].1), (1.0, 1.0), "no column reaches over η = 1");
     }
 
     #[test]

@@ -55,10 +55,10 @@ pub type Limits = (Option<f64>, Option<f64>);
 #[derive(Clone, Debug, Default, PartialEq, Args)]
 #[command(next_help_heading = "A figure of your own")]
 pub struct OwnFigure {
-    /// Column on the x axis of a figure of your own
+    /// Column, or formula of columns such as 'Kd*Delta', on the x axis of a figure of your own
     #[arg(long, value_name = "COLUMN", requires = "y")]
     pub x: Option<String>,
-    /// Column on the y axis, with error bars if it has an interval
+    /// Column on the y axis, with error bars if it has an interval; or a formula, without
     #[arg(long, value_name = "COLUMN", requires = "x")]
     pub y: Option<String>,
     /// Column that colours show, up to six values in the legend, more on a scale [default: what else was swept]
@@ -163,8 +163,11 @@ pub(super) fn overview(rows: &[SetRow], look: &Look) -> Option<Picture> {
     let fills = |place: &usize| {
         let Some(swept) = swept.get(*place) else { return false };
         let places = swept.places();
-        let has_all = |y| (0..swept.distinct.len()).all(|value| shown(y).iter().any(|&set| places[set] == Some(value)));
-        swept.distinct.len() <= MAX_COLUMNS && ys.iter().all(has_all)
+        let mut values = places.clone();
+        values.sort();
+        values.dedup();
+        let has_all = |y| values.iter().all(|value| shown(y).iter().any(|&set| places[set] == *value));
+        values.len() <= MAX_COLUMNS && ys.iter().all(has_all)
     };
     let panels = if swept.len() > 2 { [2, 1].into_iter().find(fills) } else { None };
     let colour = asked(if panels == Some(1) { 2 } else { 1 }, "colour");
@@ -280,6 +283,12 @@ impl<'a> Chart<'a> {
     /// Sets that differ in the x axis alone, in its order.
     fn lines(&self, sets: &[usize]) -> Vec<Vec<usize>> {
         let Some(symbol) = self.x.symbol else { return Vec::new() };
+        // What is measured makes no line: neighbours of one colour, or at one value of y, have nothing else in common.
+        if self.colour.as_ref().is_some_and(|colour| colour.symbol.is_none())
+            || self.ys.iter().any(|y| y.symbol.is_some())
+        {
+            return Vec::new();
+        }
         let others: Vec<_> =
             self.swept.iter().filter(|other| parameter(other.name()) != Some(symbol)).map(Swept::places).collect();
         let mut lines: BTreeMap<Vec<Option<usize>>, Vec<usize>> = BTreeMap::new();
@@ -383,12 +392,8 @@ impl<'a> Chart<'a> {
         if let Some((colour, hues)) = self.colour.as_ref().zip(hues) {
             let numbers = || inside.iter().map(|&set| colour.number(set));
             entries.extend(hues.entries(RADIUS, |value| numbers().any(|number| number == Some(value))));
-            let none = if colour.symbol == Some(Symbol::T) {
-                "Δ = 0".to_owned()
-            } else {
-                format!("no {}", colour.label().symbol)
-            };
-            entries.extend(numbers().any(|number| number.is_none()).then(|| entry(Mark::Dot(dot(GREY)), none)));
+            let none = || entry(Mark::Dot(dot(GREY)), without_value(&colour.column.values));
+            entries.extend(numbers().any(|number| number.is_none()).then(none));
         }
         entries.extend((!free.is_empty()).then(|| entry(Mark::Line(REFERENCE), "Δ = 0")));
         let slides = inside.iter().any(|&set| self.slides(set));
@@ -409,6 +414,17 @@ impl<'a> Chart<'a> {
         entries
     }
 
+    /// Swept parameters that nothing shows.
+    fn pooled(&self) -> Option<String> {
+        let asked = [Some(&self.x), self.colour.as_ref()].into_iter().flatten().chain(&self.ys).map(Asked::name);
+        let names = asked.chain(self.panels.as_ref().map(|panels| &*panels.column.name));
+        let words = names.flat_map(|name| name.split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
+        let shown: Vec<Option<Symbol>> = words.map(parameter).collect();
+        let pooled = self.swept.iter().filter(|swept| !shown.contains(&parameter(swept.name())));
+        let symbols: Vec<String> = pooled.map(|swept| swept.values.label().symbol).collect();
+        (!symbols.is_empty()).then(|| format!("not told apart: sets that differ in {}", symbols.join(", ")))
+    }
+
     /// What bars are, and what is not there.
     fn note(&self, inside: &[usize], levels: usize) -> String {
         let shows_intervals = self.ys.iter().any(|y| y.name().starts_with("tau"));
@@ -425,7 +441,7 @@ impl<'a> Chart<'a> {
             .iter()
             .any(|y| inside.iter().any(|&set| y.interval(set).is_some()))
             .then(|| "bars: 95 %".to_owned());
-        [bars, still, left_out].into_iter().flatten().collect::<Vec<_>>().join("; ")
+        [bars, still, left_out, self.pooled()].into_iter().flatten().collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -571,6 +587,12 @@ fn hues(colour: &Asked<'_>) -> Result<Hues, BadOption> {
     Ok(Hues::of(&colour.label().short(colour.unit), known, word))
 }
 
+/// What is said of sets without a value of a column: of a period, that they have no modulation.
+fn without_value(values: &Values) -> String {
+    let is_period = parameter(&values.column.name) == Some(Symbol::T);
+    if is_period { "Δ = 0".to_owned() } else { format!("no {}", values.label().symbol) }
+}
+
 /// The sets of each panel and its title.
 fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<usize>)>, BadOption> {
     let Some(values) = panels else { return Ok(vec![(String::new(), sets.to_vec())]) };
@@ -580,6 +602,11 @@ fn groups(panels: Option<&Values>, sets: &[usize]) -> Result<Vec<(String, Vec<us
     };
     let mut groups: Vec<_> = ascending(values.numbers.iter().copied().flatten()).into_iter().map(of).collect();
     groups.retain(|(_, sets)| !sets.is_empty());
+    // Sets without a value, such as a frequency at Δ = 0, have a panel of their own.
+    let without: Vec<usize> = sets.iter().copied().filter(|&set| values.numbers[set].is_none()).collect();
+    if !groups.is_empty() && !without.is_empty() {
+        groups.insert(0, (without_value(values), without));
+    }
     let problem = match groups.len() {
         0 => "no set has a value of it".to_owned(),
         1..=MAX_PANELS => return Ok(groups),
@@ -720,6 +747,16 @@ pub(super) mod tests {
             row.frequency = Some(1.0 / period);
         }
         assert_eq!(lines(&periods, "frequency"), [vec![2, 0, 1]]);
+    }
+
+    #[test]
+    fn sets_of_one_measured_colour_are_not_joined_and_what_nothing_shows_is_said() {
+        let strokes = |figure: &OwnFigure| svg(figure).matches(&format!(r#"stroke-width="{LINE_WIDTH}""#)).count();
+        let measured = OwnFigure { colour: Some("tau_mean".into()), ..figure() };
+        assert!(strokes(&figure()) > strokes(&measured));
+        let pooled = "not told apart: sets that differ in Δ";
+        assert!(svg(&measured).contains(pooled) && !svg(&figure()).contains(pooled));
+        assert!(!svg(&OwnFigure { x: Some("V0*Delta".into()), ..measured }).contains(pooled));
     }
 
     /// Sets with this spread of thresholds in N, under a modulation of this amplitude in m.

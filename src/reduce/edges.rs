@@ -4,7 +4,7 @@
 //! ones left out, lies an edge; up and down are edges of their own. Of the sets in between, two neighbours count between
 //! which the estimate crosses. If both are clear, the edge lies between them, and nothing is said of the response there.
 //! If not, it is near: where a line through the sets of a small window crosses, with Fieller's interval (E. C. Fieller,
-//! J. R. Stat. Soc. B 16, 175 (1954)).
+//! J. R. Stat. Soc. B 16, 175 (1954)); where that has no end, as the line may be level, with the bracket of clear sets.
 //!
 //! Covariances come from a jackknife over groups of seeds, left out of all sets together, since a seed is one realisation
 //! of the disorder in all sets (F. M. T. A. Busing et al., Stat. Comput. 9, 3 (1999), for groups of unequal size).
@@ -55,7 +55,7 @@ columns! {
         statistic: String = "", "what crosses the threshold, such as `resultant_length`, or `periods = 4`: the share of intervals nearest 4 T";
         threshold: f64 = "", "the threshold, in the unit of the statistic";
         edge: Option<f64> = "", "where it is crossed; null if it is not";
-        edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval; null if there is no end on one side";
+        edge_interval as "edge": Option<Interval> = "", "lower end of its 95 % confidence interval";
         rises: Option<bool> = "", "whether the statistic is above the threshold above the edge";
         jobs: u64 = "", "jobs of the sets that say where the edge is; of all of the row if it has none";
         bracket_low: f64 = "", "the nearest value clearly on one side; the least of the row if it has no edge";
@@ -153,10 +153,10 @@ pub struct Edge<'a> {
     /// The sets that say where it is: two neighbours that are clear, or those of the window.
     pub sets: Vec<Placed<'a>>,
     bracket: [Placed<'a>; 2],
-    /// Where it is, and the ends of its interval, which may have none.
+    /// Where it is, and the ends of its interval.
     pub(crate) place: f64,
-    pub(crate) interval: Option<[f64; 2]>,
-    /// Width of the interval over that wanted.
+    pub(crate) interval: [f64; 2],
+    /// Width of the interval over that wanted; infinite if no line gives one.
     pub error: f64,
     /// The row between two neighbours that is wanted next, if these are too far from each other.
     pub wanted_row: Option<u64>,
@@ -177,8 +177,16 @@ impl<'a> Edge<'a> {
             let gap = pair[1].row - pair[0].row;
             let wanted_row = (gap > 1).then(|| pair[0].row + gap / 2);
             let place = ends[0] - gap as f64 * excess(&pair[0]) / rise(&pair);
-            let (interval, error) = (Some(ends), gap as f64 / width);
-            return Some(Self { sets: pair.to_vec(), bracket, place, interval, error, wanted_row, is_bracketed: true });
+            let error = gap as f64 / width;
+            return Some(Self {
+                sets: pair.to_vec(),
+                bracket,
+                place,
+                interval: ends,
+                error,
+                wanted_row,
+                is_bracketed: true,
+            });
         }
         let near = |set: &&Placed<'_>, place: f64| (set.row as f64 - place).abs() <= window(place) as f64;
         let mut place = fit(pair, ends[0])?.crossing;
@@ -196,8 +204,11 @@ impl<'a> Edge<'a> {
         let wanted_row = (high - low > window).then(|| nearest.clamp(low + inner, high - inner));
         let sets: Vec<Placed<'_>> =
             all.iter().filter(|set| near(set, place) || set.row == low || set.row == high).copied().collect();
-        let Fit { crossing, interval, .. } = fit(&sets, place)?;
-        let (place, error) = interval.map_or((place, f64::INFINITY), |[low, high]| (crossing, (high - low) / width));
+        let line = fit(&sets, place)?;
+        let (place, interval, error) = match line.interval {
+            Some([low, high]) => (line.crossing, [low, high], (high - low) / width),
+            None => (place, bracket.map(|set| set.row as f64), f64::INFINITY),
+        };
         Some(Self { sets, bracket, place, interval, error, wanted_row, is_bracketed: false })
     }
 
@@ -302,7 +313,6 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
             let ends = bracket.map(|(row, _)| sweep.value_at(refinement.axis, row));
             let [Some((axis, bracket_low)), Some((_, bracket_high))] = ends else { return None };
             let SetOfEdges { set_id, parameters, .. } = bracket[0].1.clone();
-            let interval = edge.and_then(|edge| edge.interval);
             Some(EdgeRow {
                 set_id,
                 parameters: Selected::new(parameters),
@@ -310,7 +320,8 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
                 statistic: refinement.periods.map_or_else(|| key.to_owned(), |periods| format!("{key} = {periods}")),
                 threshold: refinement.threshold,
                 edge: edge.map(|edge| value(edge.place)),
-                edge_interval: interval.map(|[low, high]| Interval { low: value(low), high: value(high) }),
+                edge_interval: edge
+                    .map(|Edge { interval: [low, high], .. }| Interval { low: value(*low), high: value(*high) }),
                 rises: edge.map(|edge| edge.bracket[1].side > 0.0),
                 jobs: used.into_iter().map(|set| set.seeds).sum(),
                 bracket_low,

@@ -80,7 +80,7 @@ fn found(sweep: &Sweep, sets: &BTreeMap<u64, SetOfEdges>) -> Vec<Vec<([f64; 3], 
     let axis = sweep.refinement().unwrap().axis;
     let [first, second] = [0, 1].map(|row| sweep.value_at(axis, row).unwrap().1);
     let of_edge = |edge: &Edge<'_>| {
-        let [low, high] = edge.interval.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let [low, high] = edge.interval;
         ([low, edge.place, high].map(|row| first + row * (second - first)), edge.is_done())
     };
     let lines = lines(sweep, sweep.refinement().unwrap(), sets);
