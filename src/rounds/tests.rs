@@ -224,10 +224,17 @@ fn what_ends_an_edge_too_early_is_counted_and_no_more_jobs_run_than_are_allowed(
         let (rounds, sets) = noisy(mean).rounds(&sweep);
         let total: u64 = sets.values().map(|set| set.seeds).sum();
         assert!(total <= jobs && sets.values().all(|set| set.seeds <= seeds), "{total}");
-        let is_done = found(&sweep, &sets).into_iter().flatten().all(|(_, is_done)| is_done);
+        let [(interval, is_done)] = found(&sweep, &sets)[0][..] else { panic!("one edge") };
+        assert!(interval[0] < 2.345e-6 && 2.345e-6 < interval[2], "{interval:?}");
         (rounds.last().unwrap().standing.edges_capped, is_done)
     };
     assert_eq!([ended(2000, 90_000), ended(50, 90_000), ended(2000, 300)], [(0, true), (1, false), (1, false)]);
+    // So near the edge that a line through few seeds may be level.
+    let sweep = sweep(DELTA, "to = 1e-8\nseeds = { from = 24, to = 24 }\njobs = 90000");
+    let (_, sets) = noisy(mean).rounds(&sweep);
+    let lines = lines(&sweep, sweep.refinement().unwrap(), &sets);
+    let Edge { interval: [low, high], place, error, .. } = lines[0].edges[0];
+    assert!(error.is_infinite() && low < place && place < high, "the bracket: {low} {place} {high}");
 }
 
 #[test]
