@@ -11,7 +11,7 @@ use crate::table::columns::{FromRow, Row};
 pub use crate::table::error::DatasetError;
 use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{ArrowError, DataType, Schema};
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::{ArrowWriter, ProjectionMask};
@@ -68,7 +68,7 @@ impl Footer {
     }
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
-        let (units, meaning) = (by_name(schema, UNIT), by_name(schema, DESCRIPTION));
+        let [units, meaning] = [UNIT, DESCRIPTION].map(|key| by_name(schema, key));
         let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let mut properties = WriterProperties::builder()
@@ -92,9 +92,7 @@ const UNITS: &str = "units";
 
 /// What the metadata of all fields hold under a key, as JSON.
 fn by_name(schema: &Schema, key: &str) -> String {
-    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
-    let entries = schema.fields().iter().map(|field| (field.name().clone(), text(field).into()));
-    serde_json::Value::Object(entries.collect()).to_string()
+    arrow::by_name(schema.fields().iter().map(AsRef::as_ref), key).to_string()
 }
 
 /// Whether a footer is that of a file with these columns.
@@ -257,67 +255,46 @@ impl<'a> Dataset<'a> {
         self.read(names.iter().cloned().map(Cow::Owned).collect())
     }
 
-    fn read(self, columns: Vec<Cow<'static, str>>) -> Reader<'a> {
-        Reader { storage: self.storage, files: self.files.into_iter(), columns, current: None }
+    /// Of columns with these names; of all if there are none.
+    fn read(self, columns: Vec<Cow<'static, str>>) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
+        let Self { storage, files } = self;
+        let batches = files.into_iter().flat_map(move |(path, expected)| {
+            let opened = open(storage, &path, expected, &columns);
+            let (reader, error) = opened.map_or_else(|error| (None, Some(Err(error))), |reader| (Some(reader), None));
+            let path: Arc<Path> = path.into();
+            let batch = move |rows: Result<RecordBatch, ArrowError>| {
+                Ok(Batch { path: Arc::clone(&path), rows: rows.map_err(DatasetError::damaged(&path))? })
+            };
+            reader.into_iter().flatten().map(batch).chain(error)
+        });
+        let mut has_failed = false;
+        batches.take_while(move |batch| !std::mem::replace(&mut has_failed, batch.is_err()))
     }
 }
 
-struct Reader<'a> {
-    storage: &'a dyn Storage,
-    files: std::vec::IntoIter<(PathBuf, Option<RowCount>)>,
-    /// Names of the columns to read; all if there are none.
-    columns: Vec<Cow<'static, str>>,
-    /// The file that is being read.
-    current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
-}
-
-impl Reader<'_> {
-    fn open(&self, path: &Path, expected: Option<RowCount>) -> Result<ParquetRecordBatchReader, DatasetError> {
-        let bytes = load(self.storage, path)?;
-        let reader = || {
-            let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
-            if let Some(expected) = expected {
-                let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
-                expected.check(rows).map_err(ParquetError::General)?;
-            }
-            if !self.columns.is_empty() {
-                let mask = ProjectionMask::columns(builder.parquet_schema(), self.columns.iter().map(AsRef::as_ref));
-                builder = builder.with_projection(mask);
-            }
-            builder.build()
-        };
-        reader().map_err(|error| match error {
-            ParquetError::General(problem) => DatasetError::damaged(path)(problem),
-            error => DatasetError::damaged(path)(error),
-        })
-    }
-
-    fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
-        loop {
-            if let Some((path, rows)) = &mut self.current {
-                if let Some(rows) = rows.next().transpose().map_err(DatasetError::damaged(path))? {
-                    return Ok(Some(Batch { path: Arc::clone(path), rows }));
-                }
-                self.current = None;
-            }
-            let Some((path, expected)) = self.files.next() else { return Ok(None) };
-            let rows = self.open(&path, expected)?;
-            self.current = Some((path.into(), rows));
+fn open(
+    storage: &dyn Storage,
+    path: &Path,
+    expected: Option<RowCount>,
+    columns: &[Cow<'static, str>],
+) -> Result<ParquetRecordBatchReader, DatasetError> {
+    let bytes = load(storage, path)?;
+    let reader = || {
+        let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
+        if let Some(expected) = expected {
+            let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
+            expected.check(rows).map_err(ParquetError::General)?;
         }
-    }
-}
-
-impl Iterator for Reader<'_> {
-    type Item = Result<Batch, DatasetError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let batch = self.advance();
-        if batch.is_err() {
-            self.current = None;
-            self.files = Vec::new().into_iter();
+        if !columns.is_empty() {
+            let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().map(AsRef::as_ref));
+            builder = builder.with_projection(mask);
         }
-        batch.transpose()
-    }
+        builder.build()
+    };
+    reader().map_err(|error| match error {
+        ParquetError::General(problem) => DatasetError::damaged(path)(problem),
+        error => DatasetError::damaged(path)(error),
+    })
 }
 
 #[cfg(test)]
