@@ -2,10 +2,10 @@
 //! as is wanted.
 
 use super::set::SetRow;
-use crate::results::Results;
+use crate::results::{Results, ResultsError};
 use crate::sweep::{Precision, Sweep};
 use crate::table::columns::{columns, tables};
-use crate::table::file::{DatasetError, Footer, TableWriter};
+use crate::table::file::{Footer, TableWriter};
 use crate::table::storage::StoredFile;
 use std::collections::HashMap;
 
@@ -44,7 +44,7 @@ pub(super) struct Rounds<'a> {
 }
 
 impl<'a> SetWriter<'a> {
-    pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
+    pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
         let sweep = results.sweep();
         let Some(rounds) = sweep.rounds() else { return Ok(Self::Plain(TableWriter::new(file, footer)?)) };
         let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
@@ -61,7 +61,7 @@ impl<'a> SetWriter<'a> {
         Ok(Self::InRounds(TableWriter::new(file, footer)?, rounds))
     }
 
-    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), DatasetError> {
+    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), ResultsError> {
         match self {
             Self::Plain(writer) => writer.push(row),
             Self::InRounds(writer, Rounds { sweep, precision, of_sets }) => {
@@ -73,7 +73,7 @@ impl<'a> SetWriter<'a> {
         }
     }
 
-    pub(super) fn finish(self) -> Result<(), DatasetError> {
+    pub(super) fn finish(self) -> Result<(), ResultsError> {
         match self {
             Self::Plain(writer) => writer.finish().map(drop),
             Self::InRounds(writer, _) => writer.finish().map(drop),

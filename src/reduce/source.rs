@@ -2,14 +2,14 @@
 //! times.
 
 use super::{BackboneBin, HistogramBin, Point, SetRow, reduce};
-use crate::results::Results;
 use crate::results::tables::JOBS;
+use crate::results::{ErrorKind, Results, ResultsError};
 use crate::table::columns::Table;
-use crate::table::file::{DatasetError, footer};
+use crate::table::file::footer;
 use crate::table::storage::StorageError;
 use anyhow::Result;
 use sha2::{Digest, Sha256};
-use std::io::ErrorKind;
+use std::io;
 use std::ops::Deref;
 use tempfile::TempDir;
 
@@ -74,9 +74,7 @@ pub fn renew<'a>(results: &Results<'a>) -> Result<Renewed<'a>> {
 
 /// Whether something failed as nothing may be written.
 fn is_read_only(error: &anyhow::Error) -> bool {
-    let kind = error.downcast_ref().map(StorageError::kind).or_else(|| match error.downcast_ref()? {
-        DatasetError::Storage(error) => Some(error.kind()),
-        _ => None,
-    });
-    matches!(kind, Some(ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem))
+    let of_storage = error.downcast_ref().map(StorageError::kind).map(ErrorKind::Disk);
+    let kind = of_storage.or_else(|| Some(error.downcast_ref::<ResultsError>()?.kind));
+    matches!(kind, Some(ErrorKind::Disk(io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)))
 }

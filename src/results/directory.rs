@@ -1,12 +1,12 @@
 //! A results directory as it was found: opened once, valid from then on. Any version is read; only this one is run.
 
 use crate::results::commit::Commit;
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
 use crate::results::tables;
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Outline, Part, Plan, Round, Sweep};
+use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::collections::HashSet;

@@ -5,9 +5,9 @@
 
 use crate::results::commit::own_number;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::host;
+use crate::table::error::ResultsError;
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read};

@@ -13,10 +13,10 @@
 //! so that a rename moves a whole file at once, but outside their folders: a stray file of any name there breaks some
 //! reader.
 
-use crate::results::error::ResultsError;
 use crate::results::tables;
 use crate::sweep::{Outline, Sweep};
-use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
+use crate::table::error::ResultsError;
+use crate::table::file::{Dataset, FILE_EXTENSION};
 use crate::table::storage::{Storage, StorageError};
 use std::collections::{BTreeSet, HashSet};
 use std::ffi::OsString;
@@ -86,12 +86,13 @@ impl<'a> Layout<'a> {
     }
 
     /// All files of a table as they are now, each of them that of a part.
-    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, DatasetError> {
+    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, ResultsError> {
         let folder = self.table(name);
         let paths = self.storage.list(&folder)?.into_iter().map(|name| folder.join(name));
+        let stray = "it is no table file, and a table folder may hold nothing else; move it away";
         let of_part = |path: PathBuf| match PartName::of_path(&path) {
             Some(_) => Ok(path),
-            None => Err(DatasetError::Stray { path }),
+            None => Err(ResultsError::damaged(&path, stray)),
         };
         Ok(Dataset::new(self.storage, paths.map(of_part).collect::<Result<_, _>>()?))
     }

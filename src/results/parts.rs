@@ -7,7 +7,6 @@
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, PartName};
 use crate::results::tables::{
     self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
@@ -15,7 +14,8 @@ use crate::results::tables::{
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
-use crate::table::file::{Batch, Dataset, DatasetError, RowCount, TableWriter};
+use crate::table::error::ResultsError;
+use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::io::ErrorKind;
@@ -126,7 +126,7 @@ impl Results<'_> {
         part: &Part,
         (from, to): (Option<Place>, Place),
         jobs: &'j Jobs<'_>,
-        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), DatasetError>,
+        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
         let place = |place| match place {
@@ -186,7 +186,7 @@ impl RowsOfJob {
 }
 
 /// How many rows the jobs of a part have in a table, as its jobs file says.
-pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, DatasetError> {
+pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, ResultsError> {
     let mut all = RowCount { least: 0, may_exceed: false };
     for batch in jobs.rows::<RowsOfJob>() {
         for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
@@ -199,14 +199,14 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Data
 
 /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A run
 /// killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
-pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, DatasetError> {
+pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, ResultsError> {
     let there: HashSet<PathBuf> = layout.dataset(table)?.files().cloned().collect();
     let mut files = Vec::new();
     for jobs in jobs.files() {
         let Some(part) = PartName::of_path(jobs) else { continue };
         let path = layout.table(table).join(part.file());
         if !there.contains(&path) {
-            return Err(DatasetError::damaged(&path)("it is missing, though the jobs of its part are there"));
+            return Err(ResultsError::damaged(&path, "it is missing, though the jobs of its part are there"));
         }
         let count = row_count(Dataset::new(layout.storage, vec![jobs.clone()]), table)?;
         files.push((path, Some(count)));
@@ -222,7 +222,7 @@ struct KeptRows {
 }
 
 impl KeptRows {
-    fn read(before: Dataset<'_>) -> Result<Self, DatasetError> {
+    fn read(before: Dataset<'_>) -> Result<Self, ResultsError> {
         let mut kept = Self::default();
         for batch in before.batches() {
             let batch = batch?;
@@ -237,7 +237,7 @@ impl KeptRows {
         Ok(kept)
     }
 
-    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), DatasetError> {
+    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), ResultsError> {
         let rows = self.by_job.get(job).into_iter().flatten();
         rows.cloned().try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
     }

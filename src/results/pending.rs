@@ -11,16 +11,16 @@
 //! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
 
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::layout::{DoneParts, PartName};
 use crate::results::settled::settled;
 use crate::results::tables::{self, JobOutcome, RowOfJob};
 use crate::sweep::{Extension, Outline};
 use crate::table::columns::columns;
-use crate::table::file::{Dataset, DatasetError};
+use crate::table::error::{ErrorKind, ResultsError};
+use crate::table::file::Dataset;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::io::ErrorKind;
+use std::io;
 
 /// Times within this share of each other are the same bound.
 const SAME_TIME: f64 = 1e-9;
@@ -154,13 +154,13 @@ impl Results<'_> {
         for batch in Dataset::new(self.layout().storage, vec![file]).rows::<RowOfJob>() {
             match batch {
                 Ok(rows) => spilled.ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(DatasetError::Damaged { .. }) => return Ok(Some(nothing())),
-                Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
+                Err(ResultsError { kind: ErrorKind::Damaged, .. }) => return Ok(Some(nothing())),
+                Err(ResultsError { kind: ErrorKind::Disk(io::ErrorKind::NotFound), .. }) => {
                     // Not listed: another worker has just committed the part.
                     let is_listed = self.spilled_parts(table)?.contains(&part.into());
                     return Ok((!is_listed).then(nothing));
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(error),
             }
         }
         Ok(Some(spilled))

@@ -4,9 +4,9 @@
 
 use crate::results::commit::exclusive_lock;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::workers::Member;
 use crate::sweep::{Extension, Round, Standing, merged};
+use crate::table::error::ResultsError;
 use serde::{Deserialize, Serialize};
 
 const LOCK: &str = "round";

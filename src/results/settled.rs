@@ -1,6 +1,6 @@
 //! Waiting for what a host of a network disk does not see yet, although the folder lists it.
 
-use crate::results::error::ResultsError;
+use crate::table::error::ResultsError;
 use std::time::{Duration, Instant};
 
 /// How long to wait: longer than a network file system shows an old name, and the time between two looks.

@@ -6,13 +6,13 @@
 
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{Record, refuse_old};
 use crate::results::layout::{Layout, PartName};
 use crate::results::parts::RowsOfJob;
 use crate::results::tables::{self, RowOfJob};
 use crate::sweep::Part;
-use crate::table::file::{Dataset, DatasetError, footer, has_columns};
+use crate::table::error::{ErrorKind, ResultsError};
+use crate::table::file::{Dataset, footer, has_columns};
 use crate::table::shown::serialize_path;
 use crate::table::storage::StorageError;
 use serde::Serialize;
@@ -338,7 +338,7 @@ fn misplacement(
 }
 
 /// Holds the rows of all tables of a part against each other, and against the plan.
-fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
+fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let dataset = |table| Dataset::new(results.layout().storage, vec![results.part_file(table, part)]);
     let path = results.part_file(tables::JOBS, part);
     let jobs = dataset(tables::JOBS).rows::<RowsOfJob>().collect::<Result<Vec<_>, _>>()?;
@@ -379,8 +379,8 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
     Ok(())
 }
 
-fn damaged<T>(path: &Path, problem: String) -> Result<T, DatasetError> {
-    Err(DatasetError::damaged(path)(problem))
+fn damaged<T>(path: &Path, problem: String) -> Result<T, ResultsError> {
+    Err(ResultsError::damaged(path, problem))
 }
 
 /// What lies in the folders of the tables and is no table or no part of the plan.
@@ -406,6 +406,6 @@ fn strangers(results: &Results<'_>, planned: &HashSet<PartName>) -> Result<Vec<P
 }
 
 /// What a check found of a file that must be there: its path and what is wrong.
-fn damage_in<T>(checked: Result<T, DatasetError>) -> Result<Option<(PathBuf, String)>, DatasetError> {
+fn damage_in<T>(checked: Result<T, ResultsError>) -> Result<Option<(PathBuf, String)>, ResultsError> {
     checked.map_or_else(|error| error.damage().map(Some), |_| Ok(None))
 }

@@ -10,10 +10,10 @@
 //! other, and leaves.
 
 use crate::results::commit::{Commit, own_number};
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
 use crate::table::checksum;
+use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::shown::shown_text;
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
