@@ -317,7 +317,7 @@ impl<'a> Results<'a> {
 
     /// The id of a job of a part.
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters).to_string()
+        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters)
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a

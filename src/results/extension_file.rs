@@ -86,7 +86,7 @@ impl Record {
             model_version: MODEL_VERSION,
             rng_scheme: RNG_SCHEME.to_owned(),
             plan_version: PLAN_VERSION,
-            identity: sweep.job_id(&Parameters::default()).to_string(),
+            identity: sweep.job_id(&Parameters::default()),
             tables: columns_of(sweep),
             part_cost: *part_cost,
             kept_before,
@@ -130,7 +130,7 @@ impl Record {
             .map(|(key, before, after)| format!("{key}: {} -> {after}", shown_text(&before)))
             .collect();
         // Versions enter it.
-        if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()).to_string() {
+        if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()) {
             differences.push(format!("ids of jobs: those of {} -> others of this program", shown_text(&self.program)));
         }
         for (name, after) in &columns_of(sweep) {

@@ -99,8 +99,11 @@ pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
 
 /// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
-    let [job_id, set_id] = [sweep.job_id(parameters).to_string(), sweep.set_id(parameters).to_string()];
-    (Names { job_id, set_id }, Selected::new(parameters.clone()), Loading::of(parameters))
+    (
+        Names { job_id: sweep.job_id(parameters), set_id: sweep.set_id(parameters) },
+        Selected::new(parameters.clone()),
+        Loading::of(parameters),
+    )
 }
 
 /// The same label with other parameters.
