@@ -14,7 +14,7 @@ use crate::results::directory::Results;
 use crate::results::layout::{DoneParts, PartName};
 use crate::results::settled::settled;
 use crate::results::tables::{self, JobOutcome, RowOfJob};
-use crate::sweep::{Extension, Outline};
+use crate::sweep::{Extension, Outline, Part};
 use crate::table::columns::columns;
 use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Dataset;
@@ -43,18 +43,23 @@ pub enum Again {
     CutOff,
 }
 
-/// What is done and what is spilled, as the names in a directory said at one instant.
+/// Parts that are a worker's to take, and what of them is done and spilled, as the names in a directory said at one instant.
 #[derive(Debug)]
 pub struct Pending<'a> {
-    results: &'a Results<'a>,
+    pub results: &'a Results<'a>,
+    /// In plan order.
+    pub parts: &'a [Outline],
+    /// Whether failed jobs are to be run again.
+    pub retry_failed: bool,
     pub done: DoneParts,
     /// Looked up again, since workers that end spill.
     spilled: RefCell<HashSet<PartName>>,
 }
 
 impl<'a> Pending<'a> {
-    pub fn look_up(results: &'a Results<'a>) -> Result<Self, ResultsError> {
-        let pending = Self { results, done: results.done_parts()?, spilled: RefCell::default() };
+    pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
+        let done = results.done_parts()?;
+        let pending = Self { results, parts, retry_failed, done, spilled: RefCell::default() };
         pending.look_at_spill()?;
         Ok(pending)
     }
@@ -65,10 +70,14 @@ impl<'a> Pending<'a> {
         Ok(())
     }
 
-    /// Whether jobs of parts that are done may have been cut off.
-    pub fn may_have_cut_off(&self) -> bool {
+    pub fn part(&self, outline: &Outline) -> Part {
+        self.results.plan().part(outline)
+    }
+
+    /// Whether a part that is done may have jobs to be run: failed ones, or such as a shorter time has cut off.
+    pub fn may_run_again(&self) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
-        self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
+        self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
     /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its
