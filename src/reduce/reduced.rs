@@ -5,6 +5,7 @@ use super::{BackboneBin, HistogramBin, Point, SetRow, reduce};
 use crate::results::layout::Layout;
 use crate::results::tables::JOBS;
 use crate::results::{ErrorKind, Results, ResultsError};
+use crate::table::checksum::hexadecimal;
 use crate::table::columns::{FromRow, Table};
 use crate::table::file::{Dataset, footer};
 use crate::table::storage::StorageError;
@@ -25,7 +26,7 @@ pub(super) fn source(results: &Results<'_>) -> Result<String, StorageError> {
         digest.update(name.as_encoded_bytes());
         digest.update(storage.length(&folder.join(&name))?.to_le_bytes());
     }
-    Ok(digest.finalize().iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")))
+    Ok(hexadecimal(&digest.finalize()))
 }
 
 /// A directory whose reduced data are of its tables. They lie elsewhere, as long as this lives, where nothing can be written.

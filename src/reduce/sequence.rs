@@ -141,7 +141,7 @@ fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
     })
 }
 
-fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
+pub(super) fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
     sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
 }
 
