@@ -11,8 +11,7 @@
 pub(super) mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
-use crate::results::layout::Layout;
-use crate::results::settled::settled;
+use crate::results::layout::{Layout, settled};
 use crate::results::tables::{JOBS, recorded_schema, tables_of};
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;

@@ -13,7 +13,6 @@
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
 //!   export.rs                 a few large files for other tools
-//! settled.rs                  waiting for what a network disk does not show yet
 //! ```
 
 pub mod claims;
@@ -26,7 +25,6 @@ pub mod layout;
 pub mod parts;
 pub mod pending;
 pub mod rounds;
-mod settled;
 pub mod tables;
 pub mod verify;
 pub mod workers;

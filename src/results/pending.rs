@@ -11,8 +11,7 @@
 //! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
 
 use crate::results::directory::Results;
-use crate::results::layout::{DoneParts, PartName};
-use crate::results::settled::settled;
+use crate::results::layout::{DoneParts, PartName, settled};
 use crate::results::tables::{self, JobOutcome, RowOfJob};
 use crate::sweep::{Extension, Outline, Part};
 use crate::table::columns::columns;

@@ -76,7 +76,7 @@ impl Results<'_> {
             return Ok(Some(current));
         }
         let round = decide(&current)?;
-        let next = current.in_next_round(round).write_last(member)?;
+        let next = current.followed_by(current.sweep(), Some(round), None).write_last(member)?;
         // Without locks, another may have been first.
         next.map_or_else(|| Self::read(layout), Ok).map(Some)
     }

@@ -80,14 +80,12 @@ impl Worker {
     }
 }
 
-const UNKNOWN_HOST: &str = "unknown";
-
 /// Name of this host, or "unknown".
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
     let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
-    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
+    name.unwrap_or_else(|| "unknown".to_owned())
 }
 
 /// The boot of the kernel and the name space of processes.

@@ -169,7 +169,9 @@ impl Joined<'_> {
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
-            self.claim_next_reduction()?;
+            // The reduction after these jobs: what another reduces meanwhile, or has reduced, lacks them.
+            let mut claims = Claims::list(member)?;
+            while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         }
         if report.jobs_left > 0 {
             let walltime = Walltime::new(begin, options.walltime);
@@ -250,14 +252,6 @@ impl Joined<'_> {
         };
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))
-    }
-
-    /// Claims the reduction for one that comes after the jobs that this worker runs again: what another reduces
-    /// meanwhile, or has reduced, lacks them.
-    fn claim_next_reduction(&self) -> Result<(), ResultsError> {
-        let mut claims = Claims::list(self.member)?;
-        while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
-        Ok(())
     }
 }
 

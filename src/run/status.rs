@@ -144,11 +144,14 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
         }
     })?;
     overview.jobs_kept = jobs_kept(&pending);
-    let mut last_threads = None;
-    results.events(|event| {
-        if let RunEvent::Started { threads, .. } = event {
-            last_threads = Some(threads);
+    let (mut last_threads, mut predicted, mut measured) = (None, 0.0, 0.0);
+    results.events(|event| match event {
+        RunEvent::Started { threads, .. } => last_threads = Some(threads),
+        RunEvent::PartCommitted { predicted_cost, wall, .. } => {
+            predicted += predicted_cost;
+            measured += wall;
         }
+        _ => (),
     })?;
     let now = SystemTime::now();
     let present = |Living { worker, beat, .. }| {
@@ -161,7 +164,7 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
     } else {
         Some(workers.iter().map(|present| present.worker.threads).fold(0, usize::saturating_add))
     };
-    let pace = results.pace()?;
+    let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {
         name: results.sweep().name().to_owned(),
         overview,
