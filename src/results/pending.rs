@@ -101,13 +101,6 @@ columns! {
     }
 }
 
-/// A spilled file, and the ids of the jobs of its rows.
-struct Spilled {
-    /// Whether it is there and not damaged.
-    is_whole: bool,
-    ids: HashSet<String>,
-}
-
 impl Results<'_> {
     /// The jobs of a part that is done which failed or were cut off. Those of values that the sweep no longer has stay as they are.
     fn again(&self, part: &Outline) -> Result<BTreeMap<usize, Again>, ResultsError> {
@@ -143,34 +136,26 @@ impl Results<'_> {
 
     /// Positions of the jobs of a part that are spilled: none if a file is damaged or gone, and they then run again.
     fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        let mut ids = HashSet::new();
+        let mut ids: HashSet<String> = HashSet::new();
         for table in self.tables() {
-            match settled(|| self.spilled_ids(table, outline))? {
-                Some(Spilled { is_whole: true, ids: of_table }) => ids = of_table,
-                _ => return Ok(BTreeSet::new()),
-            }
+            // Nothing yet if this host does not see a file that the folder lists, and no ids in one that is damaged.
+            let read = || {
+                let file = Dataset::new(self.layout().storage, vec![self.spilled_file(table, outline)]);
+                match file.rows::<RowOfJob>().collect::<Result<Vec<_>, _>>() {
+                    Ok(rows) => Ok(Some(Some(rows.into_iter().flatten().map(|row| row.job_id).collect()))),
+                    Err(ResultsError { kind: ErrorKind::Damaged, .. }) => Ok(Some(None)),
+                    Err(ResultsError { kind: ErrorKind::Disk(io::ErrorKind::NotFound), .. }) => {
+                        // Not listed: another worker has just committed the part.
+                        let is_listed = self.spilled_parts(table)?.contains(&outline.into());
+                        Ok((!is_listed).then_some(None))
+                    }
+                    Err(error) => Err(error),
+                }
+            };
+            let Some(of_table) = settled(read)?.flatten() else { return Ok(BTreeSet::new()) };
+            ids = of_table;
         }
         let part = self.plan().part(outline);
         Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(&part, position))).collect())
-    }
-
-    /// The spilled file of a part in a table; `None` if this host does not see a file that the folder lists.
-    fn spilled_ids(&self, table: &str, part: &Outline) -> Result<Option<Spilled>, ResultsError> {
-        let file = self.spilled_file(table, part);
-        let mut spilled = Spilled { is_whole: true, ids: HashSet::new() };
-        let nothing = || Spilled { is_whole: false, ids: HashSet::new() };
-        for batch in Dataset::new(self.layout().storage, vec![file]).rows::<RowOfJob>() {
-            match batch {
-                Ok(rows) => spilled.ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(ResultsError { kind: ErrorKind::Damaged, .. }) => return Ok(Some(nothing())),
-                Err(ResultsError { kind: ErrorKind::Disk(io::ErrorKind::NotFound), .. }) => {
-                    // Not listed: another worker has just committed the part.
-                    let is_listed = self.spilled_parts(table)?.contains(&part.into());
-                    return Ok((!is_listed).then(nothing));
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(Some(spilled))
     }
 }

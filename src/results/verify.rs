@@ -96,10 +96,7 @@ impl Verification {
 }
 
 /// A directory as its files and footers say that it was, and which of its extensions are to be written again.
-struct Salvaged<'a> {
-    results: Results<'a>,
-    lost: Vec<usize>,
-}
+type Salvaged<'a> = (Results<'a>, Vec<usize>);
 
 impl<'a> Results<'a> {
     /// Verifies a directory, whatever is damaged. Runs may be at work.
@@ -109,7 +106,7 @@ impl<'a> Results<'a> {
 
     /// Moves away what is damaged, so that the next run makes it again; returns what was found.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
-        let (Salvaged { results, lost }, verification) = examine(layout)?;
+        let ((results, lost), verification) = examine(layout)?;
         let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
         for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
             let below = path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path);
@@ -128,7 +125,7 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
     loop {
         let mut verification = Verification::default();
         let salvaged = salvage(layout, &mut verification.problems)?;
-        verify_parts(&salvaged.results, &mut verification)?;
+        verify_parts(&salvaged.0, &mut verification)?;
         for name in layout.storage.list(&layout.reduced())? {
             let path = layout.reduced().join(name);
             let damage = damage_in(footer(layout.storage, &path))?;
@@ -136,7 +133,7 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
         }
         verification.whole = verification.problems.is_empty();
         // A run may have added a sweep meanwhile, whose parts are then taken for strangers.
-        let is_settled = layout.listed_extensions()?.len() <= salvaged.results.extensions().len();
+        let is_settled = layout.listed_extensions()?.len() <= salvaged.0.extensions().len();
         if verification.whole || is_settled {
             return Ok((salvaged, verification));
         }
@@ -196,7 +193,7 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
     }
     let results = Results::new(layout, records)?;
     results.refuse(&results.version_differences(), "use the program that wrote it")?;
-    Ok(Salvaged { results, lost })
+    Ok((results, lost))
 }
 
 /// What the footers of an extension's parts say of it, after these records, if the file of the extension does not say the
