@@ -128,11 +128,11 @@ impl Backbone {
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        let all = (set.phases.1.count(), set.phases.1.total());
+        let all = (set.phases.1.count(), set.phases.1.total);
         bin.phases.push(all, &set.seeds, &set.phases, |deviation| deviation);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
-            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total());
+            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total);
             let error = |[dx, dy]: [f64; 2]| {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]

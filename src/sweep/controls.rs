@@ -23,7 +23,7 @@ impl Axis {
     /// What is left of it without modulation; `None` if nothing is.
     fn unmodulated(&self) -> Option<Self> {
         let Self::Table(table) = self else { return Some(self.clone()) };
-        let kept = table.columns().iter().filter(|column| !column.quantity.is_of_modulation());
+        let kept = table.columns.iter().filter(|column| !column.quantity.is_of_modulation());
         let kept: Vec<&Column> = kept.collect();
         let rows = kept.first()?.values.len();
         let mut seen = HashSet::new();
