@@ -248,4 +248,3 @@ macro_rules! side_by_side {
 
 side_by_side!(A, B);
 side_by_side!(A, B, C);
-side_by_side!(A, B, C, D);
