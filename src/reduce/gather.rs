@@ -104,18 +104,44 @@ impl<'a> Gathering<'a> {
     /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
     /// place in the table, and with what the drive alone explains.
     pub(super) fn each_set(
-        self,
+        mut self,
         max_slips: u64,
         spacing: u64,
         mut gathered: impl FnMut(Gathered, &Explained) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
-        for chunk in chunks(self.sets, max_slips) {
-            for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
+        for chunk in chunks(std::mem::take(&mut self.sets), max_slips) {
+            for set in self.slips_of(chunk, spacing)? {
                 let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
                 gathered(set, &explained)?;
             }
         }
         Ok(())
+    }
+
+    /// Reads all slips and keeps those of the wanted jobs of these sets.
+    fn slips_of(&self, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, ResultsError> {
+        let index: HashMap<String, usize> =
+            sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
+        let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
+        let (mut place, mut last, mut found) = (0, None, None);
+        for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
+            for (job, slip) in batch? {
+                let here = place;
+                place += 1;
+                if last.as_ref() != Some(&job) {
+                    let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
+                    found = index.get(&job.set_id).copied().filter(|&index| (self.is_wanted)(&of_job(&sets[index])));
+                    last = Some(job);
+                }
+                let (Some(index), Some(job)) = (found, &last) else { continue };
+                let set = &mut sets[index];
+                if here % spacing == 0 {
+                    set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
+                }
+                set.push(job.seed, &slip);
+            }
+        }
+        Ok(sets)
     }
 }
 
@@ -199,35 +225,4 @@ impl Gathered {
         explained.add_to(&mut set.row, &set.seeds);
         (set, self.points)
     }
-}
-
-/// Reads all slips and keeps those of the wanted jobs of these sets.
-fn slips_of(
-    files: Dataset<'_>,
-    sets: Vec<SetJobs>,
-    is_wanted: Wanted<'_>,
-    spacing: u64,
-) -> Result<Vec<Gathered>, ResultsError> {
-    let index: HashMap<String, usize> =
-        sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
-    let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
-    let (mut place, mut last, mut found) = (0, None, None);
-    for batch in files.rows::<(JobOfSlip, Slip)>() {
-        for (job, slip) in batch? {
-            let here = place;
-            place += 1;
-            if last.as_ref() != Some(&job) {
-                let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
-                found = index.get(&job.set_id).copied().filter(|&index| is_wanted(&of_job(&sets[index])));
-                last = Some(job);
-            }
-            let (Some(index), Some(job)) = (found, &last) else { continue };
-            let set = &mut sets[index];
-            if here % spacing == 0 {
-                set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
-            }
-            set.push(job.seed, &slip);
-        }
-    }
-    Ok(sets)
 }
