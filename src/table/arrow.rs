@@ -61,6 +61,7 @@ pub fn texts(rows: &RecordBatch) -> impl Iterator<Item = Vec<String>> {
     let text = |array: &ArrayRef, row: usize| match cell(array, row) {
         Value::Null => String::new(),
         Value::Real(real) => format!("{real:?}"),
+        Value::Count(count) => count.cast_signed().to_string(),
         other => other.to_string(),
     };
     (0..rows.num_rows()).map(move |row| rows.columns().iter().map(|array| text(array, row)).collect())
