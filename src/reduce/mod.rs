@@ -12,7 +12,6 @@ mod histogram;
 #[cfg(test)]
 mod pool;
 mod product_limit;
-mod quantile;
 mod reduced;
 mod reduction;
 mod rounds;
@@ -35,7 +34,7 @@ pub use gather::reduce_chosen;
 pub use histogram::HistogramBin;
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
-pub use quantile::quantile;
+pub use product_limit::quantile;
 pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};

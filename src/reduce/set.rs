@@ -3,8 +3,7 @@
 use super::PhaseLimits;
 use super::circular::unit;
 use super::gather::JobFacts;
-use super::product_limit::ProductLimit;
-use super::quantile::quantile;
+use super::product_limit::{ProductLimit, quantile};
 use super::sequence::{Estimate, Sequences};
 use crate::model::Parameters;
 use crate::model::selected::Selected;

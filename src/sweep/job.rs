@@ -1,9 +1,11 @@
-//! A job, and the names by which results know it.
+//! A job: the names by which results know it, and the command line that does the same, so that one that fails can be looked
+//! at alone.
 //!
 //! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver, recording
 //! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So what is
 //! added later changes no id. Contract: pinned by known-answer tests, and so are the defaults.
 
+use super::grid::Sweep;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::Solver;
@@ -25,7 +27,7 @@ pub struct Job {
 const ID_BYTES: usize = 16;
 
 /// Keys and values of the solver, as a sweep file writes them: they read back to the same bits.
-pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
+fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
     match solver {
         Solver::EventDriven { tolerance, resolve } => vec![
             ("method", "event-driven".to_owned()),
@@ -35,6 +37,29 @@ pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
         Solver::FixedStep { time_step } => {
             vec![("method", "fixed-step".to_owned()), ("dt", Shortest(time_step).to_string())]
         }
+    }
+}
+
+impl Sweep {
+    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
+    /// that read back to the same bits.
+    pub fn command(&self, job: &Job) -> String {
+        let mut words = vec!["stickslip simulate".to_owned()];
+        let defaults = Parameters::default();
+        let parameters = Symbol::ALL.into_iter().map(|symbol| (symbol, job.parameters.get(symbol)));
+        let parameters = parameters.filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
+        words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
+        // Its default is another there.
+        words.push(format!("--slips {}", self.recording.slips));
+        // A single job has no control.
+        let defaults =
+            Recording { slips: self.recording.slips, control: self.recording.control, ..Recording::default() };
+        let recording = RecordingKey::ALL.into_iter().filter(|&key| self.recording.get(key) != defaults.get(key));
+        words.extend(recording.map(|key| format!("--record {}={}", key.key(), self.recording.get(key))));
+        let defaults = solver_settings(Solver::default());
+        let settings = solver_settings(self.solver).into_iter().filter(|setting| !defaults.contains(setting));
+        words.extend(settings.map(|(key, value)| format!("--set {key}={value}")));
+        words.join(" ")
     }
 }
 

@@ -18,7 +18,6 @@
 mod adaptive;
 mod axes;
 mod checks;
-mod command;
 mod controls;
 mod cost;
 mod expression;
