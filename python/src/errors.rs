@@ -5,7 +5,6 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use stickslip::run::threads::ThreadsError;
 use stickslip::simulate::{RequestError, mistakes_in};
-use stickslip::table::file::DatasetError;
 
 create_exception!(
     stickslip,
@@ -88,6 +87,5 @@ of_results!(
     stickslip::results::ResultsError,
     stickslip::table::storage::StorageError,
     arrow_schema::ArrowError,
-    DatasetError,
     anyhow::Error
 );

@@ -21,7 +21,7 @@ use stickslip::results::tables::{JOBS, JobRow, PRECURSORS, SLIPS, recorded_schem
 use stickslip::results::{Results, ResultsError};
 use stickslip::table::arrow::schema;
 use stickslip::table::columns::Table as TableRow;
-use stickslip::table::file::{Dataset, DatasetError};
+use stickslip::table::file::Dataset;
 use stickslip::table::storage::Disk;
 
 /// The column by which tables of jobs are joined.
@@ -152,7 +152,7 @@ impl Wanted {
         for batch in files.columns(&own) {
             interruptible(stop)?;
             let batch = batch?;
-            let damaged = |problem: String| DatasetError::damaged(&batch.path)(problem);
+            let damaged = |problem: String| ResultsError::damaged(&batch.path, problem);
             let rows = jobs.as_ref().map(|jobs| jobs.rows(&batch.rows)).transpose().map_err(damaged)?;
             let column = |field: &Field| -> Result<ArrayRef, Error> {
                 let name = field.name();

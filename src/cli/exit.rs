@@ -6,7 +6,6 @@ use crate::results::{ErrorKind, ResultsError};
 use crate::run::threads::ThreadsError;
 use crate::solver::SimulationError;
 use crate::sweep::SweepError;
-use crate::table::file::DatasetError;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
@@ -42,16 +41,10 @@ impl Exit {
                 _ => Self::Failed,
             });
         }
-        if let Some(error) = cause.downcast_ref::<ResultsError>() {
-            return match error.kind {
-                ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
-                ErrorKind::Damaged => Some(Self::Damaged),
-                ErrorKind::Disk | ErrorKind::Stopped => None,
-            };
-        }
-        match cause.downcast_ref::<DatasetError>() {
-            Some(DatasetError::Damaged { .. } | DatasetError::Stray { .. }) => Some(Self::Damaged),
-            _ => None,
+        match cause.downcast_ref::<ResultsError>()?.kind {
+            ErrorKind::Refused | ErrorKind::Busy => Some(Self::Usage),
+            ErrorKind::Damaged => Some(Self::Damaged),
+            ErrorKind::Disk(_) | ErrorKind::Stopped => None,
         }
     }
 }

@@ -117,20 +117,14 @@ pub struct Interval {
 /// Two columns, `NAME_low` and `NAME_high`; the meaning is that of the first.
 impl Part for Option<Interval> {
     fn columns_as(name: &'static str, unit: &'static str, meaning: &'static str) -> Vec<Column> {
-        [("_low", meaning), ("_high", "upper end")]
-            .map(|(end, meaning)| Column {
-                name: format!("{name}{end}").into(),
-                unit,
-                meaning,
-                kind: Kind::Real,
-                nullable: true,
-            })
-            .to_vec()
+        let column =
+            |name: String, meaning| Column { name: name.into(), unit, meaning, kind: Kind::Real, nullable: true };
+        vec![column(format!("{name}_low"), meaning), column(format!("{name}_high"), "upper end")]
     }
 
     fn give(&self, give: &mut dyn FnMut(Value<'_>)) {
-        give(self.map_or(Value::Null, |interval| Value::Real(interval.low)));
-        give(self.map_or(Value::Null, |interval| Value::Real(interval.high)));
+        give(self.map(|interval| interval.low).value());
+        give(self.map(|interval| interval.high).value());
     }
 
     fn take<'a>(name: &str, next: &mut dyn FnMut() -> Value<'a>) -> Result<Self, String> {
@@ -254,4 +248,3 @@ macro_rules! side_by_side {
 
 side_by_side!(A, B);
 side_by_side!(A, B, C);
-side_by_side!(A, B, C, D);

@@ -135,57 +135,34 @@ pub trait Field: Sized {
     fn from_value(value: Value<'_>) -> Option<Self>;
 }
 
-impl Field for f64 {
-    const KIND: Kind = Kind::Real;
+/// Types of fields: their kind, and how they are read from values.
+macro_rules! fields {
+    ($($type:ty as $kind:ident($own:ident => $held:expr) from $value:ident => $read:expr;)*) => {$(
+        impl Field for $type {
+            const KIND: Kind = Kind::$kind;
 
-    fn value(&self) -> Value<'static> {
-        Value::Real(*self)
-    }
+            fn value(&self) -> Value<'static> {
+                let $own = *self;
+                Value::$kind($held)
+            }
 
-    fn from_value(value: Value<'_>) -> Option<Self> {
-        value.number()
-    }
-}
-
-impl Field for u64 {
-    const KIND: Kind = Kind::Count;
-
-    fn value(&self) -> Value<'static> {
-        Value::Count(*self)
-    }
-
-    fn from_value(value: Value<'_>) -> Option<Self> {
-        match value {
-            Value::Count(count) => Some(count),
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked by the guard")]
-            Value::Real(real) if (0.0..=MAX_EXACT).contains(&real) && real.fract() == 0.0 => Some(real as Self),
-            _ => None,
+            fn from_value($value: Value<'_>) -> Option<Self> {
+                $read
+            }
         }
-    }
+    )*};
 }
 
-impl Field for usize {
-    const KIND: Kind = Kind::Count;
-
-    fn value(&self) -> Value<'static> {
-        Value::Count(*self as u64)
-    }
-
-    fn from_value(value: Value<'_>) -> Option<Self> {
-        u64::from_value(value)?.try_into().ok()
-    }
-}
-
-impl Field for bool {
-    const KIND: Kind = Kind::Flag;
-
-    fn value(&self) -> Value<'static> {
-        Value::Flag(*self)
-    }
-
-    fn from_value(value: Value<'_>) -> Option<Self> {
-        if let Value::Flag(flag) = value { Some(flag) } else { None }
-    }
+fields! {
+    f64 as Real(own => own) from value => value.number();
+    u64 as Count(own => own) from value => match value {
+        Value::Count(count) => Some(count),
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked by the guard")]
+        Value::Real(real) if (0.0..=MAX_EXACT).contains(&real) && real.fract() == 0.0 => Some(real as Self),
+        _ => None,
+    };
+    usize as Count(own => own as u64) from value => u64::from_value(value)?.try_into().ok();
+    bool as Flag(own => own) from value => if let Value::Flag(flag) = value { Some(flag) } else { None };
 }
 
 impl<T: Field> Field for Option<T> {

@@ -2,7 +2,7 @@
 
 use super::PhaseLimits;
 use super::circular::unit;
-use super::sequence::{Estimate, Sequences};
+use super::sequence::{Estimate, Sequences, add};
 use super::set::{FinishedSet, OfSet};
 use crate::model::theory::{minimum_phase, minimum_phase_asymptote};
 use crate::table::columns::{columns, tables};
@@ -77,14 +77,14 @@ impl Together {
         error: impl Fn([f64; 2]) -> [f64; 2],
     ) {
         self.count += count;
-        self.total = plus(self.total, total);
+        add(&mut self.total, &total);
         for (&seed, job) in seeds.iter().zip(of_set.0.jobs()) {
             let sums = self.deviations.entry(seed).or_default();
             sums.resize(sums.len().max(job.len()), [0.0; 2]);
             for (sum, &deviation) in sums.iter_mut().zip(job) {
                 let error = error(deviation);
                 self.squares += square(error);
-                *sum = plus(*sum, error);
+                add(sum, &error);
             }
         }
     }
@@ -94,10 +94,6 @@ impl Together {
         let excess = if self.squares > 0.0 { squares / self.squares } else { 1.0 };
         Sequences::of(self.deviations.into_values()).estimate().of_sums((self.count, self.total), excess)
     }
-}
-
-fn plus(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
-    [one[0] + other[0], one[1] + other[1]]
 }
 
 fn square([x, y]: [f64; 2]) -> f64 {
@@ -132,11 +128,11 @@ impl Backbone {
         let Some(phase) = set.row.phase_mean else { return };
         let bin = self.bins.entry(bin_of(set.row.eta)).or_default();
         bin.sets += 1;
-        let all = (set.phases.1.count(), set.phases.1.total());
+        let all = (set.phases.1.count(), set.phases.1.total);
         bin.phases.push(all, &set.seeds, &set.phases, |deviation| deviation);
         if set.row.has_phase {
             // The mean direction is off by the deviations across it, over the length of their sum.
-            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total());
+            let ([x, y], [sum_x, sum_y]) = (unit(phase), set.phases.1.total);
             let error = |[dx, dy]: [f64; 2]| {
                 let angle = (x * dy - y * dx) / libm::hypot(sum_x, sum_y);
                 [-y * angle, x * angle]

@@ -129,9 +129,13 @@ fn cosine_integral(angle: f64, nu: f64) -> f64 {
     const STEPS: u32 = 32;
     let step = angle / f64::from(STEPS);
     let value = |index: u32| libm::pow(libm::cos(f64::from(index) * step), nu - 1.0);
-    let weighted =
-        |index| value(index) * if index == 0 || index == STEPS { 1.0 } else { f64::from(2 + 2 * (index % 2)) };
-    step / 3.0 * (0..=STEPS).map(weighted).sum::<f64>()
+    simpson(STEPS, step, value)
+}
+
+/// Integral by Simpson's rule of a function that has these values at an even number of steps of this width.
+pub(super) fn simpson(steps: u32, width: f64, value: impl Fn(u32) -> f64) -> f64 {
+    let weighted = |step| value(step) * if step == 0 || step == steps { 1.0 } else { f64::from(2 + 2 * (step % 2)) };
+    width / 3.0 * (0..=steps).map(weighted).sum::<f64>()
 }
 
 #[cfg(test)]

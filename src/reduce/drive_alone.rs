@@ -10,10 +10,11 @@ use super::circular::unit;
 use super::sequence::{Estimate, Sequences};
 use crate::model::{Drive, Parameters};
 use crate::observe::phase;
+use crate::results::ResultsError;
 use crate::results::tables::JobOfSlip;
 use crate::sweep::{SetRow, Sweep};
 use crate::table::columns::{Interval, columns};
-use crate::table::file::{Dataset, DatasetError};
+use crate::table::file::Dataset;
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::TAU;
 
@@ -36,7 +37,7 @@ impl Controls {
         slips: Dataset<'_>,
         sweep: &Sweep,
         sets: impl Iterator<Item = &'a Parameters>,
-    ) -> Result<Self, DatasetError> {
+    ) -> Result<Self, ResultsError> {
         let mut controls: HashMap<String, BTreeMap<u64, Vec<Onset>>> =
             sets.filter_map(|set| Some((sweep.control_of(set)?, BTreeMap::new()))).collect();
         if controls.is_empty() {

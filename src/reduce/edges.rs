@@ -15,10 +15,9 @@ use super::drive_alone::Explained;
 use super::gather::{Gathered, each_chosen};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
-use crate::results::Results;
+use crate::results::{Results, ResultsError};
 use crate::sweep::{AllButSeed, Refinement, Statistic, Sweep, label, three_digits};
 use crate::table::columns::{Interval, columns, tables};
-use crate::table::file::DatasetError;
 use crate::table::value::words;
 use std::collections::BTreeMap;
 
@@ -302,7 +301,7 @@ fn scale(sweep: &Sweep, refinement: &Refinement) -> Option<(f64, f64)> {
 }
 
 /// The table of edges of a directory.
-pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, DatasetError> {
+pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Result<Vec<EdgeRow>, ResultsError> {
     let (sweep, sets) = (results.sweep(), sets_of_edges(results, refinement)?);
     let Some((first, step)) = scale(sweep, refinement) else { return Ok(Vec::new()) };
     let is_over = results.rounds_so_far().is_none_or(|rounds| rounds.is_over);
@@ -350,7 +349,7 @@ pub(super) fn edge_rows(results: &Results<'_>, refinement: &Refinement) -> Resul
 pub fn sets_of_edges(
     results: &Results<'_>,
     refinement: &Refinement,
-) -> Result<BTreeMap<u64, SetOfEdges>, DatasetError> {
+) -> Result<BTreeMap<u64, SetOfEdges>, ResultsError> {
     let mut sets = BTreeMap::new();
     each_chosen(results, |number, set, explained| drop(sets.insert(number, of_set(&set, explained, refinement))))?;
     Ok(sets)

@@ -14,12 +14,12 @@ use super::set::{FinishedSet, SetJobs, SetRow, SetSlips};
 use crate::model::selected::Selected;
 use crate::model::{Parameters, Symbol, Value};
 use crate::observe::{Regime, Slip};
-use crate::results::Results;
 use crate::results::parts::committed_files;
 use crate::results::tables::{All, JOBS, JobOfSlip, JobOutcome, SLIPS};
+use crate::results::{Results, ResultsError};
 use crate::sweep::Sweep;
 use crate::table::columns::columns;
-use crate::table::file::{Dataset, DatasetError};
+use crate::table::file::Dataset;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 
@@ -52,7 +52,7 @@ columns! {
 type Wanted<'a> = &'a dyn Fn(&Parameters) -> bool;
 
 /// The sets that the rounds of a directory have chosen, by their numbers, controls left out: of the chosen jobs alone.
-pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, DatasetError> {
+pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, ResultsError> {
     let mut rows = BTreeMap::new();
     each_chosen(results, |number, set, explained| drop(rows.insert(number, set.finish_with(explained).0.row)))?;
     Ok(rows)
@@ -62,7 +62,7 @@ pub fn reduce_chosen(results: &Results<'_>) -> Result<BTreeMap<u64, SetRow>, Dat
 pub(super) fn each_chosen(
     results: &Results<'_>,
     mut gathered: impl FnMut(u64, Gathered, &Explained),
-) -> Result<(), DatasetError> {
+) -> Result<(), ResultsError> {
     let (sweep, chosen) = (results.sweep(), results.chosen());
     let is_chosen = |parameters: &Parameters| sweep.find(parameters).is_some_and(|point| chosen.has(point));
     Gathering::of_jobs(results, &is_chosen)?.each_set(MAX_SLIPS, u64::MAX, |set, explained| {
@@ -84,7 +84,7 @@ pub(super) struct Gathering<'a> {
 
 impl<'a> Gathering<'a> {
     /// The sets of the wanted jobs, in the order of their parameters.
-    pub(super) fn of_jobs(results: &'a Results<'a>, is_wanted: Wanted<'a>) -> Result<Self, DatasetError> {
+    pub(super) fn of_jobs(results: &'a Results<'a>, is_wanted: Wanted<'a>) -> Result<Self, ResultsError> {
         let (layout, sweep) = (results.layout(), results.sweep());
         // Listed once: what other runs commit meanwhile is left out as a whole.
         let jobs = layout.dataset(JOBS)?;
@@ -104,18 +104,44 @@ impl<'a> Gathering<'a> {
     /// Hands on set after set before anything is computed, each with every `spacing`-th slip of the table as a point and its
     /// place in the table, and with what the drive alone explains.
     pub(super) fn each_set(
-        self,
+        mut self,
         max_slips: u64,
         spacing: u64,
-        mut gathered: impl FnMut(Gathered, &Explained) -> Result<(), DatasetError>,
-    ) -> Result<(), DatasetError> {
-        for chunk in chunks(self.sets, max_slips) {
-            for set in slips_of(self.slips.clone(), chunk, self.is_wanted, spacing)? {
+        mut gathered: impl FnMut(Gathered, &Explained) -> Result<(), ResultsError>,
+    ) -> Result<(), ResultsError> {
+        for chunk in chunks(std::mem::take(&mut self.sets), max_slips) {
+            for set in self.slips_of(chunk, spacing)? {
                 let explained = self.controls.explain(self.sweep, &set.jobs.parameters);
                 gathered(set, &explained)?;
             }
         }
         Ok(())
+    }
+
+    /// Reads all slips and keeps those of the wanted jobs of these sets.
+    fn slips_of(&self, sets: Vec<SetJobs>, spacing: u64) -> Result<Vec<Gathered>, ResultsError> {
+        let index: HashMap<String, usize> =
+            sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
+        let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
+        let (mut place, mut last, mut found) = (0, None, None);
+        for batch in self.slips.clone().rows::<(JobOfSlip, Slip)>() {
+            for (job, slip) in batch? {
+                let here = place;
+                place += 1;
+                if last.as_ref() != Some(&job) {
+                    let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
+                    found = index.get(&job.set_id).copied().filter(|&index| (self.is_wanted)(&of_job(&sets[index])));
+                    last = Some(job);
+                }
+                let (Some(index), Some(job)) = (found, &last) else { continue };
+                let set = &mut sets[index];
+                if here % spacing == 0 {
+                    set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
+                }
+                set.push(job.seed, &slip);
+            }
+        }
+        Ok(sets)
     }
 }
 
@@ -123,7 +149,7 @@ pub(super) fn each_job(
     files: &Dataset<'_>,
     is_wanted: Wanted<'_>,
     mut job: impl FnMut(JobOfSet, Parameters),
-) -> Result<(), DatasetError> {
+) -> Result<(), ResultsError> {
     for batch in files.clone().rows::<(JobOfSet, Selected<All>)>() {
         let wanted = batch?.into_iter().filter(|(_, of_job)| is_wanted(&of_job.parameters));
         wanted.for_each(|(facts, Selected { parameters, .. })| job(facts, parameters));
@@ -199,35 +225,4 @@ impl Gathered {
         explained.add_to(&mut set.row, &set.seeds);
         (set, self.points)
     }
-}
-
-/// Reads all slips and keeps those of the wanted jobs of these sets.
-fn slips_of(
-    files: Dataset<'_>,
-    sets: Vec<SetJobs>,
-    is_wanted: Wanted<'_>,
-    spacing: u64,
-) -> Result<Vec<Gathered>, DatasetError> {
-    let index: HashMap<String, usize> =
-        sets.iter().enumerate().map(|(index, set)| (set.set_id.clone(), index)).collect();
-    let mut sets: Vec<Gathered> = sets.into_iter().map(Gathered::new).collect();
-    let (mut place, mut last, mut found) = (0, None, None);
-    for batch in files.rows::<(JobOfSlip, Slip)>() {
-        for (job, slip) in batch? {
-            let here = place;
-            place += 1;
-            if last.as_ref() != Some(&job) {
-                let of_job = |set: &Gathered| Parameters { seed: job.seed, ..set.jobs.parameters.clone() };
-                found = index.get(&job.set_id).copied().filter(|&index| is_wanted(&of_job(&sets[index])));
-                last = Some(job);
-            }
-            let (Some(index), Some(job)) = (found, &last) else { continue };
-            let set = &mut sets[index];
-            if here % spacing == 0 {
-                set.points.push((here, Point::of(&set.jobs.parameters, &slip)));
-            }
-            set.push(job.seed, &slip);
-        }
-    }
-    Ok(sets)
 }

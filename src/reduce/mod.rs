@@ -12,16 +12,12 @@ mod histogram;
 #[cfg(test)]
 mod pool;
 mod product_limit;
-mod quantile;
 mod reduced;
 mod reduction;
 mod rounds;
 mod sample;
 mod sequence;
 mod set;
-mod slip_stats;
-mod source;
-mod statistic;
 mod swept;
 mod values;
 
@@ -38,13 +34,12 @@ pub use gather::reduce_chosen;
 pub use histogram::HistogramBin;
 #[cfg(test)]
 pub(crate) use pool::{Pool, PooledJob};
-pub use quantile::quantile;
-pub use reduced::{advise, read_reduced, read_sets};
+pub use product_limit::quantile;
+pub use reduced::{Renewed, advise, read_reduced, read_sets, renew};
 pub(crate) use reduction::WRITER;
 pub use reduction::{NoJobs, ReductionSummary, reduce};
 pub use rounds::SetInRounds;
 pub use sample::{Point, RampStage};
-pub use source::{Renewed, renew};
 pub use swept::{Swept, ascending, differing, has_even_steps, is_same, swept};
 pub use values::{FREQUENCY, Values, set_columns, sets_where};
 

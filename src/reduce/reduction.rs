@@ -5,10 +5,10 @@ use super::backbone::{Backbone, BackboneBin};
 use super::edges::{EdgeRow, edge_rows};
 use super::gather::{Gathering, MAX_SLIPS};
 use super::histogram::{HistogramBin, histogram};
+use super::reduced::{SOURCE, source};
 use super::rounds::SetWriter;
 use super::sample::{Point, spacing};
 use super::set::SetRow;
-use super::source::{SOURCE, source};
 use crate::results::Results;
 use crate::results::commit::{Commit, exclusive_lock};
 use crate::results::tables::JOBS;
@@ -30,7 +30,7 @@ pub struct NoJobs {
 }
 
 /// What a reduction found, in brief.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReductionSummary {
     /// Jobs run to an end.
     pub jobs: u64,
@@ -78,11 +78,7 @@ fn stage<'a>(results: &Results<'a>, max_slips: u64) -> Result<(Commit<'a>, Reduc
     let mut summary = ReductionSummary {
         jobs: all_jobs.iter().map(|set| set.finished).sum(),
         failed_jobs: all_jobs.iter().map(|set| set.failed).sum(),
-        sets: 0,
-        phased_sets: 0,
-        slips: 0,
-        points: 0,
-        backbone: Vec::new(),
+        ..ReductionSummary::default()
     };
 
     layout.ensure_folder(&layout.reduced())?;

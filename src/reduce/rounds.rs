@@ -2,10 +2,10 @@
 //! as is wanted.
 
 use super::set::SetRow;
-use crate::results::Results;
-use crate::sweep::{Precision, Sweep};
-use crate::table::columns::{columns, tables};
-use crate::table::file::{DatasetError, Footer, TableWriter};
+use crate::results::{Results, ResultsError};
+use crate::sweep::Sweep;
+use crate::table::columns::{Row, columns, tables};
+use crate::table::file::{Footer, TableWriter};
 use crate::table::storage::StoredFile;
 use std::collections::HashMap;
 
@@ -31,22 +31,18 @@ pub type SetInRounds = (SetRow, RoundOfSet);
 tables! { SetInRounds = SetRow::NAME, SetRow::MEANING; }
 
 /// Writes the table of sets, with the columns that the sweep asks for.
-pub(super) enum SetWriter<'a> {
-    Plain(TableWriter<SetRow>),
-    InRounds(TableWriter<SetInRounds>, Rounds<'a>),
-}
-
-/// What the rounds of a sweep have chosen.
-pub(super) struct Rounds<'a> {
+pub(super) struct SetWriter<'a> {
+    writer: TableWriter<SetInRounds>,
     sweep: &'a Sweep,
-    precision: Option<&'a Precision>,
+    /// How the sets that the rounds have chosen came about, by their numbers.
     of_sets: HashMap<u64, RoundOfSet>,
 }
 
 impl<'a> SetWriter<'a> {
-    pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
+    pub(super) fn new(results: &'a Results<'a>, file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
         let sweep = results.sweep();
-        let Some(rounds) = sweep.rounds() else { return Ok(Self::Plain(TableWriter::new(file, footer)?)) };
+        let left_out = if sweep.rounds().is_some() { Vec::new() } else { RoundOfSet::columns() };
+        let left_out: Vec<_> = left_out.into_iter().map(|column| column.name).collect();
         let mut of_sets: HashMap<u64, RoundOfSet> = HashMap::new();
         for (round, extension) in (1..).zip(results.rounds()) {
             let points = extension.round.iter().flat_map(|round| round.points.iter().cloned().flatten());
@@ -57,26 +53,21 @@ impl<'a> SetWriter<'a> {
                 *of_set.seeds.get_or_insert(0) += 1;
             }
         }
-        let rounds = Rounds { sweep, precision: rounds.precision.as_ref(), of_sets };
-        Ok(Self::InRounds(TableWriter::new(file, footer)?, rounds))
+        Ok(Self { writer: TableWriter::without(&left_out, file, footer)?, sweep, of_sets })
     }
 
-    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), DatasetError> {
-        match self {
-            Self::Plain(writer) => writer.push(row),
-            Self::InRounds(writer, Rounds { sweep, precision, of_sets }) => {
-                let number = sweep.set_with(&row.parameters.parameters);
-                let error = precision.and_then(|precision| row.error_over_target(precision));
-                let round = number.and_then(|set| of_sets.get(&set)).cloned().unwrap_or_default();
-                writer.push(&(row.clone(), RoundOfSet { target_met: error.map(|error| error <= 1.0), ..round }))
-            }
+    pub(super) fn push(&mut self, row: &SetRow) -> Result<(), ResultsError> {
+        let mut of_set = RoundOfSet::default();
+        if let Some(rounds) = self.sweep.rounds() {
+            let number = self.sweep.set_with(&row.parameters.parameters);
+            of_set = number.and_then(|set| self.of_sets.get(&set)).cloned().unwrap_or_default();
+            let error = rounds.precision.as_ref().and_then(|precision| row.error_over_target(precision));
+            of_set.target_met = error.map(|error| error <= 1.0);
         }
+        self.writer.push(&(row.clone(), of_set))
     }
 
-    pub(super) fn finish(self) -> Result<(), DatasetError> {
-        match self {
-            Self::Plain(writer) => writer.finish().map(drop),
-            Self::InRounds(writer, _) => writer.finish().map(drop),
-        }
+    pub(super) fn finish(self) -> Result<(), ResultsError> {
+        self.writer.finish()
     }
 }

@@ -141,7 +141,7 @@ fn sum<const D: usize>(values: &[[f64; D]]) -> [f64; D] {
     })
 }
 
-fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
+pub(super) fn add<const D: usize>(sum: &mut [f64; D], value: &[f64; D]) {
     sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value);
 }
 
@@ -179,7 +179,7 @@ impl<const D: usize> Matrix<D> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<const D: usize> {
     count: u64,
-    total: [f64; D],
+    pub(super) total: [f64; D],
     /// Covariances of the sum, of which the larger counts in any direction: of independent values and with
     /// autocorrelation; or twice that of many jobs.
     covariances: [Matrix<D>; 2],
@@ -203,10 +203,6 @@ impl<const D: usize> Estimate<D> {
     /// `excess` is the variance of the sums over that of independent deviations.
     pub(super) fn of_sums(self, (count, total): (u64, [f64; D]), excess: f64) -> Self {
         Self { count, total, inflation: (excess * self.inflation).max(1.0), ..self }
-    }
-
-    pub(super) const fn total(&self) -> [f64; D] {
-        self.total
     }
 
     pub(super) const fn count(&self) -> u64 {

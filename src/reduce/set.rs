@@ -3,10 +3,8 @@
 use super::PhaseLimits;
 use super::circular::unit;
 use super::gather::JobFacts;
-use super::product_limit::ProductLimit;
-use super::quantile::quantile;
+use super::product_limit::{ProductLimit, quantile};
 use super::sequence::{Estimate, Sequences};
-use super::slip_stats::{SlipStats, non_nan};
 use crate::model::Parameters;
 use crate::model::selected::Selected;
 use crate::model::theory::{finite_resultant, random_load_mean};
@@ -79,6 +77,47 @@ impl SetJobs {
         let pseudo = self.averages.values().map(|job| [average + (of(job) - average) * job.time * weight]);
         Sequences::independent(pseudo.collect()).estimate()
     }
+}
+
+/// What is kept of a slip until its set is whole. Missing values are NaN, so that a slip takes 40 bytes.
+#[derive(Clone, Copy, Debug)]
+struct SlipStats {
+    /// Interval before it, in s.
+    interval: f64,
+    /// The interval in periods of the modulation at its end.
+    periods: f64,
+    phase: f64,
+    load_phase: f64,
+    /// Stress drop, in N; missing of a slip that is still to come when its job ends.
+    drop: f64,
+}
+
+impl SlipStats {
+    fn of(slip: &Slip, limits: &PhaseLimits) -> Self {
+        let or_missing = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        Self {
+            interval: or_missing(slip.interval),
+            periods: or_missing(slip.interval.zip(slip.modulation.period).map(|(interval, period)| interval / period)),
+            phase: or_missing(slip.phase),
+            load_phase: or_missing(slip.phase.and_then(|phase| limits.load_phase(phase))),
+            drop: slip.drop,
+        }
+    }
+
+    /// Of a slip that would have come after its job ended: what its interval is at least.
+    fn to_come(interval: f64, period: Option<f64>) -> Self {
+        let periods = period.map_or(f64::NAN, |period| interval / period);
+        Self { interval, periods, phase: f64::NAN, load_phase: f64::NAN, drop: f64::NAN }
+    }
+
+    const fn is_to_come(&self) -> bool {
+        self.drop.is_nan()
+    }
+}
+
+/// A value that is not missing.
+fn non_nan(value: f64) -> Option<f64> {
+    (!value.is_nan()).then_some(value)
 }
 
 /// Gathers the slips of a set.

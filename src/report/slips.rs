@@ -2,12 +2,11 @@
 
 use super::tables::Columns;
 use crate::observe::Slip;
-use crate::results::Results;
 use crate::results::parts::committed_files;
 use crate::results::tables::{JOBS, JobOfSlip, SLIPS};
+use crate::results::{Results, ResultsError};
 use crate::sweep::{Label, capitalised};
 use crate::table::columns::Column;
-use crate::table::file::DatasetError;
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -50,7 +49,7 @@ impl Slips {
         results: &Results<'_>,
         places: &HashMap<String, usize>,
         total: u64,
-    ) -> Result<Self, DatasetError> {
+    ) -> Result<Self, ResultsError> {
         let layout = results.layout();
         let symbol = |name: &str| COLUMNS.iter().find(|(known, _)| *known == name).map(|known| known.1);
         let mut slips = Self {

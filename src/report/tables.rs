@@ -3,10 +3,11 @@
 use crate::model::Parameters;
 use crate::observe::Regime;
 use crate::reduce::{BackboneBin, HistogramBin, SetRow, read_reduced, swept};
+use crate::results::ResultsError;
 use crate::results::layout::Layout;
 use crate::sweep::{Job, Label, Sweep, label};
 use crate::table::columns::{Column, Row, Table, Value, columns};
-use crate::table::file::{Dataset, DatasetError};
+use crate::table::file::Dataset;
 use serde::Serialize;
 use serde_json::{Value as Json, json};
 use std::collections::{BTreeMap, HashMap};
@@ -93,7 +94,7 @@ columns! {
 }
 
 impl Census {
-    pub(super) fn read(layout: &Layout<'_>) -> Result<Self, DatasetError> {
+    pub(super) fn read(layout: &Layout<'_>) -> Result<Self, ResultsError> {
         let regimes = Regime::ALL.map(|regime| (regime.word(), 0)).into();
         let mut census = Self { regimes, ..Self::default() };
         for batch in sets_file(layout).rows::<Counted>() {
@@ -135,7 +136,7 @@ pub(super) struct Sets {
 
 impl Sets {
     /// Every k-th of the sets in the reduced data.
-    pub(super) fn read(layout: &Layout<'_>, sweep: &Sweep, spacing: u64) -> Result<Self, DatasetError> {
+    pub(super) fn read(layout: &Layout<'_>, sweep: &Sweep, spacing: u64) -> Result<Self, ResultsError> {
         let mut sets = Self {
             columns: Columns::of::<SetRow>(|_| true),
             commands: Vec::new(),
@@ -186,7 +187,7 @@ fn command(sweep: &Sweep, parameters: &Parameters) -> [String; 2] {
     [begin.trim_end().to_owned(), end.trim_start().to_owned()]
 }
 
-pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, DatasetError> {
+pub(super) fn backbone(layout: &Layout<'_>) -> Result<Columns, ResultsError> {
     let mut columns = Columns::of::<BackboneBin>(|_| true);
     for bin in read_reduced::<BackboneBin>(layout)? {
         columns.push(&bin);

@@ -4,8 +4,8 @@
 //! the winner dead makes the next generation. A claim stays while anybody is at work, as one who has looked before may not
 //! know yet what became of it. Who has lost some claims lists them all, and does not ask for one after the other.
 
-use crate::results::error::ResultsError;
 use crate::results::workers::{Living, Member};
+use crate::table::error::ResultsError;
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, HashMap, HashSet};
 

@@ -103,7 +103,10 @@ pub fn exclusive_lock(layout: &Layout<'_>, writer: &str) -> Result<Lock, Storage
         return Err(StorageError::at("lock", &file)(held));
     }
     if matches!(lock, Lock::Ours(_)) {
-        layout.storage.clear_folder(&layout.staging(writer))?;
+        let staging = layout.staging(writer);
+        for name in layout.storage.list(&staging)? {
+            layout.storage.remove(&staging.join(name))?;
+        }
     }
     Ok(lock)
 }

@@ -1,12 +1,12 @@
 //! A results directory as it was found: opened once, valid from then on. Any version is read; only this one is run.
 
 use crate::results::commit::Commit;
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{self, Record};
 use crate::results::layout::{DoneParts, Layout, PartName, RUN, RUN_FOLDERS};
-use crate::results::tables;
+use crate::results::tables::{TABLES, tables_of};
 use crate::results::workers::{self, Member};
 use crate::sweep::{Extension, Outline, Part, Plan, Round, Sweep};
+use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::file::Footer;
 use crate::table::storage::StorageError;
 use std::collections::HashSet;
@@ -155,24 +155,21 @@ impl<'a> Results<'a> {
     fn extended(&self, sweep: &Sweep, done: &DoneParts) -> Self {
         let last = self.extensions.len().checked_sub(1);
         let kept = last.map(|last| Plan::new(&self.extensions).ranges(last, |part| done.has(part)));
-        self.followed_by(kept, |earlier| Extension::new(sweep, earlier))
+        self.followed_by(sweep, sweep.first_round(), kept)
     }
 
-    /// The same with the next round of its sweep, all parts of the last being done.
-    pub(super) fn in_next_round(&self, round: Round) -> Self {
-        self.followed_by(None, |earlier| Extension::in_round(self.sweep(), earlier, Some(round)))
-    }
-
-    fn followed_by(
+    /// The same with a round of a sweep after the others, of which the last keeps these points, or all.
+    pub(super) fn followed_by(
         &self,
+        sweep: &Sweep,
+        round: Option<Round>,
         kept: Option<Vec<RangeInclusive<u64>>>,
-        extension: impl FnOnce(&[Extension]) -> Extension,
     ) -> Self {
         let mut all = self.clone();
         if let Some(last) = all.extensions.last_mut() {
             last.kept.clone_from(&kept);
         }
-        let extension = extension(&all.extensions);
+        let extension = Extension::in_round(sweep, &all.extensions, round);
         all.records.push(Record::new(&extension, &self.records, kept));
         all.extensions.push(extension);
         all
@@ -249,7 +246,7 @@ impl<'a> Results<'a> {
     /// Removes what earlier runs have left of parts that are not done: files of some of their tables, and spilled jobs.
     fn remove_unfinished(&self, done: &DoneParts) -> Result<(), StorageError> {
         let (layout, storage) = (&self.layout, self.layout.storage);
-        for table in [tables::SLIPS, tables::PRECURSORS, tables::JOBS] {
+        for table in TABLES {
             for (folder, is_spill) in [(layout.table(table), false), (layout.spill().join(table), true)] {
                 let mut parts: Vec<_> = layout.parts_in(&folder)?.into_iter().collect();
                 // Whoever begins the same sweep at once may be at the parts of the next extension.
@@ -312,12 +309,12 @@ impl<'a> Results<'a> {
 
     /// Names of the tables, that of the jobs last.
     pub fn tables(&self) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
-        tables::tables_of(self.sweep().recording())
+        tables_of(self.sweep().recording())
     }
 
     /// The id of a job of a part.
     pub fn job_id(&self, part: &Part, position: usize) -> String {
-        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters).to_string()
+        self.extensions[part.extension].sweep.job_id(&part.jobs[position].parameters)
     }
 
     /// Brings the names of results to the disk: a process that was killed between a rename, or the creation of a
@@ -327,7 +324,9 @@ impl<'a> Results<'a> {
             // Most are not ours, and who made the folders in them synced them if that is possible at all.
             let _ = self.layout.storage.sync_folder(above);
         }
-        for folder in self.layout.result_folders() {
+        let layout = &self.layout;
+        let tables = TABLES.map(|table| layout.table(table));
+        for folder in [layout.root().to_owned(), layout.run(), layout.tables()].into_iter().chain(tables) {
             match self.layout.storage.sync_folder(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 synced => synced?,

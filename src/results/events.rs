@@ -5,9 +5,9 @@
 
 use crate::results::commit::own_number;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::host;
+use crate::table::error::ResultsError;
 use crate::table::storage::{StorageError, StoredFile};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read};
@@ -113,13 +113,6 @@ pub struct RunReport {
     pub rounds: Option<RoundsSoFar>,
 }
 
-impl RunEvent {
-    /// Whether the log keeps it: a line for each job, or each second, would be millions.
-    const fn is_logged(&self) -> bool {
-        !matches!(self, Self::JobDone { .. } | Self::OthersDone { .. } | Self::Tick)
-    }
-}
-
 /// Most bytes of a line: far more than any reason of a failure has.
 const MAX_LINE: u64 = 1 << 24;
 
@@ -143,9 +136,9 @@ impl Log {
         self.0.sync()
     }
 
-    /// Appends an event, if it is one that the log keeps.
+    /// Appends an event, unless it comes for each job, or each second: these would be millions of lines.
     pub fn write(&mut self, event: &RunEvent) -> Result<(), StorageError> {
-        if !event.is_logged() {
+        if matches!(event, RunEvent::JobDone { .. } | RunEvent::OthersDone { .. } | RunEvent::Tick) {
             return Ok(());
         }
         // An event always has a form as JSON: it holds texts and numbers alone.
@@ -190,18 +183,6 @@ impl Results<'_> {
             }
         }
         Ok(())
-    }
-
-    /// Wall time over predicted cost of all parts in the logs; `None` before the first.
-    pub fn pace(&self) -> Result<Option<f64>, StorageError> {
-        let (mut predicted, mut measured) = (0.0, 0.0);
-        self.events(|event| {
-            if let RunEvent::PartCommitted { predicted_cost, wall, .. } = event {
-                predicted += predicted_cost;
-                measured += wall;
-            }
-        })?;
-        Ok((predicted > 0.0).then(|| measured / predicted))
     }
 }
 

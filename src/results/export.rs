@@ -5,12 +5,12 @@
 //! changed. Memory: one part, and one row group.
 
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::layout::PartName;
 use crate::results::parts::row_count;
 use crate::results::tables::{self, JobRow};
 use crate::table::arrow::{schema, schema_of};
-use crate::table::file::{Batch, Dataset, DatasetError};
+use crate::table::error::ResultsError;
+use crate::table::file::{Batch, Dataset};
 use crate::table::formats::{Format, RowWriter};
 use crate::table::storage::Storage;
 use arrow_array::cast::AsArray;
@@ -135,7 +135,7 @@ impl Results<'_> {
         let mut copied = 0;
         for batch in rows.batches() {
             let Batch { path, rows } = batch?;
-            writer.write(&jobs.join(&rows, schema).map_err(DatasetError::damaged(&path))?)?;
+            writer.write(&jobs.join(&rows, schema).map_err(ResultsError::damage_at(&path))?)?;
             copied += rows.num_rows() as u64;
         }
         Ok(copied)
@@ -163,14 +163,14 @@ struct Jobs {
 }
 
 impl Jobs {
-    fn read(dataset: Dataset<'_>, path: &Path) -> Result<Self, DatasetError> {
-        let batches = dataset.batches().map(|batch| Ok(batch?.rows)).collect::<Result<Vec<_>, DatasetError>>()?;
+    fn read(dataset: Dataset<'_>, path: &Path) -> Result<Self, ResultsError> {
+        let batches = dataset.batches().map(|batch| Ok(batch?.rows)).collect::<Result<Vec<_>, ResultsError>>()?;
         let first = batches.first().map(RecordBatch::schema);
         let rows =
             first.map_or_else(|| Ok(RecordBatch::new_empty(schema::<JobRow>())), |of| concat_batches(&of, &batches));
-        let rows = rows.map_err(DatasetError::damaged(path))?;
+        let rows = rows.map_err(ResultsError::damage_at(path))?;
         let ids = rows.column_by_name(JOB_ID).and_then(|column| column.as_string_opt::<i32>());
-        let ids = ids.ok_or("there is no column job_id").map_err(DatasetError::damaged(path))?;
+        let ids = ids.ok_or("there is no column job_id").map_err(ResultsError::damage_at(path))?;
         let by_id = ids.iter().zip(0..).filter_map(|(id, row)| Some((id?.to_owned(), row))).collect();
         Ok(Self { rows, by_id })
     }

@@ -11,12 +11,11 @@
 pub(super) mod tests;
 
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME};
-use crate::results::error::ResultsError;
-use crate::results::layout::Layout;
-use crate::results::settled::settled;
+use crate::results::layout::{Layout, settled};
 use crate::results::tables::{JOBS, recorded_schema, tables_of};
 use crate::sweep::{Extension, PLAN_VERSION, Round, Sweep};
 use crate::table::checksum;
+use crate::table::error::ResultsError;
 use crate::table::file::{Footer, PROGRAM};
 use crate::table::shown::shown_text;
 use serde::{Deserialize, Serialize};
@@ -86,7 +85,7 @@ impl Record {
             model_version: MODEL_VERSION,
             rng_scheme: RNG_SCHEME.to_owned(),
             plan_version: PLAN_VERSION,
-            identity: sweep.job_id(&Parameters::default()).to_string(),
+            identity: sweep.job_id(&Parameters::default()),
             tables: columns_of(sweep),
             part_cost: *part_cost,
             kept_before,
@@ -130,7 +129,7 @@ impl Record {
             .map(|(key, before, after)| format!("{key}: {} -> {after}", shown_text(&before)))
             .collect();
         // Versions enter it.
-        if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()).to_string() {
+        if differences.is_empty() && self.identity != sweep.job_id(&Parameters::default()) {
             differences.push(format!("ids of jobs: those of {} -> others of this program", shown_text(&self.program)));
         }
         for (name, after) in &columns_of(sweep) {
@@ -151,8 +150,7 @@ impl Record {
         let path = layout.extension(number);
         let read = || match layout.storage.read(&path) {
             Err(error) if error.is_missing() => Ok(None),
-            Err(error) if error.is_no_file() => Err(ResultsError::damaged(&path, error.source.to_string())),
-            bytes => Ok(Some(bytes?)),
+            bytes => bytes.map(Some).map_err(ResultsError::of_reading),
         };
         let damaged = |problem: String| ResultsError::damaged(&path, problem);
         let bytes = settled(read)?.ok_or_else(|| damaged(MISSING.to_owned()))?;
@@ -243,7 +241,7 @@ pub(super) fn extensions(layout: &Layout<'_>, records: &[Record]) -> Result<Vec<
             _ => {
                 let path = layout.extension(number);
                 let sweep = Sweep::parse(&record.sweep, &path);
-                let sweep = sweep.map_err(|error| ResultsError::damaged(&path, error.to_string()))?;
+                let sweep = sweep.map_err(|error| ResultsError::damaged(&path, error))?;
                 sweep.with_ids_of(record.model_version, &record.rng_scheme)
             }
         };

@@ -13,15 +13,15 @@
 //! so that a rename moves a whole file at once, but outside their folders: a stray file of any name there breaks some
 //! reader.
 
-use crate::results::error::ResultsError;
-use crate::results::tables;
 use crate::sweep::{Outline, Sweep};
-use crate::table::file::{Dataset, DatasetError, FILE_EXTENSION};
+use crate::table::error::ResultsError;
+use crate::table::file::{Dataset, FILE_EXTENSION};
 use crate::table::storage::{Storage, StorageError};
 use std::collections::{BTreeSet, HashSet};
 use std::ffi::OsString;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Folder of everything that is no result.
 pub const RUN: &str = "run";
@@ -86,12 +86,13 @@ impl<'a> Layout<'a> {
     }
 
     /// All files of a table as they are now, each of them that of a part.
-    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, DatasetError> {
+    pub fn dataset(&self, name: &str) -> Result<Dataset<'a>, ResultsError> {
         let folder = self.table(name);
         let paths = self.storage.list(&folder)?.into_iter().map(|name| folder.join(name));
+        let stray = "it is no table file, and a table folder may hold nothing else; move it away";
         let of_part = |path: PathBuf| match PartName::of_path(&path) {
             Some(_) => Ok(path),
-            None => Err(DatasetError::Stray { path }),
+            None => Err(ResultsError::damaged(&path, stray)),
         };
         Ok(Dataset::new(self.storage, paths.map(of_part).collect::<Result<_, _>>()?))
     }
@@ -121,13 +122,6 @@ impl<'a> Layout<'a> {
 
     pub fn reduced_file(&self, table: &str) -> PathBuf {
         self.reduced().join(format!("{table}.{FILE_EXTENSION}"))
-    }
-
-    /// The folders in which names are results.
-    pub fn result_folders(&self) -> Vec<PathBuf> {
-        let tables = [tables::SLIPS, tables::PRECURSORS, tables::JOBS];
-        let folders = [self.root.clone(), self.run(), self.tables()];
-        folders.into_iter().chain(tables.map(|table| self.table(table))).collect()
     }
 
     /// What is known of an extension.
@@ -218,6 +212,23 @@ pub struct DoneParts(pub(super) HashSet<PartName>);
 impl DoneParts {
     pub fn has(&self, part: &Outline) -> bool {
         self.0.contains(&part.into())
+    }
+}
+
+/// How long to wait: longer than a network file system shows an old name, and the time between two looks.
+const LATE: Duration = if cfg!(test) { Duration::from_millis(300) } else { Duration::from_mins(1) };
+const PAUSE: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(200) };
+
+/// Looks until there is something to be seen, for a minute at most: a host of a network disk may not see yet what a folder
+/// lists.
+pub(super) fn settled<T>(mut look: impl FnMut() -> Result<Option<T>, ResultsError>) -> Result<Option<T>, ResultsError> {
+    let begin = Instant::now();
+    loop {
+        let seen = look()?;
+        if seen.is_some() || begin.elapsed() >= LATE {
+            return Ok(seen);
+        }
+        std::thread::sleep(PAUSE);
     }
 }
 

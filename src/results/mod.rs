@@ -13,14 +13,11 @@
 //!   events.rs                 what happens, and its log
 //!   verify.rs                 what is damaged, and its repair
 //!   export.rs                 a few large files for other tools
-//! error.rs                    why a directory cannot be used or changed
-//! settled.rs                  waiting for what a network disk does not show yet
 //! ```
 
 pub mod claims;
 pub mod commit;
 pub mod directory;
-pub mod error;
 pub mod events;
 pub mod export;
 mod extension_file;
@@ -28,12 +25,11 @@ pub mod layout;
 pub mod parts;
 pub mod pending;
 pub mod rounds;
-mod settled;
 pub mod tables;
 pub mod verify;
 pub mod workers;
 
+pub use crate::table::error::{ErrorKind, ResultsError};
 pub use directory::Results;
-pub use error::{ErrorKind, ResultsError};
 #[cfg(test)]
 pub(crate) use extension_file::tests::of_other_versions;

@@ -7,7 +7,6 @@
 use crate::observe::Measurements;
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::layout::{Layout, PartName};
 use crate::results::tables::{
     self, DriveAndSeed, JobOutcome, JobRecord, JobRow, Label, PrecursorRow, RowOfJob, SlipRow, label, relabel,
@@ -15,7 +14,8 @@ use crate::results::tables::{
 use crate::results::workers::Member;
 use crate::sweep::{Outline, Part};
 use crate::table::columns::{Table, columns};
-use crate::table::file::{Batch, Dataset, DatasetError, RowCount, TableWriter};
+use crate::table::error::ResultsError;
+use crate::table::file::{Batch, Dataset, RowCount, TableWriter};
 use crate::table::storage::StorageError;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::io::ErrorKind;
@@ -25,15 +25,8 @@ use std::path::PathBuf;
 /// What a job of a part ended with: its measurements, or why it failed.
 pub type Outcome = Result<Measurements, String>;
 
-/// What was run of a part.
-#[derive(Clone, Copy, Debug)]
-pub struct PartRun<'a> {
-    pub part: &'a Part,
-    /// What its jobs ended with, by position.
-    pub outcomes: &'a BTreeMap<usize, Outcome>,
-    /// Positions of its jobs that an earlier run has spilled.
-    pub spilled: &'a BTreeSet<usize>,
-}
+/// What jobs of a part that were run ended with, by their positions.
+pub type Outcomes = BTreeMap<usize, Outcome>;
 
 impl Results<'_> {
     /// The file of a part in a table.
@@ -45,20 +38,32 @@ impl Results<'_> {
         self.layout().spill().join(table).join(PartName::from(part).file())
     }
 
-    /// Spills the outcomes of some jobs of a part, beside those that are spilled already.
-    pub fn spill(&self, member: &Member<'_>, run: PartRun<'_>) -> Result<(), ResultsError> {
-        let is_finished = |position: &usize| run.outcomes.contains_key(position) || run.spilled.contains(position);
-        let from = (!run.spilled.is_empty()).then_some(Place::Spill);
-        self.write(member, run, is_finished, from, Place::Spill)
+    /// Spills the outcomes of some jobs of a part, beside those at the positions that are spilled already.
+    pub fn spill(
+        &self,
+        member: &Member<'_>,
+        part: &Part,
+        outcomes: &Outcomes,
+        spilled: &BTreeSet<usize>,
+    ) -> Result<(), ResultsError> {
+        let is_finished = |position: &usize| outcomes.contains_key(position) || spilled.contains(position);
+        let spill = self.layout().spill();
+        self.write(member, part, outcomes, is_finished, ((!spilled.is_empty()).then_some(&spill), &spill))
     }
 
-    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or spilled.
+    /// Commits a part. Jobs without an outcome keep the rows that they have, in the tables or, at these positions, spilled.
     /// On an error the part counts as before, or as done, but never as half done.
-    pub fn commit(&self, member: &Member<'_>, run: PartRun<'_>) -> Result<(), ResultsError> {
-        let PartRun { part, outcomes, spilled } = run;
+    pub fn commit(
+        &self,
+        member: &Member<'_>,
+        part: &Part,
+        outcomes: &Outcomes,
+        spilled: &BTreeSet<usize>,
+    ) -> Result<(), ResultsError> {
+        let (tables, spill) = (self.layout().tables(), self.layout().spill());
+        let from = if spilled.is_empty() { &tables } else { &spill };
         let keeps = outcomes.len() < part.jobs.len();
-        let from = if spilled.is_empty() { Place::Tables } else { Place::Spill };
-        self.write(member, run, |_| true, keeps.then_some(from), Place::Tables)?;
+        self.write(member, part, outcomes, |_| true, (keeps.then_some(from), &tables))?;
         if spilled.is_empty() { Ok(()) } else { Ok(self.remove_spilled(part)?) }
     }
 
@@ -89,20 +94,20 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// Writes files of a part with some of its jobs: new rows of those with an outcome, the old ones of the others.
+    /// Writes files of a part with some of its jobs: new rows of those with an outcome, the old ones of the others. From and to
+    /// are the tables or the spill.
     fn write(
         &self,
         member: &Member<'_>,
-        PartRun { part, outcomes, .. }: PartRun<'_>,
+        part: &Part,
+        outcomes: &Outcomes,
         is_written: impl Fn(&usize) -> bool,
-        from: Option<Place>,
-        to: Place,
+        places: (Option<&PathBuf>, &PathBuf),
     ) -> Result<(), ResultsError> {
         let sweep = &self.extensions()[part.extension].sweep;
         let label = |position: usize| label(sweep, &part.jobs[position].parameters);
         let positions = (0..part.jobs.len()).filter(is_written);
         let jobs: Jobs<'_> = positions.map(|position| (label(position), outcomes.get(&position))).collect();
-        let places = (from, to);
         let mut commit = member.commit();
         self.stage::<SlipRow<'_>>(&mut commit, part, places, &jobs, |writer, job, outcome| {
             outcome.iter().flat_map(|result| &result.slips).try_for_each(|slip| writer.push(&(job, slip)))
@@ -124,42 +129,26 @@ impl Results<'_> {
         &self,
         commit: &mut Commit<'_>,
         part: &Part,
-        (from, to): (Option<Place>, Place),
+        (from, to): (Option<&PathBuf>, &PathBuf),
         jobs: &'j Jobs<'_>,
-        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), DatasetError>,
+        write: impl Fn(&mut TableWriter<R>, &'j Label<DriveAndSeed>, &'j Outcome) -> Result<(), ResultsError>,
     ) -> Result<(), ResultsError> {
         let storage = self.layout().storage;
-        let place = |place| match place {
-            Place::Tables => self.part_file(R::NAME, part),
-            Place::Spill => self.spilled_file(R::NAME, part),
-        };
-        let target = place(to);
-        let above = match to {
-            Place::Tables => self.layout().tables(),
-            Place::Spill => self.layout().run(),
-        };
-        if let Some(folder) = target.parent() {
-            storage.ensure_folder_below(&above, folder)?;
-        }
-        let kept = KeptRows::read(Dataset::new(storage, from.map(place).into_iter().collect()))?;
+        let file = |place: &PathBuf| place.join(R::NAME).join(PartName::from(&**part).file());
+        // The tables are there from the beginning of a run on.
+        let top = if *to == self.layout().spill() { &self.layout().run() } else { to };
+        storage.ensure_folder_below(top, &to.join(R::NAME))?;
+        let kept = KeptRows::read(Dataset::new(storage, from.map(file).into_iter().collect()))?;
         let left_out = self.extensions()[part.extension].sweep.recording().left_out();
-        let mut writer = TableWriter::without(&left_out, commit.stage(&target)?, &self.footer(part.extension))?;
+        let mut writer = TableWriter::without(&left_out, commit.stage(&file(to))?, &self.footer(part.extension))?;
         for (job, outcome) in jobs {
             match outcome {
                 Some(outcome) => write(&mut writer, job, outcome)?,
                 None => kept.copy(&mut writer, &job.0.job_id)?,
             }
         }
-        writer.finish()?;
-        Ok(())
+        writer.finish()
     }
-}
-
-/// Where files of a part lie.
-#[derive(Clone, Copy)]
-enum Place {
-    Tables,
-    Spill,
 }
 
 /// The jobs of a part, those that were run with their outcomes.
@@ -186,7 +175,7 @@ impl RowsOfJob {
 }
 
 /// How many rows the jobs of a part have in a table, as its jobs file says.
-pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, DatasetError> {
+pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, ResultsError> {
     let mut all = RowCount { least: 0, may_exceed: false };
     for batch in jobs.rows::<RowsOfJob>() {
         for RowCount { least, may_exceed } in batch?.iter().map(|job| job.count(table)) {
@@ -199,14 +188,14 @@ pub(super) fn row_count(jobs: Dataset<'_>, table: &str) -> Result<RowCount, Data
 
 /// The files of a table that count beside these of `jobs`: those of the same parts, with as many rows as these say. A run
 /// killed in between leaves the slips of a part without its jobs. A part without its slips is damaged.
-pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, DatasetError> {
+pub fn committed_files<'a>(layout: &Layout<'a>, table: &str, jobs: &Dataset<'_>) -> Result<Dataset<'a>, ResultsError> {
     let there: HashSet<PathBuf> = layout.dataset(table)?.files().cloned().collect();
     let mut files = Vec::new();
     for jobs in jobs.files() {
         let Some(part) = PartName::of_path(jobs) else { continue };
         let path = layout.table(table).join(part.file());
         if !there.contains(&path) {
-            return Err(DatasetError::damaged(&path)("it is missing, though the jobs of its part are there"));
+            return Err(ResultsError::damaged(&path, "it is missing, though the jobs of its part are there"));
         }
         let count = row_count(Dataset::new(layout.storage, vec![jobs.clone()]), table)?;
         files.push((path, Some(count)));
@@ -222,7 +211,7 @@ struct KeptRows {
 }
 
 impl KeptRows {
-    fn read(before: Dataset<'_>) -> Result<Self, DatasetError> {
+    fn read(before: Dataset<'_>) -> Result<Self, ResultsError> {
         let mut kept = Self::default();
         for batch in before.batches() {
             let batch = batch?;
@@ -237,7 +226,7 @@ impl KeptRows {
         Ok(kept)
     }
 
-    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), DatasetError> {
+    fn copy<R: Table>(&self, writer: &mut TableWriter<R>, job: &str) -> Result<(), ResultsError> {
         let rows = self.by_job.get(job).into_iter().flatten();
         rows.cloned().try_for_each(|(batch, rows)| writer.copy(&self.batches[batch], rows))
     }

@@ -11,16 +11,15 @@
 //! Who runs it is another question: see `claims.rs`, and `run/take.rs`.
 
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
-use crate::results::layout::{DoneParts, PartName};
-use crate::results::settled::settled;
+use crate::results::layout::{DoneParts, PartName, settled};
 use crate::results::tables::{self, JobOutcome, RowOfJob};
-use crate::sweep::{Extension, Outline};
+use crate::sweep::{Extension, Outline, Part};
 use crate::table::columns::columns;
-use crate::table::file::{Dataset, DatasetError};
+use crate::table::error::{ErrorKind, ResultsError};
+use crate::table::file::Dataset;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::io::ErrorKind;
+use std::io;
 
 /// Times within this share of each other are the same bound.
 const SAME_TIME: f64 = 1e-9;
@@ -43,18 +42,23 @@ pub enum Again {
     CutOff,
 }
 
-/// What is done and what is spilled, as the names in a directory said at one instant.
+/// Parts that are a worker's to take, and what of them is done and spilled, as the names in a directory said at one instant.
 #[derive(Debug)]
 pub struct Pending<'a> {
-    results: &'a Results<'a>,
+    pub results: &'a Results<'a>,
+    /// In plan order.
+    pub parts: &'a [Outline],
+    /// Whether failed jobs are to be run again.
+    pub retry_failed: bool,
     pub done: DoneParts,
     /// Looked up again, since workers that end spill.
     spilled: RefCell<HashSet<PartName>>,
 }
 
 impl<'a> Pending<'a> {
-    pub fn look_up(results: &'a Results<'a>) -> Result<Self, ResultsError> {
-        let pending = Self { results, done: results.done_parts()?, spilled: RefCell::default() };
+    pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
+        let done = results.done_parts()?;
+        let pending = Self { results, parts, retry_failed, done, spilled: RefCell::default() };
         pending.look_at_spill()?;
         Ok(pending)
     }
@@ -65,10 +69,14 @@ impl<'a> Pending<'a> {
         Ok(())
     }
 
-    /// Whether jobs of parts that are done may have been cut off.
-    pub fn may_have_cut_off(&self) -> bool {
+    pub fn part(&self, outline: &Outline) -> Part {
+        self.results.plan().part(outline)
+    }
+
+    /// Whether a part that is done may have jobs to be run: failed ones, or such as a shorter time has cut off.
+    pub fn may_run_again(&self) -> bool {
         let max_time = |extension: &Extension| extension.sweep.recording().max_time;
-        self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
+        self.retry_failed || self.results.extensions().windows(2).any(|pair| max_time(&pair[0]) != max_time(&pair[1]))
     }
 
     /// What is not finished of a part: by position missing, spilled, failed or cut off. Of one that is done, this reads its
@@ -91,13 +99,6 @@ columns! {
         reason: Option<String>;
         simulated_time: Option<f64>;
     }
-}
-
-/// A spilled file, and the ids of the jobs of its rows.
-struct Spilled {
-    /// Whether it is there and not damaged.
-    is_whole: bool,
-    ids: HashSet<String>,
 }
 
 impl Results<'_> {
@@ -135,34 +136,26 @@ impl Results<'_> {
 
     /// Positions of the jobs of a part that are spilled: none if a file is damaged or gone, and they then run again.
     fn spilled(&self, outline: &Outline) -> Result<BTreeSet<usize>, ResultsError> {
-        let mut ids = HashSet::new();
+        let mut ids: HashSet<String> = HashSet::new();
         for table in self.tables() {
-            match settled(|| self.spilled_ids(table, outline))? {
-                Some(Spilled { is_whole: true, ids: of_table }) => ids = of_table,
-                _ => return Ok(BTreeSet::new()),
-            }
+            // Nothing yet if this host does not see a file that the folder lists, and no ids in one that is damaged.
+            let read = || {
+                let file = Dataset::new(self.layout().storage, vec![self.spilled_file(table, outline)]);
+                match file.rows::<RowOfJob>().collect::<Result<Vec<_>, _>>() {
+                    Ok(rows) => Ok(Some(Some(rows.into_iter().flatten().map(|row| row.job_id).collect()))),
+                    Err(ResultsError { kind: ErrorKind::Damaged, .. }) => Ok(Some(None)),
+                    Err(ResultsError { kind: ErrorKind::Disk(io::ErrorKind::NotFound), .. }) => {
+                        // Not listed: another worker has just committed the part.
+                        let is_listed = self.spilled_parts(table)?.contains(&outline.into());
+                        Ok((!is_listed).then_some(None))
+                    }
+                    Err(error) => Err(error),
+                }
+            };
+            let Some(of_table) = settled(read)?.flatten() else { return Ok(BTreeSet::new()) };
+            ids = of_table;
         }
         let part = self.plan().part(outline);
         Ok((0..part.jobs.len()).filter(|&position| ids.contains(&self.job_id(&part, position))).collect())
-    }
-
-    /// The spilled file of a part in a table; `None` if this host does not see a file that the folder lists.
-    fn spilled_ids(&self, table: &str, part: &Outline) -> Result<Option<Spilled>, ResultsError> {
-        let file = self.spilled_file(table, part);
-        let mut spilled = Spilled { is_whole: true, ids: HashSet::new() };
-        let nothing = || Spilled { is_whole: false, ids: HashSet::new() };
-        for batch in Dataset::new(self.layout().storage, vec![file]).rows::<RowOfJob>() {
-            match batch {
-                Ok(rows) => spilled.ids.extend(rows.into_iter().map(|row| row.job_id)),
-                Err(DatasetError::Damaged { .. }) => return Ok(Some(nothing())),
-                Err(DatasetError::Storage(error)) if error.kind() == ErrorKind::NotFound => {
-                    // Not listed: another worker has just committed the part.
-                    let is_listed = self.spilled_parts(table)?.contains(&part.into());
-                    return Ok((!is_listed).then(nothing));
-                }
-                Err(error) => return Err(error.into()),
-            }
-        }
-        Ok(Some(spilled))
     }
 }

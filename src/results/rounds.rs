@@ -4,9 +4,9 @@
 
 use crate::results::commit::exclusive_lock;
 use crate::results::directory::Results;
-use crate::results::error::ResultsError;
 use crate::results::workers::Member;
 use crate::sweep::{Extension, Round, Standing, merged};
+use crate::table::error::ResultsError;
 use serde::{Deserialize, Serialize};
 
 const LOCK: &str = "round";
@@ -76,7 +76,7 @@ impl Results<'_> {
             return Ok(Some(current));
         }
         let round = decide(&current)?;
-        let next = current.in_next_round(round).write_last(member)?;
+        let next = current.followed_by(current.sweep(), Some(round), None).write_last(member)?;
         // Without locks, another may have been first.
         next.map_or_else(|| Self::read(layout), Ok).map(Some)
     }

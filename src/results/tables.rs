@@ -81,10 +81,12 @@ pub type Label<S> = (Names, Selected<S>, Loading);
 pub const SLIPS: &str = <SlipRow<'_> as Table>::NAME;
 pub const PRECURSORS: &str = <PrecursorRow<'_> as Table>::NAME;
 pub const JOBS: &str = JobRow::NAME;
+pub const TABLES: [&str; 3] = [SLIPS, PRECURSORS, JOBS];
 
 /// Names of the tables of a recording, that of the jobs last.
 pub fn tables_of(recording: &Recording) -> impl DoubleEndedIterator<Item = &'static str> + use<> {
-    [Some(SLIPS), recording.precursors.then_some(PRECURSORS), Some(JOBS)].into_iter().flatten()
+    let has_precursors = recording.precursors;
+    TABLES.into_iter().filter(move |table| has_precursors || *table != PRECURSORS)
 }
 
 /// The columns of the table of this name, with units and meanings, as a recording has it.
@@ -99,8 +101,11 @@ pub fn recorded_schema(table: &str, recording: &Recording) -> SchemaRef {
 
 /// The label of a job of a sweep.
 pub fn label<S>(sweep: &Sweep, parameters: &Parameters) -> Label<S> {
-    let [job_id, set_id] = [sweep.job_id(parameters).to_string(), sweep.set_id(parameters).to_string()];
-    (Names { job_id, set_id }, Selected::new(parameters.clone()), Loading::of(parameters))
+    (
+        Names { job_id: sweep.job_id(parameters), set_id: sweep.set_id(parameters) },
+        Selected::new(parameters.clone()),
+        Loading::of(parameters),
+    )
 }
 
 /// The same label with other parameters.

@@ -6,18 +6,18 @@
 
 use crate::results::commit::Commit;
 use crate::results::directory::Results;
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::extension_file::{Record, refuse_old};
 use crate::results::layout::{Layout, PartName};
 use crate::results::parts::RowsOfJob;
 use crate::results::tables::{self, RowOfJob};
 use crate::sweep::Part;
-use crate::table::file::{Dataset, DatasetError, footer, has_columns};
+use crate::table::error::{ErrorKind, ResultsError};
+use crate::table::file::{Dataset, footer, has_columns};
 use crate::table::shown::serialize_path;
 use crate::table::storage::StorageError;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Staging folder of a repair.
 const WRITER: &str = "repair";
@@ -96,10 +96,7 @@ impl Verification {
 }
 
 /// A directory as its files and footers say that it was, and which of its extensions are to be written again.
-struct Salvaged<'a> {
-    results: Results<'a>,
-    lost: Vec<usize>,
-}
+type Salvaged<'a> = (Results<'a>, Vec<usize>);
 
 impl<'a> Results<'a> {
     /// Verifies a directory, whatever is damaged. Runs may be at work.
@@ -109,7 +106,7 @@ impl<'a> Results<'a> {
 
     /// Moves away what is damaged, so that the next run makes it again; returns what was found.
     pub fn repair(layout: &Layout<'a>) -> Result<Verification, ResultsError> {
-        let (Salvaged { results, lost }, verification) = examine(layout)?;
+        let ((results, lost), verification) = examine(layout)?;
         let [tables, run, quarantine] = [layout.tables(), layout.run(), layout.quarantine()];
         for path in verification.problems.iter().flat_map(|problem| &problem.moved) {
             let below = path.strip_prefix(&tables).or_else(|_| path.strip_prefix(&run)).unwrap_or(path);
@@ -128,7 +125,7 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
     loop {
         let mut verification = Verification::default();
         let salvaged = salvage(layout, &mut verification.problems)?;
-        verify_parts(&salvaged.results, &mut verification)?;
+        verify_parts(&salvaged.0, &mut verification)?;
         for name in layout.storage.list(&layout.reduced())? {
             let path = layout.reduced().join(name);
             let damage = damage_in(footer(layout.storage, &path))?;
@@ -136,7 +133,7 @@ fn examine<'a>(layout: &Layout<'a>) -> Result<(Salvaged<'a>, Verification), Resu
         }
         verification.whole = verification.problems.is_empty();
         // A run may have added a sweep meanwhile, whose parts are then taken for strangers.
-        let is_settled = layout.listed_extensions()?.len() <= salvaged.results.extensions().len();
+        let is_settled = layout.listed_extensions()?.len() <= salvaged.0.extensions().len();
         if verification.whole || is_settled {
             return Ok((salvaged, verification));
         }
@@ -196,7 +193,7 @@ fn salvage<'a>(layout: &Layout<'a>, problems: &mut Vec<Problem>) -> Result<Salva
     }
     let results = Results::new(layout, records)?;
     results.refuse(&results.version_differences(), "use the program that wrote it")?;
-    Ok(Salvaged { results, lost })
+    Ok((results, lost))
 }
 
 /// What the footers of an extension's parts say of it, after these records, if the file of the extension does not say the
@@ -257,15 +254,18 @@ fn verify_parts(results: &Results<'_>, found: &mut Verification) -> Result<(), R
             found.missing.push(name.to_string());
             found.jobs_missing += part.jobs.len() as u64;
         }
-        // The first problem stands for the part. Jobs first: a part without them is not done.
-        for (number, (path, problem, remedy)) in damage.into_iter().enumerate() {
-            let mut of_part = Problem { part: Some(name.to_string()), ..Problem::new(path, problem, remedy) };
-            if number == 0 {
-                of_part.jobs = ids(results, &part).collect();
-                of_part.moved = if remedy == Remedy::Part { files_of(results, &part) } else { Vec::new() };
-            }
-            found.problems.push(of_part);
+        for problem in &mut damage {
+            problem.part = Some(name.to_string());
         }
+        if let Some(first) = damage.first_mut() {
+            // It stands for the part.
+            first.jobs = ids(results, &part).collect();
+            if first.remedy == Remedy::Part {
+                // Jobs first: a part without them is not done.
+                first.moved = results.tables().rev().map(|table| results.part_file(table, &part)).collect();
+            }
+        }
+        found.problems.extend(damage);
     }
     found.problems.extend(strangers(results, &planned)?);
     Ok(())
@@ -276,17 +276,8 @@ fn ids(results: &Results<'_>, part: &Part) -> impl Iterator<Item = String> {
     (0..part.jobs.len()).map(|position| results.job_id(part, position))
 }
 
-/// The files of a part, that of its jobs first.
-fn files_of(results: &Results<'_>, part: &Part) -> Vec<PathBuf> {
-    results.tables().rev().map(|table| results.part_file(table, part)).collect()
-}
-
 /// What is wrong with the files of a part, which it has in these tables.
-fn damage_of(
-    results: &Results<'_>,
-    part: &Part,
-    tables: &[&'static str],
-) -> Result<Vec<(PathBuf, String, Remedy)>, ResultsError> {
+fn damage_of(results: &Results<'_>, part: &Part, tables: &[&'static str]) -> Result<Vec<Problem>, ResultsError> {
     let mut damage = Vec::new();
     for table in results.tables() {
         let path = results.part_file(table, part);
@@ -295,25 +286,24 @@ fn damage_of(
             match footer(results.layout().storage, &path) {
                 Ok(texts) => {
                     let found = misplacement(results, part, table, &texts);
-                    damage.extend(found.map(|(problem, remedy)| (path, problem, remedy)));
+                    damage.extend(found.map(|(problem, remedy)| Problem::new(path, problem, remedy)));
                 }
                 Err(error) => {
                     let (path, problem) = error.damage()?;
-                    damage.push((path, problem, Remedy::Part));
+                    damage.push(Problem::new(path, problem, Remedy::Part));
                 }
             }
         } else if tables.contains(&tables::JOBS) {
-            damage.push((path, "it is missing, though the jobs of its part are there".to_owned(), Remedy::Run));
+            let problem = "it is missing, though the jobs of its part are there";
+            damage.push(Problem::new(path, problem, Remedy::Run));
         }
     }
     if damage.is_empty() && tables.contains(&tables::JOBS) {
         let found = damage_in(check_rows(results, part))?;
-        damage.extend(found.map(|(path, problem)| (path, problem, Remedy::Part)));
+        damage.extend(found.map(|(path, problem)| Problem::new(path, problem, Remedy::Part)));
     }
     // What is moved away is moved as a whole.
-    if damage.iter().any(|(.., remedy)| *remedy == Remedy::Part) {
-        damage.sort_by_key(|(.., remedy)| *remedy != Remedy::Part);
-    }
+    damage.sort_by_key(|problem| problem.remedy != Remedy::Part);
     Ok(damage)
 }
 
@@ -338,7 +328,7 @@ fn misplacement(
 }
 
 /// Holds the rows of all tables of a part against each other, and against the plan.
-fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
+fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), ResultsError> {
     let dataset = |table| Dataset::new(results.layout().storage, vec![results.part_file(table, part)]);
     let path = results.part_file(tables::JOBS, part);
     let jobs = dataset(tables::JOBS).rows::<RowsOfJob>().collect::<Result<Vec<_>, _>>()?;
@@ -346,12 +336,16 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
     let mut planned = 0;
     for (expected, job) in ids(results, part).zip(&jobs) {
         if job.job_id != expected {
-            return damaged(&path, format!("it has job {} where the plan has {expected}", job.job_id));
+            return Err(ResultsError::damaged(
+                &path,
+                format!("it has job {} where the plan has {expected}", job.job_id),
+            ));
         }
         planned += 1;
     }
     if jobs.len() != planned || part.jobs.len() != planned {
-        return damaged(&path, format!("it has {} jobs, and its part {}", jobs.len(), part.jobs.len()));
+        let problem = format!("it has {} jobs, and its part {}", jobs.len(), part.jobs.len());
+        return Err(ResultsError::damaged(&path, problem));
     }
     for table in results.tables().filter(|table| *table != tables::JOBS) {
         let path = results.part_file(table, part);
@@ -360,27 +354,18 @@ fn check_rows(results: &Results<'_>, part: &Part) -> Result<(), DatasetError> {
             for RowOfJob { job_id } in batch? {
                 // Rows stand in the order of the jobs.
                 at += jobs[at..].iter().take_while(|job| job.job_id != job_id).count();
-                match rows.get_mut(at) {
-                    Some(rows) => *rows += 1,
-                    None => {
-                        return damaged(
-                            &path,
-                            format!("it has rows of job {job_id} that are not its part's, or not there"),
-                        );
-                    }
-                }
+                *rows.get_mut(at).ok_or_else(|| {
+                    let problem = format!("it has rows of job {job_id} that are not its part's, or not there");
+                    ResultsError::damaged(&path, problem)
+                })? += 1;
             }
         }
         for (job, rows) in jobs.iter().zip(rows) {
-            let checked = job.count(table).check(rows);
-            checked.or_else(|problem| damaged(&path, format!("of job {} {problem}", job.job_id)))?;
+            let problem = |problem| ResultsError::damaged(&path, format!("of job {} {problem}", job.job_id));
+            job.count(table).check(rows).map_err(problem)?;
         }
     }
     Ok(())
-}
-
-fn damaged<T>(path: &Path, problem: String) -> Result<T, DatasetError> {
-    Err(DatasetError::damaged(path)(problem))
 }
 
 /// What lies in the folders of the tables and is no table or no part of the plan.
@@ -406,6 +391,6 @@ fn strangers(results: &Results<'_>, planned: &HashSet<PartName>) -> Result<Vec<P
 }
 
 /// What a check found of a file that must be there: its path and what is wrong.
-fn damage_in<T>(checked: Result<T, DatasetError>) -> Result<Option<(PathBuf, String)>, DatasetError> {
+fn damage_in<T>(checked: Result<T, ResultsError>) -> Result<Option<(PathBuf, String)>, ResultsError> {
     checked.map_or_else(|error| error.damage().map(Some), |_| Ok(None))
 }

@@ -10,10 +10,10 @@
 //! other, and leaves.
 
 use crate::results::commit::{Commit, own_number};
-use crate::results::error::{ErrorKind, ResultsError};
 use crate::results::layout::Layout;
 use crate::sweep::Sweep;
 use crate::table::checksum;
+use crate::table::error::{ErrorKind, ResultsError};
 use crate::table::shown::shown_text;
 use crate::table::storage::StorageError;
 use serde::{Deserialize, Serialize};
@@ -80,14 +80,12 @@ impl Worker {
     }
 }
 
-const UNKNOWN_HOST: &str = "unknown";
-
 /// Name of this host, or "unknown".
 pub fn host() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let name = name.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
     let name = name.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
-    name.unwrap_or_else(|| UNKNOWN_HOST.to_owned())
+    name.unwrap_or_else(|| "unknown".to_owned())
 }
 
 /// The boot of the kernel and the name space of processes.

@@ -3,8 +3,9 @@
 
 use crate::results::ResultsError;
 use crate::results::layout::PartName;
-use crate::results::parts::{Outcome, PartRun};
-use crate::run::take::{PartJob, Share, Taken, Work};
+use crate::results::parts::{Outcome, Outcomes};
+use crate::results::pending::Pending;
+use crate::run::take::{PartJob, Taken, Work};
 use crate::run::walltime::Walltime;
 use crate::run::{Events, Joined, Kernel, RunEvent, RunReport, cpu};
 use crate::solver::SimulationError;
@@ -61,21 +62,15 @@ type AllUnderWay = Mutex<BTreeMap<(usize, u64, usize), UnderWay>>;
 /// A part of which some jobs are still out.
 struct OpenPart {
     of: Arc<Taken>,
-    outcomes: BTreeMap<usize, Outcome>,
+    outcomes: Outcomes,
     failed_before: u64,
     predicted_cost: f64,
     measured: JobTime,
 }
 
-impl OpenPart {
-    fn run(&self) -> PartRun<'_> {
-        PartRun { part: &self.of.part, outcomes: &self.outcomes, spilled: &self.of.spilled }
-    }
-}
-
 pub(super) struct Collector<'a, 'e> {
     joined: &'a Joined<'a>,
-    share: &'a Share<'a>,
+    pending: &'a Pending<'a>,
     walltime: &'a Walltime,
     events: &'a mut Events<'e>,
     report: &'a mut RunReport,
@@ -87,27 +82,27 @@ pub(super) struct Collector<'a, 'e> {
 impl<'a, 'e> Collector<'a, 'e> {
     pub fn new(
         joined: &'a Joined<'a>,
-        share: &'a Share<'a>,
+        pending: &'a Pending<'a>,
         walltime: &'a Walltime,
         events: &'a mut Events<'e>,
         report: &'a mut RunReport,
     ) -> Self {
-        Self { joined, share, walltime, events, report, open: BTreeMap::new(), own: (0, 0.0) }
+        Self { joined, pending, walltime, events, report, open: BTreeMap::new(), own: (0, 0.0) }
     }
 
-    /// Runs jobs of the share until none is left for this worker, the flag turns true, the
+    /// Runs pending jobs until none is left for this worker, the flag turns true, the
     /// time is over, or something fails that is not a job. Returns whether it took all that it could.
     pub fn run(&mut self, kernel: &Kernel<'_>) -> Result<bool, ResultsError> {
         let threads = self.joined.threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let problem = format!("cannot start {threads} threads: {error}; take fewer with --threads");
-            ResultsError::refused(self.share.results.layout().root(), problem)
+            ResultsError::refused(self.pending.results.layout().root(), problem)
         })?;
         // Apart from the caller's flag, since an error here also ends the workers.
         let interrupt = &AtomicBool::new(false);
         let under_way = &AllUnderWay::default();
         let (sender, receiver) = channel();
-        let work = Work::new(self.share, self.joined.member, self.walltime)?;
+        let work = Work::new(self.pending, self.joined.member, self.walltime)?;
         let all_run = pool.in_place_scope(|workers| {
             let hand_out = |job: PartJob| {
                 let sender = sender.clone();
@@ -132,7 +127,8 @@ impl<'a, 'e> Collector<'a, 'e> {
             if open.of.again {
                 self.commit(open)?;
             } else {
-                self.share.results.spill(self.joined.member, open.run())?;
+                let Taken { part, spilled, .. } = &*open.of;
+                self.pending.results.spill(self.joined.member, part, &open.outcomes, spilled)?;
                 let jobs = open.outcomes.len() as u64;
                 self.report.jobs_spilled += jobs;
                 self.report.jobs_left = self.report.jobs_left.saturating_sub(jobs);
@@ -157,7 +153,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         loop {
             if last_look.elapsed() >= LOOK_AT_OTHERS {
                 last_look = Instant::now();
-                let (jobs, cost) = self.share.done_since()?;
+                let (jobs, cost) = self.pending.done_since()?;
                 let jobs = jobs.saturating_sub(self.own.0);
                 let predicted_cost = (cost - self.own.1).max(0.0);
                 self.events.send(&RunEvent::OthersDone { jobs, predicted_cost })?;
@@ -207,7 +203,7 @@ impl<'a, 'e> Collector<'a, 'e> {
                 *long_after = 2 * elapsed;
                 let part = &job.of.part;
                 self.events.send(&RunEvent::JobTakesLong {
-                    command: self.share.results.sweep().command(&part.jobs[job.position]),
+                    command: self.pending.results.sweep().command(&part.jobs[job.position]),
                     predicted_cost: part.jobs[job.position].cost,
                     wall: elapsed.as_secs_f64(),
                 })?;
@@ -224,9 +220,9 @@ impl<'a, 'e> Collector<'a, 'e> {
         let event = match &outcome {
             Ok(measured) => RunEvent::JobDone { slips: measured.slips.len(), predicted_cost },
             Err(reason) => RunEvent::JobFailed {
-                job_id: self.share.results.job_id(part, of.position),
+                job_id: self.pending.results.job_id(part, of.position),
                 reason: reason.clone(),
-                command: self.share.results.sweep().command(job),
+                command: self.pending.results.sweep().command(job),
                 predicted_cost,
             },
         };
@@ -234,7 +230,7 @@ impl<'a, 'e> Collector<'a, 'e> {
         let key = (part.extension, part.index);
         let open = self.open.entry(key).or_insert_with(|| OpenPart {
             of: Arc::clone(&of.of),
-            outcomes: BTreeMap::new(),
+            outcomes: Outcomes::new(),
             failed_before: 0,
             predicted_cost: 0.0,
             measured: JobTime::default(),
@@ -254,8 +250,8 @@ impl<'a, 'e> Collector<'a, 'e> {
 
     fn commit(&mut self, whole: &OpenPart) -> Result<(), ResultsError> {
         let begin = Instant::now();
-        let run @ PartRun { part, .. } = whole.run();
-        self.share.results.commit(self.joined.member, run)?;
+        let Taken { part, spilled, .. } = &*whole.of;
+        self.pending.results.commit(self.joined.member, part, &whole.outcomes, spilled)?;
         self.walltime.committed(whole.of.begin.elapsed(), begin.elapsed());
         if !whole.of.again {
             self.own = (self.own.0 + part.job_count as u64, self.own.1 + part.cost);

@@ -33,11 +33,12 @@ use crate::observe::Measurements;
 use crate::results::claims::{Claims, Standing};
 use crate::results::events::Log;
 use crate::results::layout::Layout;
+use crate::results::pending::Pending;
 use crate::results::workers::{Member, host};
 use crate::results::{Results, ResultsError};
 use crate::rounds;
 use crate::run::collect::Collector;
-use crate::run::take::{LOOK, Left, Share};
+use crate::run::take::{LOOK, Left};
 use crate::run::walltime::Walltime;
 use crate::solver::SimulationError;
 use crate::sweep::{Job, Outline, Sweep};
@@ -143,7 +144,7 @@ impl Joined<'_> {
         let (results, parts) = &round;
         report.rounds = results.rounds_so_far();
         if report.jobs_left == 0 && self.member.others()?.is_empty() {
-            let overview = Share::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
+            let overview = Pending::look_up(results, parts, false)?.overview(true, |_, _, _| ())?;
             report.jobs_failed = overview.jobs_failed;
         }
         events.send(&RunEvent::Finished(report.clone()))?;
@@ -161,14 +162,16 @@ impl Joined<'_> {
         report: &mut RunReport,
     ) -> Result<(), ResultsError> {
         let Self { member, begin, threads, options, .. } = *self;
-        let share = Share::look_up(results, parts, retry_failed)?;
-        let overview = share.overview(false, |_, _, _| ())?;
+        let pending = Pending::look_up(results, parts, retry_failed)?;
+        let overview = pending.overview(false, |_, _, _| ())?;
         let (jobs_again, cost_again) =
             if retry_failed { (overview.jobs_failed, overview.predicted_cost_failed) } else { (0, 0.0) };
         report.jobs_failed += jobs_again;
         report.jobs_left = overview.jobs_missing + jobs_again;
         if jobs_again > 0 {
-            self.claim_next_reduction()?;
+            // The reduction after these jobs: what another reduces meanwhile, or has reduced, lacks them.
+            let mut claims = Claims::list(member)?;
+            while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
         }
         if report.jobs_left > 0 {
             let walltime = Walltime::new(begin, options.walltime);
@@ -189,7 +192,7 @@ impl Joined<'_> {
                     predicted_cost,
                 })?;
             }
-            let mut collector = Collector::new(self, &share, &walltime, events, report);
+            let mut collector = Collector::new(self, &pending, &walltime, events, report);
             let ended = loop {
                 match collector.run(kernel) {
                     Ok(true) => (),
@@ -197,7 +200,7 @@ impl Joined<'_> {
                 }
                 let must_end = || options.stop.load(Ordering::Relaxed) || walltime.is_over();
                 let left = loop {
-                    match share.left(member) {
+                    match pending.left(member) {
                         // There may be work for this one in the next round.
                         Ok(Left { jobs: 1.., has_abandoned: false, .. })
                             if results.round().is_some() && !must_end() =>
@@ -249,14 +252,6 @@ impl Joined<'_> {
         };
         let generation = claims.last(REDUCTION).unwrap_or_default();
         Ok(is_taken.then_some((claims, generation)))
-    }
-
-    /// Claims the reduction for one that comes after the jobs that this worker runs again: what another reduces
-    /// meanwhile, or has reduced, lacks them.
-    fn claim_next_reduction(&self) -> Result<(), ResultsError> {
-        let mut claims = Claims::list(self.member)?;
-        while !claims.take(REDUCTION, claims.last(REDUCTION).map_or(0, |last| last + 1))? {}
-        Ok(())
     }
 }
 

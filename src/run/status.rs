@@ -1,11 +1,10 @@
 //! The status of a directory: what is done, what is missing, and how long that will take.
 
 use crate::results::events::RunEvent;
-use crate::results::pending::{Again, PartState};
+use crate::results::pending::{Again, PartState, Pending};
 use crate::results::rounds::RoundsSoFar;
 use crate::results::workers::{Living, Worker};
 use crate::results::{Results, ResultsError};
-use crate::run::take::Share;
 use crate::sweep::{Outline, Part};
 use serde::Serialize;
 use std::time::SystemTime;
@@ -67,14 +66,14 @@ pub struct Failure {
     pub command: String,
 }
 
-impl Share<'_> {
+impl Pending<'_> {
     /// How far the parts are, by their names alone unless jobs of them may run again. With `looks`, looks into every part;
     /// visits jobs that failed, each with its part, its position and the reason.
     pub fn overview(&self, looks: bool, mut visit: impl FnMut(&Part, usize, &str)) -> Result<Overview, ResultsError> {
         let looks = looks || self.may_run_again();
         let mut overview = Overview::default();
         for outline in self.parts {
-            if self.pending.done.has(outline) {
+            if self.done.has(outline) {
                 overview.parts_done += 1;
                 overview.jobs_done += outline.job_count as u64;
                 overview.predicted_cost_done += outline.cost;
@@ -82,7 +81,7 @@ impl Share<'_> {
                     continue;
                 }
             }
-            match self.pending.state(outline)? {
+            match self.state(outline)? {
                 PartState::Missing { spilled } => {
                     let jobs = if spilled.is_empty() { Vec::new() } else { self.part(outline).jobs };
                     let spilled_cost: f64 = spilled.iter().map(|&position| jobs[position].cost).sum();
@@ -119,11 +118,11 @@ impl Share<'_> {
 }
 
 /// Of the jobs of parts that are done, those that the sweep which was asked for last does not have.
-fn jobs_kept(share: &Share<'_>) -> u64 {
-    let last = share.results.extensions().len() - 1;
-    let earlier = share.parts.iter().filter(|part| part.extension < last && share.pending.done.has(part));
-    let jobs = earlier.flat_map(|part| share.part(part).jobs);
-    jobs.filter(|job| !share.results.sweep().contains(&job.parameters)).count() as u64
+fn jobs_kept(pending: &Pending<'_>) -> u64 {
+    let last = pending.results.extensions().len() - 1;
+    let earlier = pending.parts.iter().filter(|part| part.extension < last && pending.done.has(part));
+    let jobs = earlier.flat_map(|part| pending.part(part).jobs);
+    jobs.filter(|job| !pending.results.sweep().contains(&job.parameters)).count() as u64
 }
 
 pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
@@ -134,8 +133,8 @@ pub fn status(results: &Results<'_>) -> Result<Status, ResultsError> {
 pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status, ResultsError> {
     let mut failures = Vec::new();
     let parts: Vec<Outline> = results.plan().outlines().collect();
-    let share = Share::look_up(results, &parts, false)?;
-    let mut overview = share.overview(true, |part, position, reason| {
+    let pending = Pending::look_up(results, &parts, false)?;
+    let mut overview = pending.overview(true, |part, position, reason| {
         if failures.len() < max_failures {
             failures.push(Failure {
                 job_id: results.job_id(part, position),
@@ -144,12 +143,15 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
             });
         }
     })?;
-    overview.jobs_kept = jobs_kept(&share);
-    let mut last_threads = None;
-    results.events(|event| {
-        if let RunEvent::Started { threads, .. } = event {
-            last_threads = Some(threads);
+    overview.jobs_kept = jobs_kept(&pending);
+    let (mut last_threads, mut predicted, mut measured) = (None, 0.0, 0.0);
+    results.events(|event| match event {
+        RunEvent::Started { threads, .. } => last_threads = Some(threads),
+        RunEvent::PartCommitted { predicted_cost, wall, .. } => {
+            predicted += predicted_cost;
+            measured += wall;
         }
+        _ => (),
     })?;
     let now = SystemTime::now();
     let present = |Living { worker, beat, .. }| {
@@ -162,7 +164,7 @@ pub fn status_with(results: &Results<'_>, max_failures: usize) -> Result<Status,
     } else {
         Some(workers.iter().map(|present| present.worker.threads).fold(0, usize::saturating_add))
     };
-    let pace = results.pace()?;
+    let pace = (predicted > 0.0).then(|| measured / predicted);
     Ok(Status {
         name: results.sweep().name().to_owned(),
         overview,

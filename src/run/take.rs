@@ -8,7 +8,7 @@ use crate::results::claims::{Claims, Standing};
 use crate::results::layout::PartName;
 use crate::results::pending::{Again, PartState, Pending};
 use crate::results::workers::{Living, Member};
-use crate::results::{Results, ResultsError, tables};
+use crate::results::{ResultsError, tables};
 use crate::run::walltime::Walltime;
 use crate::sweep::{Outline, Part};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -21,16 +21,6 @@ const LOSSES: u32 = 3;
 /// Time between two looks at workers who may have died, for one that has nothing else to do, and for one that has.
 pub(super) const LOOK: Duration = if cfg!(test) { Duration::ZERO } else { Duration::from_millis(500) };
 const LOOK_BUSY: Duration = Duration::from_secs(5);
-
-/// Parts that are a worker's to take, and which of them were done when that was looked up.
-pub(super) struct Share<'a> {
-    pub results: &'a Results<'a>,
-    /// In plan order.
-    pub parts: &'a [Outline],
-    /// Whether failed jobs are to be run again.
-    retry_failed: bool,
-    pub pending: Pending<'a>,
-}
 
 /// A part that this worker has taken.
 #[derive(Debug)]
@@ -70,31 +60,17 @@ pub(super) struct Left {
     pub has_abandoned: bool,
 }
 
-impl<'a> Share<'a> {
-    /// Looks up which of these parts are done.
-    pub fn look_up(results: &'a Results<'a>, parts: &'a [Outline], retry_failed: bool) -> Result<Self, ResultsError> {
-        Ok(Self { results, parts, retry_failed, pending: Pending::look_up(results)? })
-    }
-
-    pub fn part(&self, outline: &Outline) -> Part {
-        self.results.plan().part(outline)
-    }
-
-    /// Whether a part that is done may have jobs to be run.
-    pub fn may_run_again(&self) -> bool {
-        self.retry_failed || self.pending.may_have_cut_off()
-    }
-
+impl Pending<'_> {
     /// Number and predicted cost of the jobs of the parts that were done since they were looked up.
-    pub fn done_since(&self) -> Result<(u64, f64), ResultsError> {
+    pub(super) fn done_since(&self) -> Result<(u64, f64), ResultsError> {
         let done = self.results.done_parts()?;
-        let new = self.parts.iter().filter(|part| done.has(part) && !self.pending.done.has(part));
+        let new = self.parts.iter().filter(|part| done.has(part) && !self.done.has(part));
         Ok(new.fold((0, 0.0), |(jobs, cost), part| (jobs + part.job_count as u64, cost + part.cost)))
     }
 
     /// What is left now, once this worker has committed all that it has taken. The last of all workers to look finds
     /// nothing.
-    pub fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
+    pub(super) fn left(&self, member: &Member<'_>) -> Result<Left, ResultsError> {
         let (others, claims) = (member.others()?, Claims::list(member)?);
         let done = self.results.done_parts()?;
         let mut left = Left::default();
@@ -115,9 +91,9 @@ impl<'a> Share<'a> {
     }
 }
 
-/// Takes parts of a share, and gives their jobs one by one.
+/// Takes pending parts, and gives their jobs one by one.
 pub(super) struct Work<'a> {
-    share: &'a Share<'a>,
+    pending: &'a Pending<'a>,
     member: &'a Member<'a>,
     walltime: &'a Walltime,
     claims: Claims<'a>,
@@ -133,16 +109,16 @@ pub(super) struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    pub fn new(share: &'a Share<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
+    pub fn new(pending: &'a Pending<'a>, member: &'a Member<'a>, walltime: &'a Walltime) -> Result<Self, ResultsError> {
         let (others, claims) = (member.others()?, Claims::list(member)?);
-        let parts = share.parts.iter().filter(|part| !share.pending.done.has(part) || share.may_run_again());
+        let parts = pending.parts.iter().filter(|part| !pending.done.has(part) || pending.may_run_again());
         let mut pass: Vec<&Outline> = parts.collect();
         if !others.is_empty() && !pass.is_empty() {
             let place = member.number() % pass.len() as u64;
             pass.rotate_left(usize::try_from(place).unwrap_or_default());
         }
         Ok(Self {
-            share,
+            pending,
             member,
             walltime,
             claims,
@@ -186,7 +162,7 @@ impl<'a> Work<'a> {
     /// Time between two looks at workers who may have died; none for one that was alone, has nothing else to do, and has
     /// rounds before it.
     fn pause(&self, is_busy: bool) -> Duration {
-        let has_rounds = self.share.results.round().is_some();
+        let has_rounds = self.pending.results.round().is_some();
         match (is_busy, self.others.is_empty() && has_rounds) {
             (true, _) => LOOK_BUSY,
             (false, true) => Duration::ZERO,
@@ -198,7 +174,7 @@ impl<'a> Work<'a> {
     /// nobody is at it.
     fn take_unclaimed(&mut self, outline: &Outline) -> Result<bool, ResultsError> {
         let name = PartName::from(outline).to_string();
-        if !self.share.pending.done.has(outline) {
+        if !self.pending.done.has(outline) {
             return Ok(self.claims.last(&name).is_none() && self.take_part(outline, 0)?);
         }
         match self.claims.standing(&name, &self.others)? {
@@ -213,10 +189,10 @@ impl<'a> Work<'a> {
         // In this order: who has ended has committed or spilled before.
         let others = self.member.others()?;
         self.claims.refresh()?;
-        self.share.pending.look_at_spill()?;
-        let done = self.share.results.done_parts()?;
+        self.pending.look_at_spill()?;
+        let done = self.pending.results.done_parts()?;
         let mut is_certain = true;
-        for part in self.share.parts.iter().filter(|part| !done.has(part)) {
+        for part in self.pending.parts.iter().filter(|part| !done.has(part)) {
             match self.claims.standing(&PartName::from(part).to_string(), &others)? {
                 Standing::Own => (),
                 Standing::Taken(owner) => {
@@ -240,16 +216,16 @@ impl<'a> Work<'a> {
 
     /// Takes what is to be run of a part.
     fn take_part(&mut self, outline: &Outline, generation: u64) -> Result<bool, ResultsError> {
-        match self.share.pending.state(outline)? {
+        match self.pending.state(outline)? {
             PartState::Missing { spilled } => {
                 let left = (0..outline.job_count).filter(|position| !spilled.contains(position));
                 let jobs = left.map(|position| (position, false)).collect();
-                self.take(self.share.part(outline), spilled, jobs, generation)
+                self.take(self.pending.part(outline), spilled, jobs, generation)
             }
             PartState::Done { again } => {
                 let again = again.into_iter().map(|(position, why)| (position, why != Again::CutOff));
-                let jobs: Vec<_> = again.filter(|&(_, failed)| self.share.retry_failed || !failed).collect();
-                Ok(!jobs.is_empty() && self.take(self.share.part(outline), BTreeSet::new(), jobs, generation)?)
+                let jobs: Vec<_> = again.filter(|&(_, failed)| self.pending.retry_failed || !failed).collect();
+                Ok(!jobs.is_empty() && self.take(self.pending.part(outline), BTreeSet::new(), jobs, generation)?)
             }
         }
     }
@@ -273,7 +249,7 @@ impl<'a> Work<'a> {
             }
             return Ok(false);
         }
-        let again = self.share.pending.done.has(&part);
+        let again = self.pending.done.has(&part);
         let taken = Arc::new(Taken { part, spilled, again, together: jobs.len(), begin: Instant::now() });
         let job = |(position, failed_before)| PartJob { of: Arc::clone(&taken), position, failed_before };
         self.jobs.extend(jobs.into_iter().map(job));

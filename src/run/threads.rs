@@ -14,16 +14,8 @@ pub const MAX_THREADS: usize = 1024;
 
 /// What is no number of threads.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ThreadsError {
-    #[error("{variable}={value}: must be a whole number from 1 to {MAX_THREADS}; unset it, or give --threads")]
-    Variable {
-        variable: &'static str,
-        /// What it holds, as it can be shown.
-        value: String,
-    },
-    #[error("{0} threads: must be a whole number from 1 to {MAX_THREADS}")]
-    Asked(NonZeroUsize),
-}
+#[error("{0}")]
+pub struct ThreadsError(String);
 
 /// How many threads, and who said so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,25 +34,19 @@ impl Threads {
     ) -> Result<Self, ThreadsError> {
         let granted = |variable| Some((variable, environment(variable).filter(|value| !value.is_empty())?));
         let Some((variable, value)) = VARIABLES.into_iter().find_map(granted).filter(|_| asked.is_none()) else {
-            let too_many = asked.filter(|count| !is_bearable(*count));
-            return too_many.map_or(Ok(Self { count: asked, variable: None }), |count| Err(ThreadsError::Asked(count)));
+            let count = asked.map(|count| parse(&count.to_string()).map_err(|must| format!("{count} threads: {must}")));
+            return Ok(Self { count: count.transpose().map_err(ThreadsError)?, variable: None });
         };
         // OpenMP's may be a list, of one number for each level of nesting.
-        let count = value.to_str().and_then(|value| value.split(',').next()?.trim().parse().ok());
-        let count = count.filter(|count| is_bearable(*count));
-        let count =
-            count.ok_or_else(|| ThreadsError::Variable { variable, value: shown(value.as_ref()).to_string() })?;
-        Ok(Self { count: Some(count), variable: Some(variable) })
+        let count = parse(value.to_str().and_then(|value| value.split(',').next()).unwrap_or_default().trim());
+        let refuse = |must| format!("{variable}={}: {must}; unset it, or give --threads", shown(value.as_ref()));
+        Ok(Self { count: Some(count.map_err(refuse).map_err(ThreadsError)?), variable: Some(variable) })
     }
-}
-
-fn is_bearable(count: NonZeroUsize) -> bool {
-    count.get() <= MAX_THREADS
 }
 
 /// A number of threads, as a flag has it.
 pub fn parse(text: &str) -> Result<NonZeroUsize, String> {
-    let count = text.parse().ok().filter(|count| is_bearable(*count));
+    let count = text.parse().ok().filter(|count: &NonZeroUsize| count.get() <= MAX_THREADS);
     count.ok_or_else(|| format!("must be a whole number from 1 to {MAX_THREADS}"))
 }
 

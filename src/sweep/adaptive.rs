@@ -94,8 +94,11 @@ impl Sweep {
 
     /// The sets of the first round, in order: all combinations of the rows that the sweep file has.
     pub(super) fn first_sets(&self) -> BTreeSet<u64> {
-        let spacing_of = |axis| self.rounds.as_ref().map_or(1, |rounds| rounds.spacing(axis));
-        let mut spacing: Vec<u64> = (0..self.axes.len()).map(spacing_of).collect();
+        // How many rows of the grid lie between two of the first round, on each axis.
+        let mut spacing = vec![1; self.axes.len()];
+        if let Some(refinement) = self.refinement() {
+            spacing[refinement.axis] = 1 << refinement.levels;
+        }
         if let Some(axis) = self.seed_axis() {
             spacing[axis] = self.axes[axis].len();
         }

@@ -36,7 +36,7 @@ pub(super) enum Axis {
 /// Listed rows and their order for look-up.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
-    columns: Vec<Column>,
+    pub columns: Vec<Column>,
     /// Rows in the order of the parameters that they lead to, the period last.
     sorted: Vec<u32>,
     /// For each row, whether no earlier one equals it in all but what fixes the period.
@@ -129,10 +129,6 @@ impl Axis {
 }
 
 impl Table {
-    pub fn columns(&self) -> &[Column] {
-        &self.columns
-    }
-
     /// Where a row stands among the sorted ones, against one that leads to these parameters.
     fn compare(&self, row: u32, wanted: &Parameters) -> Ordering {
         let columns = |fix_period| self.columns.iter().filter(move |column| column.quantity.is_period() == fix_period);

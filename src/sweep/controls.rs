@@ -23,7 +23,7 @@ impl Axis {
     /// What is left of it without modulation; `None` if nothing is.
     fn unmodulated(&self) -> Option<Self> {
         let Self::Table(table) = self else { return Some(self.clone()) };
-        let kept = table.columns().iter().filter(|column| !column.quantity.is_of_modulation());
+        let kept = table.columns.iter().filter(|column| !column.quantity.is_of_modulation());
         let kept: Vec<&Column> = kept.collect();
         let rows = kept.first()?.values.len();
         let mut seen = HashSet::new();
@@ -59,7 +59,7 @@ impl Sweep {
     /// Id of the set that is the control of a modulated job; `None` if the sweep has no controls.
     pub fn control_of(&self, parameters: &Parameters) -> Option<String> {
         let is_wanted = self.controls.is_some() && parameters.modulation_amplitude > 0.0;
-        is_wanted.then(|| self.set_id(&parameters.without_modulation()).to_string())
+        is_wanted.then(|| self.set_id(&parameters.without_modulation()))
     }
 
     /// These points of the grid, and the controls of their jobs.
@@ -101,7 +101,7 @@ mod tests {
         }
         let first = sweep.jobs().next().unwrap().parameters;
         let own = sweep.jobs().find(|job| job.parameters == first.without_modulation()).unwrap();
-        assert_eq!(sweep.control_of(&first), Some(sweep.set_id(&own.parameters).to_string()));
+        assert_eq!(sweep.control_of(&first), Some(sweep.set_id(&own.parameters)));
         assert_eq!(sweep.control_of(&own.parameters), None);
     }
 

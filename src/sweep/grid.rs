@@ -8,7 +8,7 @@
 use super::axes::Axis;
 use super::cost::predicted_cost;
 use super::expression::Expression;
-use super::job::{Id, Identity, Job, settings};
+use super::job::{Identity, Job, settings};
 use super::quantity::{Point, Quantity};
 use super::rounds::Rounds;
 use crate::model::{Parameters, Symbol};
@@ -115,11 +115,11 @@ impl Sweep {
         is_job.then(|| self.axes.iter().zip(rows).fold(0, |number, (axis, row)| number * axis.len() + row))
     }
 
-    pub fn job_id(&self, parameters: &Parameters) -> Id {
+    pub fn job_id(&self, parameters: &Parameters) -> String {
         self.identity.job(parameters)
     }
 
-    pub fn set_id(&self, parameters: &Parameters) -> Id {
+    pub fn set_id(&self, parameters: &Parameters) -> String {
         self.identity.set(parameters)
     }
 

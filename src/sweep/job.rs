@@ -1,15 +1,17 @@
-//! A job, and the names by which results know it.
+//! A job: the names by which results know it, and the command line that does the same, so that one that fails can be looked
+//! at alone.
 //!
 //! An id is the first half of SHA-256 over the model version, the scheme of random numbers, and all of solver, recording
 //! and parameters that is not at its default, parameters with their exact bits: never over the place in a grid. So what is
 //! added later changes no id. Contract: pinned by known-answer tests, and so are the defaults.
 
+use super::grid::Sweep;
 use crate::model::{MODEL_VERSION, Parameters, RNG_SCHEME, Symbol, Value};
 use crate::observe::{Recording, RecordingKey};
 use crate::solver::Solver;
+use crate::table::checksum::hexadecimal;
 use crate::table::value::Shortest;
 use sha2::{Digest, Sha256};
-use std::fmt;
 
 /// One point of a sweep.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,18 +26,8 @@ pub struct Job {
 /// Bytes of an id: 128 bits, so that ten million jobs collide with a probability of about 1e-25.
 const ID_BYTES: usize = 16;
 
-/// Name of a job, or of the jobs that differ in the seed alone. Shown as 32 hexadecimal characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Id(pub [u8; ID_BYTES]);
-
-impl fmt::Display for Id {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
-}
-
 /// Keys and values of the solver, as a sweep file writes them: they read back to the same bits.
-pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
+fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
     match solver {
         Solver::EventDriven { tolerance, resolve } => vec![
             ("method", "event-driven".to_owned()),
@@ -45,6 +37,29 @@ pub(super) fn solver_settings(solver: Solver) -> Vec<(&'static str, String)> {
         Solver::FixedStep { time_step } => {
             vec![("method", "fixed-step".to_owned()), ("dt", Shortest(time_step).to_string())]
         }
+    }
+}
+
+impl Sweep {
+    /// The `stickslip simulate` command that does what a job of this sweep does: what differs from the defaults, in digits
+    /// that read back to the same bits.
+    pub fn command(&self, job: &Job) -> String {
+        let mut words = vec!["stickslip simulate".to_owned()];
+        let defaults = Parameters::default();
+        let parameters = Symbol::ALL.into_iter().map(|symbol| (symbol, job.parameters.get(symbol)));
+        let parameters = parameters.filter(|(symbol, value)| *value != defaults.get(*symbol) && *value != Value::Null);
+        words.extend(parameters.map(|(symbol, value)| format!("--set {}={value}", symbol.key())));
+        // Its default is another there.
+        words.push(format!("--slips {}", self.recording.slips));
+        // A single job has no control.
+        let defaults =
+            Recording { slips: self.recording.slips, control: self.recording.control, ..Recording::default() };
+        let recording = RecordingKey::ALL.into_iter().filter(|&key| self.recording.get(key) != defaults.get(key));
+        words.extend(recording.map(|key| format!("--record {}={}", key.key(), self.recording.get(key))));
+        let defaults = solver_settings(Solver::default());
+        let settings = solver_settings(self.solver).into_iter().filter(|setting| !defaults.contains(setting));
+        words.extend(settings.map(|(key, value)| format!("--set {key}={value}")));
+        words.join(" ")
     }
 }
 
@@ -58,7 +73,7 @@ pub(super) fn settings(solver: Solver, recording: &Recording) -> impl Iterator<I
     solver.chain(RecordingKey::ALL.map(|key| (format!("record.{}", key.key()), recording.get(key).to_string())))
 }
 
-/// Gives jobs their ids: all that they share is hashed once.
+/// Gives jobs their ids, of 32 hexadecimal characters: all that they share is hashed once.
 #[derive(Clone, Debug)]
 pub struct Identity {
     shared: Sha256,
@@ -82,16 +97,16 @@ impl Identity {
     }
 
     /// The id of a job with these canonical parameters.
-    pub fn job(&self, parameters: &Parameters) -> Id {
+    pub fn job(&self, parameters: &Parameters) -> String {
         self.hash(parameters, &Symbol::ALL)
     }
 
     /// The id of the set that such a job belongs to.
-    pub fn set(&self, parameters: &Parameters) -> Id {
+    pub fn set(&self, parameters: &Parameters) -> String {
         self.hash(parameters, Symbol::ALL.split_last().map_or(&[], |(_, others)| others))
     }
 
-    fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> Id {
+    fn hash(&self, parameters: &Parameters, symbols: &[Symbol]) -> String {
         let (mut hasher, defaults) = (self.shared.clone(), Parameters::default());
         for &symbol in symbols {
             let value = parameters.get(symbol);
@@ -106,8 +121,7 @@ impl Identity {
                 hasher.update("\n");
             }
         }
-        let digest = hasher.finalize();
-        Id(std::array::from_fn(|byte| digest[byte]))
+        hexadecimal(&hasher.finalize()[..ID_BYTES])
     }
 }
 
@@ -132,9 +146,9 @@ mod tests {
             ..Parameters::default()
         };
         let default = Identity::new(Solver::default(), &Recording::default());
-        assert_eq!(default.job(&Parameters::default()).to_string(), "5a03d318da4b4d433cb4649f6cb112c1");
-        assert_eq!(identity().job(&modulated).to_string(), "99900668d7355ca885476379621e7dee");
-        assert_eq!(identity().set(&modulated).to_string(), "c114d52bf333477369486ef0b16ce1dd");
+        assert_eq!(default.job(&Parameters::default()), "5a03d318da4b4d433cb4649f6cb112c1");
+        assert_eq!(identity().job(&modulated), "99900668d7355ca885476379621e7dee");
+        assert_eq!(identity().set(&modulated), "c114d52bf333477369486ef0b16ce1dd");
     }
 
     #[test]

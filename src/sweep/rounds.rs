@@ -90,13 +90,6 @@ pub struct Bounds {
     pub predicted_cost: f64,
 }
 
-impl Rounds {
-    /// How many rows of the grid lie between two of the first round, on this axis.
-    pub(super) fn spacing(&self, axis: usize) -> u64 {
-        self.refinement.as_ref().filter(|refined| refined.axis == axis).map_or(1, |refined| 1 << refined.levels)
-    }
-}
-
 impl Round {
     pub fn has(&self, point: u64) -> bool {
         contains(&self.points, point)

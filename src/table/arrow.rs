@@ -45,22 +45,24 @@ pub fn schema<R: Row>() -> SchemaRef {
 
 /// The same of fields that have a unit and a description.
 pub fn schema_of(fields: Vec<Field>) -> SchemaRef {
-    let by_name = |key: &str| {
-        let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default().into();
-        fields.iter().map(|field| (field.name().clone(), text(field))).collect::<Map<_, _>>()
-    };
+    let by_name = |key| by_name(fields.iter(), key);
     let attributes = json!({ "meaning": by_name(DESCRIPTION), "units": by_name(UNIT) });
     Arc::new(Schema::new_with_metadata(fields, HashMap::from([(PANDAS_ATTRS.to_owned(), attributes.to_string())])))
 }
 
+/// What the metadata of fields hold under a key, by the names of the fields.
+pub(super) fn by_name<'f>(fields: impl Iterator<Item = &'f Field>, key: &str) -> Json {
+    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default().into();
+    fields.map(|field| (field.name().clone(), text(field))).collect::<Map<_, _>>().into()
+}
+
 /// The rows of a batch as texts, which read back as the same values; empty where a value is missing.
 pub fn texts(rows: &RecordBatch) -> impl Iterator<Item = Vec<String>> {
-    let text = |array: &ArrayRef, row: usize| match array.data_type() {
-        _ if array.is_null(row) => String::new(),
-        DataType::Float64 => format!("{:?}", array.as_primitive::<Float64Type>().value(row)),
-        DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
-        DataType::Boolean => array.as_boolean().value(row).to_string(),
-        _ => array.as_string::<i32>().value(row).to_owned(),
+    let text = |array: &ArrayRef, row: usize| match cell(array, row) {
+        Value::Null => String::new(),
+        Value::Real(real) => format!("{real:?}"),
+        Value::Count(count) => count.cast_signed().to_string(),
+        other => other.to_string(),
     };
     (0..rows.num_rows()).map(move |row| rows.columns().iter().map(|array| text(array, row)).collect())
 }
@@ -77,13 +79,12 @@ pub fn json<R: Row>(row: &R) -> Json {
 /// Rows of one table, column by column, before they become a record batch. How rows came in leaves no trace in the batch.
 pub struct RowBuffer {
     schema: SchemaRef,
-    cells: Vec<Cells>,
+    /// Of all columns of the row type; none of one that is left out.
+    cells: Vec<Option<Cells>>,
     rows: usize,
 }
 
 enum Cells {
-    /// Of a column that is left out.
-    None,
     Real(Vec<Option<f64>>),
     Count(Vec<Option<i64>>),
     Flag(Vec<Option<bool>>),
@@ -93,11 +94,13 @@ enum Cells {
 impl RowBuffer {
     /// An empty buffer for rows of this type.
     pub fn new<R: Row>() -> Self {
-        let cells = R::columns().into_iter().map(|column| match column.kind {
-            Kind::Real => Cells::Real(Vec::new()),
-            Kind::Count => Cells::Count(Vec::new()),
-            Kind::Flag => Cells::Flag(Vec::new()),
-            Kind::Text => Cells::Text(Vec::new()),
+        let cells = R::columns().into_iter().map(|column| {
+            Some(match column.kind {
+                Kind::Real => Cells::Real(Vec::new()),
+                Kind::Count => Cells::Count(Vec::new()),
+                Kind::Flag => Cells::Flag(Vec::new()),
+                Kind::Text => Cells::Text(Vec::new()),
+            })
         });
         Self { schema: schema::<R>(), cells: cells.collect(), rows: 0 }
     }
@@ -107,7 +110,7 @@ impl RowBuffer {
         let has = |field: &Field| !left_out.iter().any(|name| name == field.name());
         for (field, cells) in self.schema.fields().iter().zip(&mut self.cells) {
             if !has(field) {
-                *cells = Cells::None;
+                *cells = None;
             }
         }
         self.schema = schema_of(self.schema.fields().iter().map(|field| Field::clone(field)).filter(has).collect());
@@ -130,7 +133,7 @@ impl RowBuffer {
     pub fn push<R: Row>(&mut self, row: &R) {
         let mut columns = self.cells.iter_mut();
         row.cells(&mut |cell| {
-            if let Some(column) = columns.next() {
+            if let Some(Some(column)) = columns.next() {
                 column.push(cell);
             }
         });
@@ -139,10 +142,9 @@ impl RowBuffer {
 
     /// Appends some rows of a batch of the same table.
     pub fn copy(&mut self, batch: &RecordBatch, rows: Range<usize>) -> Result<(), ArrowError> {
-        let there = self.cells.iter_mut().filter(|cells| !matches!(cells, Cells::None));
-        for (field, cells) in self.schema.fields().iter().zip(there) {
+        for (field, cells) in self.schema.fields().iter().zip(self.cells.iter_mut().flatten()) {
             let array = column(batch, field.name(), field.data_type()).map_err(ArrowError::SchemaError)?;
-            cells.extend(&array.slice(rows.start, rows.len()));
+            rows.clone().for_each(|row| cells.push(cell(array, row)));
         }
         self.rows += rows.len();
         Ok(())
@@ -151,7 +153,7 @@ impl RowBuffer {
     /// Takes all rows out as one batch.
     pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
-        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().filter_map(Cells::take).collect())
+        RecordBatch::try_new(Arc::clone(&self.schema), self.cells.iter_mut().flatten().map(Cells::take).collect())
     }
 }
 
@@ -159,7 +161,6 @@ impl Cells {
     fn push(&mut self, cell: Value<'_>) {
         // What is of no kind is a missing value; a cell of another kind than its column does not exist.
         match self {
-            Self::None => (),
             Self::Real(cells) => cells.push(if let Value::Real(real) = cell { Some(real) } else { None }),
             Self::Count(cells) => cells.push(u64::from_value(cell).map(u64::cast_signed)),
             Self::Flag(cells) => cells.push(bool::from_value(cell)),
@@ -167,25 +168,13 @@ impl Cells {
         }
     }
 
-    /// Appends the cells of an array of the column's type.
-    fn extend(&mut self, array: &dyn Array) {
+    fn take(&mut self) -> ArrayRef {
         match self {
-            Self::None => (),
-            Self::Real(cells) => cells.extend(array.as_primitive::<Float64Type>()),
-            Self::Count(cells) => cells.extend(array.as_primitive::<Int64Type>()),
-            Self::Flag(cells) => cells.extend(array.as_boolean()),
-            Self::Text(cells) => cells.extend(array.as_string::<i32>().iter().map(|text| text.map(str::to_owned))),
-        }
-    }
-
-    fn take(&mut self) -> Option<ArrayRef> {
-        Some(match self {
-            Self::None => return None,
             Self::Real(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Float64Array>()),
             Self::Count(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<Int64Array>()),
             Self::Flag(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<BooleanArray>()),
             Self::Text(cells) => Arc::new(std::mem::take(cells).into_iter().collect::<StringArray>()),
-        })
+        }
     }
 }
 
@@ -196,13 +185,13 @@ fn column<'a>(batch: &'a RecordBatch, name: &str, expected: &DataType) -> Result
     if found == expected { Ok(array) } else { Err(format!("column {name} is {found}, not {expected}")) }
 }
 
-fn cell(array: &dyn Array, kind: Kind, row: usize) -> Value<'_> {
-    match kind {
+fn cell(array: &ArrayRef, row: usize) -> Value<'_> {
+    match array.data_type() {
         _ if array.is_null(row) => Value::Null,
-        Kind::Real => Value::Real(array.as_primitive::<Float64Type>().value(row)),
-        Kind::Count => Value::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
-        Kind::Flag => Value::Flag(array.as_boolean().value(row)),
-        Kind::Text => Value::Text(array.as_string::<i32>().value(row)),
+        DataType::Float64 => Value::Real(array.as_primitive::<Float64Type>().value(row)),
+        DataType::Int64 => Value::Count(array.as_primitive::<Int64Type>().value(row).cast_unsigned()),
+        DataType::Boolean => Value::Flag(array.as_boolean().value(row)),
+        _ => Value::Text(array.as_string::<i32>().value(row)),
     }
 }
 
@@ -213,14 +202,12 @@ pub fn rows<R: FromRow>(batch: &RecordBatch) -> Result<Vec<R>, String> {
         if described.nullable && batch.column_by_name(&described.name).is_none() {
             return Ok(None);
         }
-        let array = column(batch, &described.name, &data_type(described.kind))?;
-        Ok(Some((array.as_ref(), described.kind)))
+        column(batch, &described.name, &data_type(described.kind)).map(Some)
     });
-    let arrays = arrays.collect::<Result<Vec<Option<(&dyn Array, Kind)>>, String>>()?;
+    let arrays = arrays.collect::<Result<Vec<Option<&ArrayRef>>, String>>()?;
     let row = |row: usize| {
         let mut columns = arrays.iter();
-        let mut next = || columns.next().copied().flatten();
-        R::from_cells(&mut || next().map_or(Value::Null, |(array, kind)| cell(array, kind, row)))
+        R::from_cells(&mut || columns.next().copied().flatten().map_or(Value::Null, |array| cell(array, row)))
     };
     (0..batch.num_rows()).map(row).collect()
 }

@@ -1,58 +1,101 @@
-//! Why a table file cannot be written or read.
+//! Why a results directory, or a file of it, cannot be used, written or changed: where, what, and the way out.
 
 use crate::table::shown::{shown, shown_text};
 use crate::table::storage::StorageError;
 use parquet::errors::ParquetError;
+use std::error::Error;
+use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 
-/// A table file that cannot be written or read.
-#[derive(Debug, thiserror::Error)]
-pub enum DatasetError {
-    /// A file operation failed, which says nothing about what the file holds.
-    #[error(transparent)]
-    Storage(StorageError),
-    #[error("{}: cannot be written: {source}", shown(path))]
-    Write { path: PathBuf, source: ParquetError },
-    /// A file is cut off, changed or no table.
-    #[error(
-        "{}: damaged: {}; `stickslip verify` on its results directory reports how to repair it",
-        shown(path),
-        shown_text(problem)
-    )]
-    Damaged { path: PathBuf, problem: String },
-    /// Something else lies among the files of a table.
-    #[error("{}: is no table file, and a table folder may hold nothing else; move it away", shown(path))]
-    Stray { path: PathBuf },
+/// Whose fault an error is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// What was asked for does not fit the directory. Nothing was changed.
+    Refused,
+    /// Another process has the directory, or a share of it. Nothing was changed.
+    Busy,
+    /// Others have taken over the work of this process.
+    Stopped,
+    /// A file is not as it was written: cut off, changed or no table.
+    Damaged,
+    /// A file operation failed, which says nothing about what the file holds; what was committed is kept, and the same can
+    /// be tried again.
+    Disk(io::ErrorKind),
 }
 
-impl From<StorageError> for DatasetError {
-    fn from(error: StorageError) -> Self {
-        if error.is_no_file() {
-            Self::Damaged { path: error.path, problem: error.source.to_string() }
-        } else {
-            Self::Storage(error)
-        }
+/// A results directory, or a file of it, that cannot be used, written or changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ResultsError {
+    pub kind: ErrorKind,
+    /// The file or the directory.
+    pub path: PathBuf,
+    /// What is wrong with it, and the way out where the kind does not say it.
+    pub problem: String,
+}
+
+impl ResultsError {
+    pub(crate) fn new(kind: ErrorKind, path: &Path, problem: impl fmt::Display) -> Self {
+        Self { kind, path: path.to_owned(), problem: problem.to_string() }
     }
-}
 
-impl DatasetError {
-    /// Of a file that must be there: what is wrong with it, as far as that is known.
-    /// An error of the disk stays one: what cannot be read is not damaged.
-    pub fn damage(self) -> Result<(PathBuf, String), Self> {
-        match self {
-            Self::Damaged { path, problem } => Ok((path, problem)),
-            Self::Storage(error) if error.is_missing() => Ok((error.path, "it is missing".to_owned())),
-            error => Err(error),
-        }
+    /// What was asked for does not fit.
+    pub fn refused(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::new(ErrorKind::Refused, path, problem)
+    }
+
+    /// It is not as it was written.
+    pub fn damaged(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::new(ErrorKind::Damaged, path, problem)
+    }
+
+    /// For `map_err`: what was found in a file.
+    pub fn damage_at<E: fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
+        move |problem| Self::damaged(path, problem)
+    }
+
+    /// For `map_err`: why a file of the directory cannot be read. What has its name and is no file is damage.
+    pub fn of_reading(error: StorageError) -> Self {
+        if error.is_no_file() { Self::damaged(&error.path, error.source) } else { error.into() }
     }
 
     /// For `map_err`: why a file cannot be written.
     pub(super) fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> Self {
-        move |source| Self::Write { path: path.to_owned(), source }
+        move |error| Self::new(ErrorKind::Disk(io::ErrorKind::Other), path, format!("cannot be written: {error}"))
     }
 
-    /// For `map_err`: what was found in a file.
-    pub fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
-        move |problem| Self::Damaged { path: path.to_owned(), problem: problem.to_string() }
+    /// Of a file that must be there: its path and what is wrong with it, as far as that is known.
+    /// An error of the disk stays one: what cannot be read is not damaged.
+    pub fn damage(self) -> Result<(PathBuf, String), Self> {
+        match self.kind {
+            ErrorKind::Damaged => Ok((self.path, self.problem)),
+            ErrorKind::Disk(io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                Ok((self.path, "it is missing".to_owned()))
+            }
+            _ => Err(self),
+        }
+    }
+}
+
+impl fmt::Display for ResultsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, path, problem } = self;
+        let path = shown(path);
+        match kind {
+            ErrorKind::Damaged => write!(
+                f,
+                "{path}: damaged: {}; `stickslip verify` on the results directory reports how to repair it",
+                shown_text(problem)
+            ),
+            _ => write!(f, "{path}: {problem}"),
+        }
+    }
+}
+
+impl Error for ResultsError {}
+
+impl From<StorageError> for ResultsError {
+    fn from(error: StorageError) -> Self {
+        Self::new(ErrorKind::Disk(error.kind()), &error.path, format!("cannot {}: {}", error.action, error.source))
     }
 }

@@ -8,10 +8,10 @@ use crate::model::{MODEL_VERSION, RNG_SCHEME};
 use crate::table::arrow::{self, DESCRIPTION, RowBuffer, UNIT};
 use crate::table::checksum;
 use crate::table::columns::{FromRow, Row};
-pub use crate::table::error::DatasetError;
+use crate::table::error::ResultsError;
 use crate::table::storage::{Storage, StoredFile};
 use arrow_array::RecordBatch;
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{ArrowError, DataType, Schema};
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::{ArrowWriter, ProjectionMask};
@@ -68,7 +68,7 @@ impl Footer {
     }
 
     pub(super) fn properties(&self, schema: &Schema) -> Result<WriterProperties, ParquetError> {
-        let (units, meaning) = (by_name(schema, UNIT), by_name(schema, DESCRIPTION));
+        let [units, meaning] = [UNIT, DESCRIPTION].map(|key| by_name(schema, key));
         let footer = self.clone().with(UNITS, &units).with("meaning", &meaning);
         let footer = footer.with(checksum::FOOTER_KEY, checksum::PLACEHOLDER);
         let mut properties = WriterProperties::builder()
@@ -92,9 +92,7 @@ const UNITS: &str = "units";
 
 /// What the metadata of all fields hold under a key, as JSON.
 fn by_name(schema: &Schema, key: &str) -> String {
-    let text = |field: &Field| field.metadata().get(key).cloned().unwrap_or_default();
-    let entries = schema.fields().iter().map(|field| (field.name().clone(), text(field).into()));
-    serde_json::Value::Object(entries.collect()).to_string()
+    arrow::by_name(schema.fields().iter().map(AsRef::as_ref), key).to_string()
 }
 
 /// Whether a footer is that of a file with these columns.
@@ -114,30 +112,30 @@ pub struct TableWriter<R> {
 
 impl<R: Row> TableWriter<R> {
     /// Writes into this file, which is empty.
-    pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
+    pub fn new(file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
         Self::without(&[], file, footer)
     }
 
     /// The same without the columns of these names.
-    pub fn without(left_out: &[Cow<'static, str>], file: StoredFile, footer: &Footer) -> Result<Self, DatasetError> {
+    pub fn without(left_out: &[Cow<'static, str>], file: StoredFile, footer: &Footer) -> Result<Self, ResultsError> {
         let buffer = RowBuffer::new::<R>().without(left_out);
         let writer = footer
             .properties(buffer.schema())
             .and_then(|properties| ArrowWriter::try_new(Vec::new(), Arc::clone(buffer.schema()), Some(properties)))
-            .map_err(DatasetError::unwritten(file.path()))?;
+            .map_err(ResultsError::unwritten(file.path()))?;
         Ok(Self { row: PhantomData, buffer, writer, file, hasher: Sha256::new() })
     }
 
-    pub fn push(&mut self, row: &R) -> Result<(), DatasetError> {
+    pub fn push(&mut self, row: &R) -> Result<(), ResultsError> {
         self.buffer.push(row);
         if self.buffer.len() == GROUP_ROWS { self.flush() } else { Ok(()) }
     }
 
     /// Appends rows that were read from a file of the same table.
-    pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), DatasetError> {
+    pub fn copy(&mut self, batch: &Batch, mut rows: Range<usize>) -> Result<(), ResultsError> {
         while !rows.is_empty() {
             let next = rows.end.min(rows.start + GROUP_ROWS - self.buffer.len());
-            self.buffer.copy(&batch.rows, rows.start..next).map_err(DatasetError::damaged(&batch.path))?;
+            self.buffer.copy(&batch.rows, rows.start..next).map_err(ResultsError::damage_at(&batch.path))?;
             rows.start = next;
             if self.buffer.len() == GROUP_ROWS {
                 self.flush()?;
@@ -147,10 +145,10 @@ impl<R: Row> TableWriter<R> {
     }
 
     /// Writes the buffered rows as a row group.
-    fn flush(&mut self) -> Result<(), DatasetError> {
+    fn flush(&mut self) -> Result<(), ResultsError> {
         let written = self.buffer.take().map_err(ParquetError::from).and_then(|batch| self.writer.write(&batch));
         let written = written.and_then(|()| self.writer.flush()).and_then(|()| Ok(self.writer.sync()?));
-        written.map_err(DatasetError::unwritten(self.file.path()))?;
+        written.map_err(ResultsError::unwritten(self.file.path()))?;
         let bytes = std::mem::take(self.writer.inner_mut());
         self.hasher.update(&bytes);
         Ok(self.file.write(&bytes)?)
@@ -158,7 +156,7 @@ impl<R: Row> TableWriter<R> {
 
     /// Writes what is left and the footer, brings the file to the disk.
     /// Without it, the file is unreadable.
-    pub fn finish(mut self) -> Result<(), DatasetError> {
+    pub fn finish(mut self) -> Result<(), ResultsError> {
         if !self.buffer.is_empty() {
             self.flush()?;
         }
@@ -167,7 +165,7 @@ impl<R: Row> TableWriter<R> {
             let missing = || ParquetError::General("the footer has no place for a checksum".to_owned());
             checksum::close(self.hasher, &mut footer).ok_or_else(missing).map(|()| footer)
         });
-        let footer = footer.map_err(DatasetError::unwritten(file.path()))?;
+        let footer = footer.map_err(ResultsError::unwritten(file.path()))?;
         file.write(&footer)?;
         Ok(file.sync()?)
     }
@@ -181,22 +179,22 @@ pub struct Batch {
 }
 
 impl Batch {
-    pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, DatasetError> {
-        arrow::rows(&self.rows).map_err(DatasetError::damaged(&self.path))
+    pub fn rows_of<R: FromRow>(&self) -> Result<Vec<R>, ResultsError> {
+        arrow::rows(&self.rows).map_err(ResultsError::damage_at(&self.path))
     }
 }
 
 /// The bytes of a file that are those that were written.
-fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, DatasetError> {
-    let bytes = storage.read(path)?;
-    checksum::check(&bytes).map_err(DatasetError::damaged(path))?;
+fn load(storage: &dyn Storage, path: &Path) -> Result<Bytes, ResultsError> {
+    let bytes = storage.read(path).map_err(ResultsError::of_reading)?;
+    checksum::check(&bytes).map_err(ResultsError::damage_at(path))?;
     Ok(bytes.into())
 }
 
 /// The texts under keys in the footer of a file.
-pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, DatasetError> {
+pub fn footer(storage: &dyn Storage, path: &Path) -> Result<BTreeMap<String, String>, ResultsError> {
     let bytes = load(storage, path)?;
-    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(DatasetError::damaged(path))?;
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(ResultsError::damage_at(path))?;
     let entries = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     Ok(entries.map(|entry| (entry.key.clone(), entry.value.clone().unwrap_or_default())).collect())
 }
@@ -243,87 +241,67 @@ impl<'a> Dataset<'a> {
     }
 
     /// Reads all rows, one batch after the other, holding one file; an error ends it.
-    pub fn batches(self) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
+    pub fn batches(self) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         self.read(Vec::new())
     }
 
     /// The same, as rows of one type.
-    pub fn rows<R: FromRow>(self) -> impl Iterator<Item = Result<Vec<R>, DatasetError>> + use<'a, R> {
+    pub fn rows<R: FromRow>(self) -> impl Iterator<Item = Result<Vec<R>, ResultsError>> + use<'a, R> {
         self.read(R::columns().into_iter().map(|column| column.name).collect()).map(|batch| batch?.rows_of())
     }
 
     /// The same, of the columns with these names alone, of which there is at least one; in the order of the file.
-    pub fn columns(self, names: &[String]) -> impl Iterator<Item = Result<Batch, DatasetError>> + use<'a> {
+    pub fn columns(self, names: &[String]) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
         self.read(names.iter().cloned().map(Cow::Owned).collect())
     }
 
-    fn read(self, columns: Vec<Cow<'static, str>>) -> Reader<'a> {
-        Reader { storage: self.storage, files: self.files.into_iter(), columns, current: None }
+    /// Of columns with these names; of all if there are none.
+    fn read(self, columns: Vec<Cow<'static, str>>) -> impl Iterator<Item = Result<Batch, ResultsError>> + use<'a> {
+        let Self { storage, files } = self;
+        let batches = files.into_iter().flat_map(move |(path, expected)| {
+            let opened = open(storage, &path, expected, &columns);
+            let (reader, error) = opened.map_or_else(|error| (None, Some(Err(error))), |reader| (Some(reader), None));
+            let path: Arc<Path> = path.into();
+            let batch = move |rows: Result<RecordBatch, ArrowError>| {
+                Ok(Batch { path: Arc::clone(&path), rows: rows.map_err(ResultsError::damage_at(&path))? })
+            };
+            reader.into_iter().flatten().map(batch).chain(error)
+        });
+        let mut has_failed = false;
+        batches.take_while(move |batch| !std::mem::replace(&mut has_failed, batch.is_err()))
     }
 }
 
-struct Reader<'a> {
-    storage: &'a dyn Storage,
-    files: std::vec::IntoIter<(PathBuf, Option<RowCount>)>,
-    /// Names of the columns to read; all if there are none.
-    columns: Vec<Cow<'static, str>>,
-    /// The file that is being read.
-    current: Option<(Arc<Path>, ParquetRecordBatchReader)>,
-}
-
-impl Reader<'_> {
-    fn open(&self, path: &Path, expected: Option<RowCount>) -> Result<ParquetRecordBatchReader, DatasetError> {
-        let bytes = load(self.storage, path)?;
-        let reader = || {
-            let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
-            if let Some(expected) = expected {
-                let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
-                expected.check(rows).map_err(ParquetError::General)?;
-            }
-            if !self.columns.is_empty() {
-                let mask = ProjectionMask::columns(builder.parquet_schema(), self.columns.iter().map(AsRef::as_ref));
-                builder = builder.with_projection(mask);
-            }
-            builder.build()
-        };
-        reader().map_err(|error| match error {
-            ParquetError::General(problem) => DatasetError::damaged(path)(problem),
-            error => DatasetError::damaged(path)(error),
-        })
-    }
-
-    fn advance(&mut self) -> Result<Option<Batch>, DatasetError> {
-        loop {
-            if let Some((path, rows)) = &mut self.current {
-                if let Some(rows) = rows.next().transpose().map_err(DatasetError::damaged(path))? {
-                    return Ok(Some(Batch { path: Arc::clone(path), rows }));
-                }
-                self.current = None;
-            }
-            let Some((path, expected)) = self.files.next() else { return Ok(None) };
-            let rows = self.open(&path, expected)?;
-            self.current = Some((path.into(), rows));
+fn open(
+    storage: &dyn Storage,
+    path: &Path,
+    expected: Option<RowCount>,
+    columns: &[Cow<'static, str>],
+) -> Result<ParquetRecordBatchReader, ResultsError> {
+    let bytes = load(storage, path)?;
+    let reader = || {
+        let mut builder = ParquetRecordBatchReaderBuilder::try_new(bytes)?.with_batch_size(BATCH_ROWS);
+        if let Some(expected) = expected {
+            let rows = builder.metadata().file_metadata().num_rows().cast_unsigned();
+            expected.check(rows).map_err(ParquetError::General)?;
         }
-    }
-}
-
-impl Iterator for Reader<'_> {
-    type Item = Result<Batch, DatasetError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let batch = self.advance();
-        if batch.is_err() {
-            self.current = None;
-            self.files = Vec::new().into_iter();
+        if !columns.is_empty() {
+            let mask = ProjectionMask::columns(builder.parquet_schema(), columns.iter().map(AsRef::as_ref));
+            builder = builder.with_projection(mask);
         }
-        batch.transpose()
-    }
+        builder.build()
+    };
+    reader().map_err(|error| match error {
+        ParquetError::General(problem) => ResultsError::damaged(path, problem),
+        error => ResultsError::damage_at(path)(error),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::table::columns::columns;
+    use crate::table::error::ErrorKind;
     use crate::table::storage::over_disk::OverDisk;
     use crate::table::storage::{Disk, StorageError};
     use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -363,7 +341,7 @@ mod tests {
         Dataset::new(&Disk, names.into_iter().map(|name| folder.join(name)).collect())
     }
 
-    fn numbers(folder: &Path) -> Result<Vec<u64>, DatasetError> {
+    fn numbers(folder: &Path) -> Result<Vec<u64>, ResultsError> {
         let mut numbers = Vec::new();
         for batch in dataset(folder).batches() {
             numbers.extend(batch?.rows_of()?.into_iter().map(|number: Number| number.value));
@@ -450,7 +428,7 @@ mod tests {
     #[test]
     fn an_error_of_the_disk_is_no_damage() {
         let path = Path::new("a.parquet");
-        let is_of_disk = |error: DatasetError| matches!(error, DatasetError::Storage(error) if error.path == path);
+        let is_of_disk = |error: ResultsError| matches!(error.kind, ErrorKind::Disk(_)) && error.path == path;
         assert!(is_of_disk(footer(&Unreadable, path).unwrap_err()));
         assert!(is_of_disk(Dataset::new(&Unreadable, vec![path.to_owned()]).batches().next().unwrap().unwrap_err()));
     }

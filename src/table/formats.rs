@@ -1,7 +1,7 @@
 //! Rows of any schema, in the formats of other programs.
 
 use crate::table::arrow;
-use crate::table::error::DatasetError;
+use crate::table::error::ResultsError;
 use crate::table::file::{FILE_EXTENSION, Footer};
 use crate::table::storage::StoredFile;
 use arrow_array::RecordBatch;
@@ -48,7 +48,7 @@ fn of_csv(error: impl Into<csv::Error>) -> ParquetError {
 }
 
 impl RowWriter {
-    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, DatasetError> {
+    pub fn new(file: StoredFile, format: Format, schema: &SchemaRef, footer: &Footer) -> Result<Self, ResultsError> {
         let path = file.path().to_owned();
         let encoder = || -> Result<Encoder, ParquetError> {
             Ok(match format {
@@ -64,21 +64,21 @@ impl RowWriter {
                 Format::Arrow => Encoder::Arrow(Box::new(FileWriter::try_new(file, schema)?)),
             })
         };
-        let encoder = encoder().map_err(DatasetError::unwritten(&path))?;
+        let encoder = encoder().map_err(ResultsError::unwritten(&path))?;
         Ok(Self { path, encoder })
     }
 
-    pub fn write(&mut self, rows: &RecordBatch) -> Result<(), DatasetError> {
+    pub fn write(&mut self, rows: &RecordBatch) -> Result<(), ResultsError> {
         let written = match &mut self.encoder {
             Encoder::Parquet(writer) => writer.write(rows),
             Encoder::Csv(writer) => arrow::texts(rows).try_for_each(|texts| writer.write_record(texts)).map_err(of_csv),
             Encoder::Arrow(writer) => writer.write(rows).map_err(ParquetError::from),
         };
-        written.map_err(DatasetError::unwritten(&self.path))
+        written.map_err(ResultsError::unwritten(&self.path))
     }
 
     /// Writes what is left and brings the file to the disk.
-    pub fn finish(self) -> Result<(), DatasetError> {
+    pub fn finish(self) -> Result<(), ResultsError> {
         let file = match self.encoder {
             Encoder::Parquet(writer) => writer.into_inner(),
             Encoder::Csv(writer) => writer.into_inner().map_err(|error| of_csv(error.into_error())),
@@ -86,6 +86,6 @@ impl RowWriter {
                 writer.finish().and_then(|()| writer.into_inner()).map_err(ParquetError::from)
             }
         };
-        Ok(file.map_err(DatasetError::unwritten(&self.path))?.sync()?)
+        Ok(file.map_err(ResultsError::unwritten(&self.path))?.sync()?)
     }
 }

@@ -101,18 +101,18 @@ pub trait Storage: Sync {
     }
 
     /// When a file, or a name in a folder, was written last, by the clock of its file system.
-    fn modified(&self, file: &Path) -> Result<SystemTime, StorageError> {
-        let modified = self.open(file)?.metadata().and_then(|metadata| metadata.modified());
-        modified.map_err(StorageError::at("look up", file))
+    fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
+        // A network file system tells the truth about what is opened.
+        let opened = self.open(path).or_else(|error| open_folder(path).map_err(|_| error))?;
+        opened.metadata().and_then(|metadata| metadata.modified()).map_err(StorageError::at("look up", path))
     }
 
     /// The number of bytes of a file.
     fn length(&self, file: &Path) -> Result<u64, StorageError> {
-        let metadata = self
-            .open(file)?
-            .metadata()
-            .and_then(|metadata| if metadata.is_file() { Ok(metadata) } else { Err(NoFile::Irregular.into()) });
-        Ok(metadata.map_err(StorageError::at("read", file))?.len())
+        let metadata = self.open(file)?.metadata();
+        let is_file =
+            |metadata: Metadata| if metadata.is_file() { Ok(metadata) } else { Err(NoFile::Irregular.into()) };
+        Ok(metadata.and_then(is_file).map_err(StorageError::at("read", file))?.len())
     }
 
     /// Creates a folder and its parents as needed, and brings the names of the new ones to the disk.
@@ -134,31 +134,19 @@ pub trait Storage: Sync {
         self.sync_folder(parent)
     }
 
-    /// Removes the files in a folder.
-    fn clear_folder(&self, folder: &Path) -> Result<(), StorageError> {
-        self.list(folder)?.into_iter().try_for_each(|name| self.remove(&folder.join(name)))
-    }
-
     /// Moves a file, if it is there, under a name that is free.
     fn move_away(&self, from: &Path, to: &Path) -> Result<(), StorageError> {
         if !self.exists(from)? {
             return Ok(());
         }
-        let free = self.free_name(to)?;
-        self.rename(from, &free)?;
-        [free.parent(), from.parent()].into_iter().flatten().try_for_each(|folder| self.sync_folder(folder))
-    }
-
-    /// A name like this one that is free, in a folder that is there.
-    fn free_name(&self, file: &Path) -> Result<PathBuf, StorageError> {
-        file.parent().map_or(Ok(()), |folder| self.ensure_folder(folder))?;
-        let mut free = file.to_owned();
-        let mut number = 0;
+        to.parent().map_or(Ok(()), |folder| self.ensure_folder(folder))?;
+        let (mut free, mut number) = (to.to_owned(), 0);
         while self.exists(&free)? {
             number += 1;
-            free = file.with_added_extension(number.to_string());
+            free = to.with_added_extension(number.to_string());
         }
-        Ok(free)
+        self.rename(from, &free)?;
+        [free.parent(), from.parent()].into_iter().flatten().try_for_each(|folder| self.sync_folder(folder))
     }
 
     /// Tries for a lock until it is free or the time is over.
@@ -288,13 +276,10 @@ impl Storage for Disk {
             let bytes = fs::read(from)?;
             File::create_new(to)?.write_all(&bytes)
         };
-        match fs::hard_link(from, to) {
-            Ok(()) => Ok(true),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
-            Err(_) => match copied() {
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
-                copied => copied.map(|()| true).map_err(StorageError::at("create", to)),
-            },
+        let is_there = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
+        match fs::hard_link(from, to).or_else(|error| if is_there(&error) { Err(error) } else { copied() }) {
+            Err(error) if is_there(&error) => Ok(false),
+            made => made.map(|()| true).map_err(StorageError::at("create", to)),
         }
     }
 
@@ -315,12 +300,6 @@ impl Storage for Disk {
 
     fn open(&self, file: &Path) -> Result<File, StorageError> {
         open_regular(File::options().read(true), file).map_err(StorageError::at("read", file))
-    }
-
-    fn modified(&self, path: &Path) -> Result<SystemTime, StorageError> {
-        // A network file system tells the truth about what is opened.
-        let opened = open_regular(File::options().read(true), path).or_else(|_| open_folder(path));
-        opened.and_then(|opened| opened.metadata()?.modified()).map_err(StorageError::at("look up", path))
     }
 
     fn exists(&self, file: &Path) -> Result<bool, StorageError> {

@@ -102,7 +102,7 @@ fn the_command_of_a_job_is_that_job() {
             // The poison among them names no id.
             if ended.code == Some(0) {
                 compared += 1;
-                let job_id = sweep.job_id(&job.parameters).to_string();
+                let job_id = sweep.job_id(&job.parameters);
                 assert_eq!(json(&ended.stdout)["job_id"].as_str(), Some(job_id.as_str()), "{command}");
             }
         }

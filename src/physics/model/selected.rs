@@ -13,7 +13,7 @@ pub trait Selection {
 
 /// Some of the parameters as columns, under their keys and with their units and meanings. Read back, the others have their
 /// defaults.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selected<S> {
     pub parameters: Parameters,
     selection: PhantomData<S>,
@@ -23,12 +23,6 @@ impl<S> Selected<S> {
     /// The columns of these parameters.
     pub const fn new(parameters: Parameters) -> Self {
         Self { parameters, selection: PhantomData }
-    }
-}
-
-impl<S> Default for Selected<S> {
-    fn default() -> Self {
-        Self::new(Parameters::default())
     }
 }
 

@@ -106,19 +106,33 @@ const NUMBERS: Row = Row([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes<S: pulp::Simd, const K: usize>(S, [S::f64s; K]);
 
-impl<S: pulp::Simd, const K: usize> Lanes<S, K> {
-    /// A loop, since closures may be compiled without the features of the token.
-    #[inline(always)]
-    fn zip(mut self, other: Self, combine: impl Fn(S, S::f64s, S::f64s) -> S::f64s) -> Self {
-        for k in 0..K {
-            self.1[k] = combine(self.0, self.1[k], other.1[k]);
+/// Operations of the registers, lane by lane. Loops, since closures may be compiled without the features of the token.
+macro_rules! lanewise {
+    ($($name:ident($($other:ident),*) = $operation:ident;)*) => {$(
+        #[inline(always)]
+        fn $name(mut self $(, $other: Self)*) -> Self {
+            for k in 0..K {
+                self.1[k] = self.0.$operation(self.1[k] $(, $other.1[k])*);
+            }
+            self
         }
-        self
-    }
+    )*};
 }
 
 impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     type Simd = S;
+
+    lanewise! {
+        plus(other) = add_f64s;
+        minus(other) = sub_f64s;
+        times(other) = mul_f64s;
+        over(other) = div_f64s;
+        larger(other) = max_f64s;
+        smaller(other) = min_f64s;
+        root() = sqrt_f64s;
+        abs() = abs_f64s;
+        mul_add(factor, addend) = mul_add_f64s;
+    }
 
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
@@ -140,64 +154,13 @@ impl<S: Registers<K>, const K: usize> Vector for Lanes<S, K> {
     }
 
     #[inline(always)]
-    fn plus(self, other: Self) -> Self {
-        self.zip(other, S::add_f64s)
-    }
-
-    #[inline(always)]
-    fn minus(self, other: Self) -> Self {
-        self.zip(other, S::sub_f64s)
-    }
-
-    #[inline(always)]
-    fn times(self, other: Self) -> Self {
-        self.zip(other, S::mul_f64s)
-    }
-
-    #[inline(always)]
-    fn over(self, other: Self) -> Self {
-        self.zip(other, S::div_f64s)
-    }
-
-    #[inline(always)]
-    fn root(mut self) -> Self {
-        for register in &mut self.1 {
-            *register = self.0.sqrt_f64s(*register);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn mul_add(mut self, factor: Self, addend: Self) -> Self {
-        for k in 0..K {
-            self.1[k] = self.0.mul_add_f64s(self.1[k], factor.1[k], addend.1[k]);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn abs(mut self) -> Self {
-        for register in &mut self.1 {
-            *register = self.0.abs_f64s(*register);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.zip(other, S::max_f64s)
-    }
-
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        self.zip(other, S::min_f64s)
-    }
-
-    #[inline(always)]
-    fn with(self, lane: usize, value: f64) -> Self {
+    fn with(mut self, lane: usize, value: f64) -> Self {
         let (simd, chosen, value) = (self.0, self.0.splat_f64s(lane as f64), self.0.splat_f64s(value));
-        Self::load(simd, &NUMBERS)
-            .zip(self, |_, number, kept| simd.select_f64s(simd.equal_f64s(number, chosen), value, kept))
+        let numbers = Self::load(simd, &NUMBERS);
+        for k in 0..K {
+            self.1[k] = simd.select_f64s(simd.equal_f64s(numbers.1[k], chosen), value, self.1[k]);
+        }
+        self
     }
 
     #[inline(always)]

@@ -5,12 +5,8 @@ use crate::model::{ContactEvent, Parameters};
 /// A rupture in progress or just ended.
 #[derive(Clone, Debug)]
 pub struct Rupture {
-    /// Time of the first break, in s.
-    pub first_time: f64,
     /// Block of the first break, from 0.
     pub first_block: usize,
-    /// Time of the last break so far, in s.
-    pub last_time: f64,
     pub size: u64,
     /// The furthest block with a break, from 0.
     pub reach: usize,
@@ -26,9 +22,7 @@ impl Rupture {
     /// The rupture that begins with this break, on a slider of `blocks` blocks.
     pub fn new(first: &ContactEvent, blocks: usize) -> Self {
         let mut rupture = Self {
-            first_time: first.time,
             first_block: first.block,
-            last_time: first.time,
             size: 0,
             reach: first.block,
             fronts: Vec::new(),
@@ -41,7 +35,6 @@ impl Rupture {
     }
 
     pub fn include(&mut self, event: &ContactEvent) {
-        self.last_time = event.time;
         self.size += 1;
         self.least_attached = self.least_attached.min(event.attached);
         self.reach = self.reach.max(event.block);

@@ -317,7 +317,7 @@ impl SlipObserver {
     }
 
     fn begin_or_extend(&mut self, event: &ContactEvent) {
-        if self.rupture.as_ref().is_some_and(|active| event.time - active.rupture.last_time > self.crossing_time) {
+        if self.rupture.as_ref().is_some_and(|active| event.time - active.last.time > self.crossing_time) {
             self.finish_rupture();
         }
         let blocks = self.parameters.blocks;
@@ -388,9 +388,9 @@ impl SlipObserver {
                 phase: modulation.period.map(|period| phase(onset.time - drive.cycle_start, period, drive.eta())),
                 peak_force: onset.force,
                 drop: onset.force - active.least_at_last_break,
-                nucleation: rupture.first_time,
+                nucleation: first.time,
                 nucleation_block: rupture.first_block as u64 + 1,
-                duration: rupture.last_time - rupture.first_time,
+                duration: last.time - first.time,
                 size: rupture.size,
                 attached_before: rupture.attached_before as f64 / self.contacts as f64,
                 least_attached: rupture.least_attached as f64 / self.contacts as f64,
@@ -406,10 +406,10 @@ impl SlipObserver {
             });
         }
         if self.drops.is_some() {
-            self.spans.push((rupture.first_time, rupture.last_time));
+            self.spans.push((first.time, last.time));
         }
         self.slips_seen += 1;
-        self.slipping += rupture.last_time - rupture.first_time;
+        self.slipping += last.time - first.time;
         let end = Instant { slipping: self.slipping, ..last };
         if self.slips_seen == discard.max(1) {
             self.start_up_end = Some(end);
@@ -432,7 +432,7 @@ impl SlipObserver {
     }
 
     fn record_precursor(&mut self, active: &Active) {
-        let rupture = &active.rupture;
+        let Active { rupture, first, last, .. } = active;
         let onset = active.precursor_onset.time;
         if self.recording.precursors && self.slips_seen >= self.recording.discard {
             self.at_precursor.advance_to(onset);
@@ -442,9 +442,9 @@ impl SlipObserver {
                 onset,
                 interval: self.last_precursor_onset.map(|last| onset - last),
                 modulation: Modulation::of(&self.at_precursor),
-                nucleation: rupture.first_time,
+                nucleation: first.time,
                 nucleation_block: rupture.first_block as u64 + 1,
-                duration: rupture.last_time - rupture.first_time,
+                duration: last.time - first.time,
                 size: rupture.size,
                 extent: rupture.extent() as u64,
                 length: rupture.extent() as f64 * self.parameters.slider_length / self.parameters.blocks as f64,
@@ -454,7 +454,7 @@ impl SlipObserver {
         }
         if self.furthest.is_none_or(|furthest| rupture.reach > furthest) {
             let position = (rupture.reach + 1) as f64 * self.parameters.slider_length / self.parameters.blocks as f64;
-            self.advances.push((rupture.first_time, position));
+            self.advances.push((first.time, position));
             self.furthest = Some(rupture.reach);
         }
         self.pending += 1;
@@ -487,7 +487,7 @@ impl Observer for SlipObserver {
         }
         let impulse = self.now.impulse + segment.impulse();
         self.now = Instant { time: segment.end(), force: segment.end_force(), impulse, ..self.now };
-        if self.rupture.as_ref().is_some_and(|active| self.now.time - active.rupture.last_time > self.crossing_time) {
+        if self.rupture.as_ref().is_some_and(|active| self.now.time - active.last.time > self.crossing_time) {
             self.finish_rupture();
         }
         let since_slip = self.now.time - self.last_end.map_or(0.0, |end| end.time);

@@ -179,7 +179,8 @@ fn a_directory_that_another_has_replaced_is_not_ours_any_more_and_one_with_a_fur
     let layout = Layout::new(&Disk, root.path());
     let rounds = sweep("[precision]\nof = \"tau_mean\"\nrelative = 0.1\nseeds = { from = 2, to = 3 }");
     let first = open(&layout, &rounds).unwrap();
-    let second = first.in_next_round(Round { points: vec![2..=2], ..Round::default() });
+    let round = Round { points: vec![2..=2], ..Round::default() };
+    let second = first.followed_by(first.sweep(), Some(round), None);
     fs::write(layout.extension(1), second.record(1).text()).unwrap();
     assert_eq!(Results::read(&layout).unwrap().rounds().len(), 2);
     assert!(first.check_place().is_ok() && second.check_place().is_ok());

@@ -611,11 +611,11 @@ fn what_was_done_since_it_was_looked_up_is_counted_whoever_did_it() {
     let (layout, stop) = (Layout::new(&Disk, root.path()), AtomicBool::new(false));
     let results = open(&layout, &sweep(SEEDS, "")).unwrap();
     let parts: Vec<Outline> = results.plan().outlines().collect();
-    let share = Share::look_up(&results, &parts, false).unwrap();
-    assert_eq!(share.done_since().unwrap(), (0, 0.0));
+    let pending = Pending::look_up(&results, &parts, false).unwrap();
+    assert_eq!(pending.done_since().unwrap(), (0, 0.0));
     let report =
         run(&layout, &sweep(SEEDS, ""), options(&stop, 1), &|job, _| Ok(measure(&job.parameters)), &mut |_| ());
-    let (jobs, cost) = share.done_since().unwrap();
+    let (jobs, cost) = pending.done_since().unwrap();
     assert_eq!(jobs, 2 * SEEDS);
     assert!((cost / report.unwrap().predicted_cost - 1.0).abs() < 1e-9);
 }

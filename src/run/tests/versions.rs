@@ -68,9 +68,8 @@ fn a_directory_of_another_version_is_reduced_and_exported_as_it_is_and_not_run()
         .flat_map(|names| names.unwrap())
         .map(|names| names.job_id)
         .collect();
-    let own_ids = |sweep: &crate::sweep::Sweep| {
-        sweep.jobs().map(|job| sweep.job_id(&job.parameters).to_string()).collect::<Vec<_>>()
-    };
+    let own_ids =
+        |sweep: &crate::sweep::Sweep| sweep.jobs().map(|job| sweep.job_id(&job.parameters)).collect::<Vec<_>>();
     assert_eq!(own_ids(&sweep(SEEDS, "")), ids);
     assert!(own_ids(own.sweep()).iter().all(|id| !ids.contains(id)));
 }

@@ -167,12 +167,12 @@ proptest! {
         prop_assert_eq!(&again, &parts);
         let ids = |jobs: &mut dyn Iterator<Item = &Job>| jobs.map(|job| identity.job(&job.parameters)).collect::<Vec<_>>();
         let there = ids(&mut parts.iter().flat_map(|part| &part.jobs));
-        let once: HashSet<_> = there.iter().copied().collect();
+        let once: HashSet<_> = there.iter().cloned().collect();
         prop_assert_eq!(once.len(), there.len());
         let last: Vec<Job> = sweeps[sweeps.len() - 1].jobs().collect();
         let wanted: HashSet<_> = ids(&mut last.iter()).into_iter().collect();
         let kept: HashSet<_> = ids(&mut done.iter().flat_map(|part| &part.jobs)).into_iter().collect();
-        prop_assert_eq!(once, wanted.union(&kept).copied().collect::<HashSet<_>>());
+        prop_assert_eq!(once, wanted.union(&kept).cloned().collect::<HashSet<_>>());
     }
 
     #[test]
