@@ -90,7 +90,7 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
         }
         changes.push(match flag {
             "--set" => Change::setting(key, value),
-            _ => Change::axis(key, value).ok_or_else(no_change)?,
+            _ => Change::axis(key, value).map_err(|form| UsageError(format!("{flag} {text}: must be {key}={form}")))?,
         });
     }
     Ok(changes)

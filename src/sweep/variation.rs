@@ -34,20 +34,22 @@ impl Change {
         Self { section, key: key.to_owned(), value: scalar(value) }
     }
 
-    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them;
-    /// `None` for what is no TOML.
-    pub fn axis(key: &str, values: &str) -> Option<Self> {
+    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them.
+    /// The error is what to write in place of others.
+    pub fn axis(key: &str, values: &str) -> Result<Self, &'static str> {
         let value = match values.split(':').map(str::trim).collect::<Vec<_>>()[..] {
             _ if values.starts_with(['[', '{']) => values.to_owned(),
             [form @ ("log" | "linear"), low, high, points] => {
                 let [low, high, points] = [low, high, points].map(scalar);
                 format!("{{ {form} = [{low}, {high}], points = {points} }}")
             }
+            ["log" | "linear", ..] => return Err("log:LOW:HIGH:POINTS, or linear, with the number of points"),
             ["count", count] => format!("{{ count = {} }}", scalar(count)),
+            ["count", ..] => return Err("count:N, with the number of values"),
             _ => format!("[{}]", values.split(',').map(str::trim).map(scalar).collect::<Vec<_>>().join(", ")),
         };
-        value.parse::<Value>().ok()?;
-        Some(Self { section: AXES, key: key.to_owned(), value })
+        value.parse::<Value>().map_err(|_| "VALUES, such as 1e-5,1e-4")?;
+        Ok(Self { section: AXES, key: key.to_owned(), value })
     }
 }
 
@@ -153,7 +155,7 @@ mod tests {
             let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
             assert_eq!((sweep.jobs().count(), sweep.jobs().next().unwrap().parameters.contacts_per_block), (count, 9));
         }
-        assert_eq!(Change::axis("V0", "[1e-5"), None);
+        assert!(Change::axis("V0", "[1e-5").is_err());
         assert_eq!(Change::setting("break_on", "tension").value, "\"tension\"");
     }
 }
