@@ -258,7 +258,12 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
         ("plan good.toml --axis V0=log:1e-5:1e-3", &["V0=log:1e-5:1e-3: must be V0=log:LOW:HIGH:POINTS", "number of"]),
         ("plan good.toml --axis V0=linear:1e-5", &["must be V0=log:LOW:HIGH:POINTS, or linear"]),
         ("plan good.toml --axis seed=count", &["--axis seed=count: must be seed=count:N"]),
-        ("plan good.toml --axis T=1,2 --set eta=3", &["T: fixes the period, as does eta", "keep one"]),
+        ("plan good.toml --axis T=1,2 --set eta=3", &["T in [axes]: fixes the period, as does eta; keep one"]),
+        (
+            "plan --preset fig2 --axis Delta=1e-6,2e-6",
+            &["Delta in [axes]: is set in [axes.zip], too; keep one", "edit the file (`stickslip init` writes"],
+        ),
+        ("plan --preset fig2 --set eta=3", &["frequency in [axes.zip]: fixes the period, as does eta; keep one"]),
         ("plan good.toml --axis slips=1,2", &["slips = [1, 2]: unknown key in [axes]"]),
         ("init my.toml --question why", &["friction, interval, locking, sliding"]),
     ];
