@@ -264,6 +264,7 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
             &["Delta in [axes]: is set in [axes.zip], too; keep one", "edit the file (`stickslip init` writes"],
         ),
         ("plan --preset fig2 --set eta=3", &["frequency in [axes.zip]: fixes the period, as does eta; keep one"]),
+        ("plan --preset velocity --set of=tau_mean --set relative=0.02", &["flags: seeds is missing in [precision]"]),
         ("plan good.toml --axis slips=1,2", &["slips = [1, 2]: unknown key in [axes]"]),
         ("init my.toml --question why", &["friction, interval, locking, sliding"]),
     ];
