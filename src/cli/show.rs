@@ -16,6 +16,7 @@ use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Map, Value as Json};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Show the result of a sweep: a line for each parameter set, with 95 % intervals
@@ -92,7 +93,7 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
             let mut differences = differences.iter().filter(|difference| !difference.starts_with("name"));
             differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
         }
-        return print(arguments, &columns, &[]);
+        return print(arguments, &columns, &[], &[]);
     }
     let results = renew(&results)?;
     let mut rows = sets(&results, usize::MAX)?;
@@ -202,7 +203,7 @@ fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
     Ok(())
 }
 
-/// A value of a set with its interval, in SI, by the names of the table of sets.
+/// A value of a set with its interval, in SI, by the names of the table of sets, each name once.
 fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     let mut record = Vec::new();
     for values in columns {
@@ -221,6 +222,8 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
             record.push((format!("{name}_high"), high.into()));
         }
     }
+    let mut known = BTreeSet::new();
+    record.retain(|(name, _)| known.insert(name.clone()));
     record
 }
 
@@ -286,21 +289,22 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
-    Ok(format!("{columns}\n"))
+    format!("{columns}\n")
 }
 
 /// The head of a column and its first cells.
 fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     let label = values.label();
-    let (factor, unit) = values.scale();
+    let bound = |set: usize| rows.get(set).filter(|_| values.column.name == "tau_mean")?.tau_bound;
+    let shown = |set: usize| values.numbers[set].or_else(|| bound(set)).unwrap_or_default().abs();
+    let (factor, unit) = label.scale((0..values.numbers.len()).map(shown).fold(0.0, f64::max));
     let mut cells = vec![label.short(unit)];
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
-        let bound = rows.get(set).and_then(|row| row.tau_bound).filter(|_| values.column.name == "tau_mean");
         cells.push(match (number, values.intervals[set]) {
             (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
             (Some(value), Some((low, high))) => with_error(factor * value, 0.5 * factor * (high - low)),
             (Some(value), None) => three_digits(factor * value),
-            (None, _) => bound.map_or_else(|| "–".to_owned(), |bound| format!("> {}", three_digits(factor * bound))),
+            (None, _) => bound(set).map_or_else(|| "–".to_owned(), |tau| format!("> {}", three_digits(factor * tau))),
         });
     }
     cells
@@ -327,13 +331,14 @@ fn with_error(value: f64, half: f64) -> String {
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let (sweep, mut notes) = (results.sweep(), Vec::new());
     let without: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_without_slips > 0).collect();
-    if let Some(first) = without.first() {
+    if !without.is_empty() {
         let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
         let sets = output::count(without.len() as u64, "set");
-        let job = sweep.set_with(&first.parameters.parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
-        let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
+        let set = without.iter().find_map(|row| sweep.set_with(&row.parameters.parameters));
+        let job = set.and_then(|set| sweep.jobs_at(set..set + 1).next());
+        let command = job.map_or_else(String::new, |job| format!("; a job of one such set: {}", sweep.command(&job)));
         notes.push(format!(
-            "{jobs} of {sets} without slips: they slide, or give_up_after is too short for their slips; the first: {command}"
+            "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
         ));
     }
     let recording = sweep.recording();
@@ -355,7 +360,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     }
     let gone = rows.iter().filter(|row| sweep.set_with(&row.parameters.parameters).is_none()).count();
     if gone > 0 {
-        notes.push(format!("{} of these the sweep no longer has", output::count(gone as u64, "set")));
+        notes.push(format!("no longer in the sweep: {} of these", output::count(gone as u64, "set")));
     }
     notes
 }
