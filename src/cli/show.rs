@@ -302,7 +302,7 @@ fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
         cells.push(match (number, values.intervals[set]) {
             (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
-            (Some(value), Some((low, high))) => with_error(factor * value, 0.5 * factor * (high - low)),
+            (Some(value), Some((low, high))) => with_interval(factor * value, factor * low, factor * high),
             (Some(value), None) => three_digits(factor * value),
             (None, _) => bound(set).map_or_else(|| "–".to_owned(), |tau| format!("> {}", three_digits(factor * tau))),
         });
@@ -310,20 +310,27 @@ fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     cells
 }
 
-/// A value and the half-width of its interval, with the digits that this leaves.
-fn with_error(value: f64, half: f64) -> String {
+/// Part of its half-width by which an interval may lie off its value and be shown by that half-width.
+const LOPSIDED: f64 = 0.2;
+
+/// A value and the half-width of its interval, with the digits that this leaves; the ends where these lie unlike, or where
+/// half of the interval would reach beyond zero, and the interval does not.
+fn with_interval(value: f64, low: f64, high: f64) -> String {
+    let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
         return three_digits(value);
     }
-    // Two digits of an error that begins with 1.
+    let crosses = low >= 0.0 && value < half || high <= 0.0 && value > -half;
+    let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;
+    // Two digits of an error that begins with 1, and of ends.
     let exponent = libm::floor(libm::log10(half));
-    let digits = if half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
+    let digits = if is_lopsided || half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
     let digits = digits.clamp(0.0, 18.0) as usize;
-    let rounded = format!("{value:.digits$}");
-    // Not -0.00.
-    let is_zero = rounded.trim_start_matches('-').bytes().all(|digit| b"0.".contains(&digit));
-    format!("{} ± {half:.digits$}", if is_zero { rounded.trim_start_matches('-') } else { &rounded })
+    let rounded = |value: f64| format!("{value:.digits$}");
+    // Not -0.00, which is 0 with 0 added.
+    let [value, low, high] = [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
+    if is_lopsided { format!("{value} ({low} to {high})") } else { format!("{value} ± {}", rounded(half)) }
 }
 
 /// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
@@ -374,8 +381,24 @@ mod tests {
         let shown =
             [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06), (-3e-4, 2e-3)];
         assert_eq!(
-            shown.map(|(value, half)| with_error(value, half)),
+            shown.map(|(value, half)| with_interval(value, value - half, value + half)),
             ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06", "0.000 ± 0.002"]
+        );
+    }
+
+    #[test]
+    fn an_interval_that_lies_unlike_about_its_value_is_shown_by_its_ends() {
+        let shown =
+            [(4.03, 1.42, 13.78), (0.9, 0.05, 1.9), (136.4, 120.0, 150.0), (0.046, 0.031, 0.112), (-0.5, -1.1, -0.01)];
+        assert_eq!(
+            shown.map(|(value, low, high)| with_interval(value, low, high)),
+            [
+                "4.0 (1.4 to 13.8)",
+                "0.90 (0.05 to 1.90)",
+                "136 ± 15",
+                "0.046 (0.031 to 0.112)",
+                "-0.50 (-1.10 to -0.01)"
+            ]
         );
     }
 }
