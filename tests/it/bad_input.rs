@@ -252,7 +252,6 @@ fn bad_flags_of_a_simulation_are_refused_and_nothing_is_written() {
         ("simulate good.toml --preset fig4b", &["'[SWEEP.toml]'", "--preset"]),
         ("simulate good.toml --dt 1e-6", &["dt = 1e-6: unknown key in [solver]"]),
         ("simulate good.toml --set N=0", &["in the flags: N = 0: must be"]),
-        ("run good.toml --set N=4", &["--set, --axis: make another sweep than that of results/good", "--out DIR"]),
         ("run good.toml -o x --axis V0", &["--axis V0: must be KEY=VALUES, such as --axis V0=1e-5,1e-4"]),
         ("run good.toml -o x --axis V0=[1e-5", &["--axis V0=[1e-5: must be V0=VALUES, such as 1e-5,1e-4"]),
         ("plan good.toml --axis V0=log:1e-5:1e-3", &["V0=log:1e-5:1e-3: must be V0=log:LOW:HIGH:POINTS", "number of"]),
