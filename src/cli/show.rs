@@ -9,6 +9,7 @@ use crate::reduce::{
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{label, three_digits};
+use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
@@ -112,14 +113,15 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         |name: &String| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}")));
     let asked: Vec<Values> = arguments.columns.iter().map(asked).collect::<Result<_, _>>()?;
     let columns = if asked.is_empty() { usual_columns(usual, &rows) } else { asked };
+    let edges = edges(&results)?;
     if is_text {
         if let Some((_, missing @ 1..)) = results.missing()? {
             let (jobs, root) = (output::count(missing, "job"), output::quoted_path(&arguments.directory));
             output::print(&format!("so far: {jobs} missing; stickslip run {root} goes on with them\n\n"))?;
         }
-        output::print(&edges(&results)?)?;
+        output::print(&table_of_edges(&edges))?;
     }
-    print(arguments, &columns, &rows)?;
+    print(arguments, &columns, &rows, &edges)?;
     if is_text {
         for note in notes(&results, &rows) {
             output::print(&format!("{note}\n"))?;
@@ -128,12 +130,13 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Prints columns as is asked; `rows` are the sets, if they are of one directory.
-fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<Exit> {
+/// Prints columns as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
+fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow], edges: &[EdgeRow]) -> Result<Exit> {
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if arguments.json {
         let sets: Vec<Map<String, Json>> = (0..count).map(|set| record(columns, set).into_iter().collect()).collect();
-        output::json(FORMAT, &serde_json::json!({ "sets": sets }))?;
+        let edges: Vec<Json> = edges.iter().map(json).collect();
+        output::json(FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))?;
     } else if arguments.csv {
         print_csv(columns, count)?;
     } else {
@@ -154,7 +157,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
         let root = output::quoted_path(results.layout().root());
         notes.insert(0, format!("… {more} more: stickslip show {root}"));
     }
-    let text = edges(results)? + &aligned(&columns, &rows, first);
+    let text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
     Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
 }
 
@@ -252,13 +255,15 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
     text.to_string()
 }
 
-/// The edges that a sweep has found, and a blank line; empty for one that looks for none.
-fn edges(results: &Results<'_>) -> Result<String> {
-    if results.sweep().rounds().is_none_or(|rounds| rounds.refinement.is_none()) {
-        return Ok(String::new());
-    }
-    let edges = read_reduced::<EdgeRow>(results.layout())?;
-    let Some(first) = edges.first() else { return Ok(String::new()) };
+/// The edges that a sweep has found; none for one that looks for none.
+fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
+    let refines = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
+    Ok(if refines { read_reduced(results.layout())? } else { Vec::new() })
+}
+
+/// Edges for people, and a blank line; empty if there are none.
+fn table_of_edges(edges: &[EdgeRow]) -> String {
+    let Some(first) = edges.first() else { return String::new() };
     let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
         frequency: parameters.frequency(),
         parameters: parameters.clone(),

@@ -157,6 +157,9 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
         assert_eq!(ended == "width", high / low < 1.1 * (1.0 + 1e-9), "{ended}: {low} to {high}");
     }
     assert!(folder.path("r/figures/edges.svg").exists());
+    let told = json(&folder.ends(0, "show r --json").stdout)["edges"].as_array().unwrap().clone();
+    let of_json = |key: &str| told.iter().map(|edge| edge[key].as_f64().unwrap()).collect::<Vec<_>>();
+    assert!(of_json("edge") == place && of_json("edge_high") == high && told[0]["statistic"].is_string(), "{told:?}");
     assert!(folder.table("r", "jobs").counts("seed").into_iter().min() == Some(5));
     folder.ends(0, "run few.toml --out few");
     let none = folder.file("few/reduced/edges.parquet");
