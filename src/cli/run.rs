@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
-    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads));
+    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads, sweep.rounds().is_some()));
     let report =
         crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
     let report = report.map_err(|error| match Exit::of(&error) {

@@ -129,8 +129,12 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
     let planned = folder.ends(0, "plan hard.toml");
     assert!(planned.stderr.contains("warning: seeds: from = 3 is raised to 11"), "{}", planned.stderr);
     let planned = planned.stdout;
-    assert!(planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs"), "{planned}");
+    assert!(
+        planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs; estimated"),
+        "{planned}"
+    );
     let ended = folder.ends(0, "run hard.toml --out r");
+    assert!(ended.stderr.contains("running 22 jobs of this round, 0 there already"), "{}", ended.stderr);
     assert!(ended.stdout.contains("2 sets with all seeds allowed, above the target"), "{}", ended.stdout);
     assert!(folder.ends(0, "status r").stdout.contains("round         1 (the last): 0 sets done, 0 open; 2 sets"));
     let sets = folder.file("r/reduced/sets.parquet");
