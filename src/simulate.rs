@@ -52,10 +52,10 @@ pub fn sweep_text(changes: &[Change]) -> String {
     format!("name = \"simulate\"\n[model]\n{model}[record]\n{slips}{record}[solver]\n{solver}")
 }
 
-/// The mistakes in the text of a sweep, as those in what it was made from, which has neither sections nor lines.
+/// The mistakes in the text of a sweep, as those in what it was made from, which has no lines, nor `[model]`.
 pub fn mistakes_in(source: &str, mistakes: &[Mistake]) -> String {
     let problems = mistakes.iter().map(|Mistake { problem, .. }| {
-        let (start, end) = problem.split_once(" in [model] (line ").unwrap_or((problem, ""));
+        let (start, end) = problem.split_once(" (line ").unwrap_or((problem, ""));
         let end = end.split_once(')').map_or("", |(_, rest)| rest);
         format!("{start}{end}").replace(" in [model]", "")
     });

@@ -142,13 +142,17 @@ fn margin(time: Duration) -> Duration {
 }
 
 /// An absolute path; symbolic links stay, since a common disk may be mounted elsewhere on other nodes.
-fn whole_path(path: &Path) -> Result<String> {
-    let path = absolute(path).with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
+fn whole_path(mut path: &Path) -> Result<String> {
+    // In the current folder there are none, so that `..` after it needs no look at the disk.
+    let mut folder = std::env::current_dir().unwrap_or_default();
+    while let Ok(rest) = path.strip_prefix("..") {
+        folder.pop();
+        path = rest;
+    }
+    let path = absolute(folder.join(path)).with_context(|| format!("{}: cannot be made absolute", shown(path)))?;
     let text = path.to_str().filter(|text| !text.contains(char::is_control));
-    Ok(text.map(ToOwned::to_owned).ok_or_else(|| {
-        let path = shown(&path);
-        UsageError(format!("{path}: must be UTF-8 without control characters; choose another path"))
-    })?)
+    let problem = || format!("{}: must be UTF-8 without control characters; choose another path", shown(&path));
+    Ok(text.map(ToOwned::to_owned).ok_or_else(|| UsageError(problem()))?)
 }
 
 /// The line of an option as sbatch reads it from a script: with quotes, and a backslash before what else would mean

@@ -78,21 +78,15 @@ impl Directory {
     }
 
     fn in_words(&self) -> String {
-        let path = shown(&self.path);
+        let Some(Overview { jobs_done, jobs_failed, jobs_kept, jobs_missing, .. }) = &self.overview else {
+            return format!("refused: {}", self.refused.as_deref().unwrap_or_default());
+        };
+        let (path, own) = (shown(&self.path), jobs_done - jobs_kept);
+        let kept = format!("; {jobs_kept} more done that the sweep no longer has");
+        let kept = if *jobs_kept == 0 { "" } else { &kept };
         let round =
             self.rounds.as_ref().map_or_else(String::new, |rounds| format!("; round {}", output::rounds(rounds)));
-        match (&self.overview, &self.refused) {
-            (Some(overview), _) => {
-                let Overview { jobs_done, jobs_failed, jobs_kept, jobs_missing, .. } = overview;
-                let kept = match jobs_kept {
-                    0 => String::new(),
-                    kept => format!("; {kept} more done that the sweep no longer has"),
-                };
-                let own = jobs_done - jobs_kept;
-                format!("{path}: {own} done, {jobs_failed} failed, {jobs_missing} to run{kept}{round}")
-            }
-            (None, refused) => format!("refused: {}", refused.as_deref().unwrap_or_default()),
-        }
+        format!("{path}: {own} done, {jobs_failed} failed, {jobs_missing} to run{kept}{round}")
     }
 }
 
@@ -157,7 +151,7 @@ pub fn plan(arguments: &Arguments) -> Result<Exit> {
         ];
         if let Some(Bounds { sets, jobs, predicted_cost }) = at_most {
             let cost = output::duration(predicted_cost);
-            pairs.push(("all rounds", format!("at most {sets} sets, {jobs} jobs, {cost} of CPU time")));
+            pairs.push(("all rounds", format!("at most {sets} sets, {jobs} jobs; estimated CPU time {cost}")));
         }
         pairs.push(("directory", directory));
         output::pairs(&pairs)?;

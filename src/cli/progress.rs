@@ -21,11 +21,13 @@ pub struct Progress {
     last_line: Instant,
     tally: Tally,
     threads: Threads,
+    /// Where more may come, what is to be done now.
+    of_round: &'static str,
     has_results: bool,
 }
 
 impl Progress {
-    pub fn new(threads: Threads) -> Self {
+    pub fn new(threads: Threads, has_rounds: bool) -> Self {
         let now = Instant::now();
         Self {
             bar: ProgressBar::hidden(),
@@ -34,6 +36,7 @@ impl Progress {
             last_line: now,
             tally: Tally::default(),
             threads,
+            of_round: if has_rounds { " of this round" } else { "" },
             has_results: false,
         }
     }
@@ -50,13 +53,12 @@ impl Progress {
             &RunEvent::Started { jobs, predicted_cost, jobs_there, threads, others, .. } => {
                 self.begin = Instant::now();
                 let variable = self.threads.variable.map_or_else(String::new, |variable| format!(" ({variable})"));
-                let beside = match others {
-                    0 => String::new(),
-                    others => format!(", shared with {}", output::count(others as u64, "worker")),
-                };
+                let workers = || format!(", shared with {}", output::count(others as u64, "worker"));
+                let beside = (others > 0).then(workers).unwrap_or_default();
                 self.say(&format!(
-                    "running {}, {jobs_there} there already; predicted: {} on {}{variable}{beside}",
+                    "running {}{}, {jobs_there} there already; predicted: {} on {}{variable}{beside}",
                     output::count(jobs, "job"),
+                    self.of_round,
                     output::duration(predicted_cost / threads as f64),
                     output::count(threads as u64, "thread"),
                 ));
@@ -101,14 +103,11 @@ impl Progress {
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = if share > 0.0 {
             let guess = if share < GUESS { ", a guess so far" } else { "" };
-            format!("{} left{guess}", output::duration(elapsed * (1.0 - share) / share))
+            format!("{} left{}{guess}", output::duration(elapsed * (1.0 - share) / share), self.of_round)
         } else {
             "time left unknown".to_owned()
         };
-        let others = match jobs_of_others {
-            0 => String::new(),
-            others => format!(" ({others} by others)"),
-        };
+        let others = if jobs_of_others == 0 { String::new() } else { format!(" ({jobs_of_others} by others)") };
         let text = format!("{jobs_done} of {jobs} jobs{others}, {left}");
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1000")]
         self.bar.set_position((f64::from(RESOLUTION) * share) as u64);
@@ -117,5 +116,22 @@ impl Progress {
             self.last_line = Instant::now();
             output::report(&format!("{}, {:.0} %: {text}", output::duration(elapsed), 100.0 * share));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_that_of_a_round_where_more_may_come() {
+        let message = |has_rounds: bool| {
+            let mut progress = Progress::new(Threads { count: None, variable: None }, has_rounds);
+            progress.tally.note(&RunEvent::OthersDone { jobs: 3, predicted_cost: 1.0 });
+            progress.show(&RunEvent::Tick);
+            progress.bar.message()
+        };
+        assert_eq!(message(false), "3 of 0 jobs (3 by others), 0.0 s left");
+        assert_eq!(message(true), "3 of 0 jobs (3 by others), 0.0 s left of this round");
     }
 }

@@ -14,7 +14,7 @@ use crate::run::threads::{self, Threads};
 use crate::run::{Joined, Options, RunReport, Shard};
 use crate::sweep::{Job, Sweep};
 use crate::table::shown::shown;
-use crate::table::storage::Disk;
+use crate::table::storage::{Disk, Storage};
 use anyhow::Result;
 use clap::Args;
 use std::num::NonZeroUsize;
@@ -51,7 +51,7 @@ pub struct Arguments {
     preset: PresetFlag,
     #[command(flatten)]
     variation: Variation,
-    /// Results directory; needed with --set or --axis [default: results/<name of the sweep>, or the one to resume]
+    /// Results directory [default: results/<name of the sweep>, with --set or --axis if it is new; or the one to resume]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads [default: those that the batch system grants, else all cores]
@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit> {
         shard: arguments.shard.unwrap_or_default(),
         walltime: arguments.walltime,
     };
-    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads));
+    let (layout, mut progress) = (Layout::new(&Disk, &root), Progress::new(threads, sweep.rounds().is_some()));
     let report =
         crate::run::join(&layout, &sweep, options, |joined| work(joined, &sweep, &layout, arguments, &mut progress));
     let report = report.map_err(|error| match Exit::of(&error) {
@@ -116,10 +116,10 @@ impl Arguments {
             return Ok((sweep, out.clone()));
         }
         let is_own = |results: Results<'_>| results.sweep().text() == sweep.text();
-        if !changes.is_empty() && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own) {
-            let root = shown(&root);
+        if !changes.is_empty() && Disk.exists(&root)? && !Results::read(&Layout::new(&Disk, &root)).is_ok_and(is_own) {
+            let (there, root) = (shown(&root), output::quoted_path(&root));
             let problem = format!(
-                "--set, --axis: make another sweep than that of {root}; name its directory with --out DIR, {root} to extend that"
+                "--set, --axis: {there} holds another sweep; give a new directory with -o DIR, or -o {root} to extend that one"
             );
             return Err(UsageError(problem).into());
         }

@@ -9,6 +9,7 @@ use crate::reduce::{
 use crate::results::Results;
 use crate::results::layout::Layout;
 use crate::sweep::{label, three_digits};
+use crate::table::arrow::json;
 use crate::table::columns::{Kind, Table};
 use crate::table::file::Dataset;
 use crate::table::shown::shown;
@@ -16,6 +17,7 @@ use crate::table::storage::Disk;
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Map, Value as Json};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Show the result of a sweep: a line for each parameter set, with 95 % intervals
@@ -92,7 +94,7 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
             let mut differences = differences.iter().filter(|difference| !difference.starts_with("name"));
             differences.try_for_each(|difference| output::print(&format!("{difference}\n")))?;
         }
-        return print(arguments, &columns, &[]);
+        return print(arguments, &columns, &[], &[]);
     }
     let results = renew(&results)?;
     let mut rows = sets(&results, usize::MAX)?;
@@ -111,14 +113,15 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
         |name: &String| Values::of(&rows, name).map_err(|problem| UsageError(format!("--columns {name}: {problem}")));
     let asked: Vec<Values> = arguments.columns.iter().map(asked).collect::<Result<_, _>>()?;
     let columns = if asked.is_empty() { usual_columns(usual, &rows) } else { asked };
+    let edges = edges(&results)?;
     if is_text {
         if let Some((_, missing @ 1..)) = results.missing()? {
             let (jobs, root) = (output::count(missing, "job"), output::quoted_path(&arguments.directory));
             output::print(&format!("so far: {jobs} missing; stickslip run {root} goes on with them\n\n"))?;
         }
-        output::print(&edges(&results)?)?;
+        output::print(&table_of_edges(&edges))?;
     }
-    print(arguments, &columns, &rows)?;
+    print(arguments, &columns, &rows, &edges)?;
     if is_text {
         for note in notes(&results, &rows) {
             output::print(&format!("{note}\n"))?;
@@ -127,12 +130,13 @@ pub fn show(arguments: &Arguments) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// Prints columns as is asked; `rows` are the sets, if they are of one directory.
-fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow]) -> Result<Exit> {
+/// Prints columns as is asked, as JSON with the edges; `rows` are the sets, if they are of one directory.
+fn print(arguments: &Arguments, columns: &[Values], rows: &[SetRow], edges: &[EdgeRow]) -> Result<Exit> {
     let count = columns.first().map_or(0, |values| values.numbers.len());
     if arguments.json {
         let sets: Vec<Map<String, Json>> = (0..count).map(|set| record(columns, set).into_iter().collect()).collect();
-        output::json(FORMAT, &serde_json::json!({ "sets": sets }))?;
+        let edges: Vec<Json> = edges.iter().map(json).collect();
+        output::json(FORMAT, &serde_json::json!({ "sets": sets, "edges": edges }))?;
     } else if arguments.csv {
         print_csv(columns, count)?;
     } else {
@@ -153,7 +157,7 @@ pub fn summary(results: &Results<'_>, count: u64) -> Result<String> {
         let root = output::quoted_path(results.layout().root());
         notes.insert(0, format!("… {more} more: stickslip show {root}"));
     }
-    let text = edges(results)? + &aligned(&columns, &rows, first);
+    let text = table_of_edges(&edges(results)?) + &aligned(&columns, &rows, first);
     Ok(notes.into_iter().fold(text, |text, note| text + &note + "\n"))
 }
 
@@ -202,7 +206,7 @@ fn sort(rows: &mut Vec<SetRow>, column: &str) -> Result<()> {
     Ok(())
 }
 
-/// A value of a set with its interval, in SI, by the names of the table of sets.
+/// A value of a set with its interval, in SI, by the names of the table of sets, each name once.
 fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
     let mut record = Vec::new();
     for values in columns {
@@ -221,6 +225,8 @@ fn record(columns: &[Values], set: usize) -> Vec<(String, Json)> {
             record.push((format!("{name}_high"), high.into()));
         }
     }
+    let mut known = BTreeSet::new();
+    record.retain(|(name, _)| known.insert(name.clone()));
     record
 }
 
@@ -249,13 +255,15 @@ fn aligned(columns: &[Values], rows: &[SetRow], most: usize) -> String {
     text.to_string()
 }
 
-/// The edges that a sweep has found, and a blank line; empty for one that looks for none.
-fn edges(results: &Results<'_>) -> Result<String> {
-    if results.sweep().rounds().is_none_or(|rounds| rounds.refinement.is_none()) {
-        return Ok(String::new());
-    }
-    let edges = read_reduced::<EdgeRow>(results.layout())?;
-    let Some(first) = edges.first() else { return Ok(String::new()) };
+/// The edges that a sweep has found; none for one that looks for none.
+fn edges(results: &Results<'_>) -> Result<Vec<EdgeRow>> {
+    let refines = results.sweep().rounds().is_some_and(|rounds| rounds.refinement.is_some());
+    Ok(if refines { read_reduced(results.layout())? } else { Vec::new() })
+}
+
+/// Edges for people, and a blank line; empty if there are none.
+fn table_of_edges(edges: &[EdgeRow]) -> String {
+    let Some(first) = edges.first() else { return String::new() };
     let row = |EdgeRow { parameters, .. }: &EdgeRow| SetRow {
         frequency: parameters.frequency(),
         parameters: parameters.clone(),
@@ -285,40 +293,48 @@ fn edges(results: &Results<'_>) -> Result<String> {
     add(String::new(), &|edge| edge.rises.map_or("", |rises| if rises { "rises" } else { "falls" }).to_owned());
     add("jobs".to_owned(), &|edge| edge.jobs.to_string());
     add("ended by".to_owned(), &|edge| edge.ended.word().to_owned());
-    Ok(format!("{columns}\n"))
+    format!("{columns}\n")
 }
 
 /// The head of a column and its first cells.
 fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     let label = values.label();
-    let (factor, unit) = values.scale();
+    let bound = |set: usize| rows.get(set).filter(|_| values.column.name == "tau_mean")?.tau_bound;
+    let shown = |set: usize| values.numbers[set].or_else(|| bound(set)).unwrap_or_default().abs();
+    let (factor, unit) = label.scale((0..values.numbers.len()).map(shown).fold(0.0, f64::max));
     let mut cells = vec![label.short(unit)];
     for (set, &number) in values.numbers.iter().enumerate().take(most) {
-        let bound = rows.get(set).and_then(|row| row.tau_bound).filter(|_| values.column.name == "tau_mean");
         cells.push(match (number, values.intervals[set]) {
             (Some(value), _) if values.is_worded() => values.word(value).unwrap_or_default().to_owned(),
-            (Some(value), Some((low, high))) => with_error(factor * value, 0.5 * factor * (high - low)),
+            (Some(value), Some((low, high))) => with_interval(factor * value, factor * low, factor * high),
             (Some(value), None) => three_digits(factor * value),
-            (None, _) => bound.map_or_else(|| "–".to_owned(), |bound| format!("> {}", three_digits(factor * bound))),
+            (None, _) => bound(set).map_or_else(|| "–".to_owned(), |tau| format!("> {}", three_digits(factor * tau))),
         });
     }
     cells
 }
 
-/// A value and the half-width of its interval, with the digits that this leaves.
-fn with_error(value: f64, half: f64) -> String {
+/// Part of its half-width by which an interval may lie off its value and be shown by that half-width.
+const LOPSIDED: f64 = 0.2;
+
+/// A value and the half-width of its interval, with the digits that this leaves; the ends where these lie unlike, or where
+/// half of the interval would reach beyond zero, and the interval does not.
+fn with_interval(value: f64, low: f64, high: f64) -> String {
+    let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
         return three_digits(value);
     }
-    // Two digits of an error that begins with 1.
+    let crosses = low >= 0.0 && value < half || high <= 0.0 && value > -half;
+    let is_lopsided = crosses || (value - low - half).abs() > LOPSIDED * half;
+    // Two digits of an error that begins with 1, and of ends.
     let exponent = libm::floor(libm::log10(half));
-    let digits = if half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
+    let digits = if is_lopsided || half / libm::exp10(exponent) < 1.95 { 1.0 } else { 0.0 } - exponent;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
     let digits = digits.clamp(0.0, 18.0) as usize;
-    let rounded = format!("{value:.digits$}");
-    // Not -0.00.
-    let is_zero = rounded.trim_start_matches('-').bytes().all(|digit| b"0.".contains(&digit));
-    format!("{} ± {half:.digits$}", if is_zero { rounded.trim_start_matches('-') } else { &rounded })
+    let rounded = |value: f64| format!("{value:.digits$}");
+    // Not -0.00, which is 0 with 0 added.
+    let [value, low, high] = [value, low, high].map(|end| rounded(rounded(end).parse().unwrap_or(end) + 0.0));
+    if is_lopsided { format!("{value} ({low} to {high})") } else { format!("{value} ± {}", rounded(half)) }
 }
 
 /// What the lines do not say: jobs that ended otherwise, each kind with a command that shows one, and sets that the sweep
@@ -326,13 +342,14 @@ fn with_error(value: f64, half: f64) -> String {
 fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     let (sweep, mut notes) = (results.sweep(), Vec::new());
     let without: Vec<&SetRow> = rows.iter().filter(|row| row.jobs_without_slips > 0).collect();
-    if let Some(first) = without.first() {
+    if !without.is_empty() {
         let jobs = output::count(without.iter().map(|row| row.jobs_without_slips).sum(), "job");
         let sets = output::count(without.len() as u64, "set");
-        let job = sweep.set_with(&first.parameters.parameters).and_then(|set| sweep.jobs_at(set..set + 1).next());
-        let command = job.map_or_else(|| "the sweep no longer has it".to_owned(), |job| sweep.command(&job));
+        let set = without.iter().find_map(|row| sweep.set_with(&row.parameters.parameters));
+        let job = set.and_then(|set| sweep.jobs_at(set..set + 1).next());
+        let command = job.map_or_else(String::new, |job| format!("; a job of one such set: {}", sweep.command(&job)));
         notes.push(format!(
-            "{jobs} of {sets} without slips: they slide, or give_up_after is too short for their slips; the first: {command}"
+            "{jobs} of {sets} ended as no further slip came: they slide, or give_up_after is too short{command}"
         ));
     }
     let recording = sweep.recording();
@@ -354,7 +371,7 @@ fn notes(results: &Results<'_>, rows: &[SetRow]) -> Vec<String> {
     }
     let gone = rows.iter().filter(|row| sweep.set_with(&row.parameters.parameters).is_none()).count();
     if gone > 0 {
-        notes.push(format!("{} of these the sweep no longer has", output::count(gone as u64, "set")));
+        notes.push(format!("no longer in the sweep: {} of these", output::count(gone as u64, "set")));
     }
     notes
 }
@@ -368,8 +385,24 @@ mod tests {
         let shown =
             [(136.42, 0.83), (136.42, 1.24), (0.9412, 0.0171), (297.3, 21.0), (3.0, 0.0), (-0.02, 0.06), (-3e-4, 2e-3)];
         assert_eq!(
-            shown.map(|(value, half)| with_error(value, half)),
+            shown.map(|(value, half)| with_interval(value, value - half, value + half)),
             ["136.4 ± 0.8", "136.4 ± 1.2", "0.941 ± 0.017", "297 ± 21", "3", "-0.02 ± 0.06", "0.000 ± 0.002"]
+        );
+    }
+
+    #[test]
+    fn an_interval_that_lies_unlike_about_its_value_is_shown_by_its_ends() {
+        let shown =
+            [(4.03, 1.42, 13.78), (0.9, 0.05, 1.9), (136.4, 120.0, 150.0), (0.046, 0.031, 0.112), (-0.5, -1.1, -0.01)];
+        assert_eq!(
+            shown.map(|(value, low, high)| with_interval(value, low, high)),
+            [
+                "4.0 (1.4 to 13.8)",
+                "0.90 (0.05 to 1.90)",
+                "136 ± 15",
+                "0.046 (0.031 to 0.112)",
+                "-0.50 (-1.10 to -0.01)"
+            ]
         );
     }
 }

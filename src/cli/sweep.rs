@@ -74,6 +74,8 @@ pub struct Variation {
     pub axes: Vec<String>,
 }
 
+const IN_THE_FILE: &str = "; flags change no zip or sample: edit the file (`stickslip init` writes that of a preset)";
+
 /// What `--set` and `--axis` change.
 pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, UsageError> {
     let mut changes: Vec<Change> = Vec::new();
@@ -90,7 +92,7 @@ pub fn changes(Variation { settings, axes }: &Variation) -> Result<Vec<Change>, 
         }
         changes.push(match flag {
             "--set" => Change::setting(key, value),
-            _ => Change::axis(key, value).ok_or_else(no_change)?,
+            _ => Change::axis(key, value).map_err(|form| UsageError(format!("{flag} {text}: must be {key}={form}")))?,
         });
     }
     Ok(changes)
@@ -116,7 +118,11 @@ pub fn vary(sweep: Sweep, changes: &[Change]) -> Result<Sweep> {
 /// Reads a text that flags were made into; mistakes are those of the flags.
 fn of_flags(text: &str) -> Result<Sweep> {
     Sweep::parse(text, Path::new("flags")).map_err(|error| match error {
-        SweepError::Invalid { mistakes, .. } => UsageError(single::mistakes_in("flags", &mistakes)).into(),
+        SweepError::Invalid { mistakes, .. } => {
+            let problem = single::mistakes_in("flags", &mistakes);
+            let hint = if problem.contains("[axes.") { IN_THE_FILE } else { "" };
+            UsageError(problem + hint).into()
+        }
         unreadable @ SweepError::Unreadable { .. } => unreadable.into(),
     })
 }

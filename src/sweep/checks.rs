@@ -25,7 +25,7 @@ struct Place {
     quantity: Quantity,
     /// Byte of the text.
     at: usize,
-    in_model: bool,
+    section: &'static str,
 }
 
 impl<'a> Places<'a> {
@@ -33,21 +33,20 @@ impl<'a> Places<'a> {
         Self { source, set: Vec::new() }
     }
 
-    /// A quantity is set, in `[model]` or on an axis; refused if something else sets it, or the period, already.
-    pub fn set(&mut self, quantity: Quantity, at: usize, in_model: bool) {
+    /// A quantity is set in a section; refused if something else sets it, or the period, already.
+    pub fn set(&mut self, quantity: Quantity, at: usize, section: &'static str) {
         let clash = |place: &&Place| place.quantity == quantity || (place.quantity.is_period() && quantity.is_period());
         if let Some(place) = self.set.iter().find(clash) {
             let (key, other) = (quantity.key(), place.quantity.key());
-            let section = if place.in_model { "[model]" } else { "[axes]" };
-            let line = self.source.line(place.at);
+            let (there, line) = (place.section, self.source.line(place.at));
             let problem = if place.quantity == quantity {
-                format!("{key}: is set in {section}, too (line {line}); keep one")
+                format!("{key} in {section}: is set in {there}, too (line {line}); keep one")
             } else {
-                format!("{key}: fixes the period, as does {other} in {section} (line {line}); keep one")
+                format!("{key} in {section}: fixes the period, as does {other} in {there} (line {line}); keep one")
             };
             self.source.refuse(at, problem);
         } else {
-            self.set.push(Place { quantity, at, in_model });
+            self.set.push(Place { quantity, at, section });
         }
     }
 

@@ -5,13 +5,14 @@ use crate::model::{Description, Symbol};
 use crate::table::columns::Row;
 
 /// Column, symbol, and what it is where its meaning does not say so in a few words.
-const LABELS: [(&str, &str, &str); 30] = [
+const LABELS: [(&str, &str, &str); 31] = [
     ("Delta", "Δ", "Amplitude"),
     ("ramp_time", "ramp time", "Duration of the ramp"),
     ("eta", "η", "η = 2πΔ / (T V₀)"),
     ("frequency", "1/T", "Modulation frequency"),
     ("slip_share", "slip share", "Share of time within slips"),
     ("tau_mean", "⟨τ⟩", ""),
+    ("tau_mean_bound", "⟨τ⟩, at least", "Least mean interval"),
     ("tau_sd", "σ(τ)", "S.d. of the intervals"),
     ("tau_05", "τ(5 %)", ""),
     ("tau_25", "τ(25 %)", ""),

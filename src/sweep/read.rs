@@ -129,7 +129,7 @@ fn read_model(model: &Section<'_>, places: &mut Places<'_>) -> Result<(Parameter
     let (mut parameters, mut period) = (Parameters::default(), None);
     all(model.entries().iter().map(|entry| {
         let quantity = Quantity::from_key(entry.key).ok_or_else(|| entry.unknown(model.title, &keys))?;
-        places.set(quantity, entry.at, true);
+        places.set(quantity, entry.at, model.title);
         let value = read_axes::read_value(entry, quantity)?;
         match quantity {
             Quantity::Parameter(symbol) => {

@@ -23,6 +23,7 @@ const AXIS_FORMS: &str =
     "a list [..], { linear = [low, high], points = n }, { log = [low, high], points = n } or { count = n }";
 const SAMPLE_FORMS: &str = "{ linear = [low, high] } or { log = [low, high] } in a sample";
 
+type Keys = [&'static str];
 type TableReader = fn(&Section<'_>, &mut Places<'_>) -> Result<Axis, Refused>;
 
 pub(super) fn read(section: &Section<'_>, places: &mut Places<'_>) -> Result<Vec<Axis>, Refused> {
@@ -48,12 +49,12 @@ fn tables<'a>(entry: &Entry<'a>, title: &'static str) -> Result<Vec<Section<'a>>
 }
 
 /// The quantity that an entry sets.
-fn known(entry: &Entry<'_>, title: &str, also: &[&'static str], places: &mut Places<'_>) -> Result<Quantity, Refused> {
+fn known(entry: &Entry<'_>, title: &'static str, also: &Keys, places: &mut Places<'_>) -> Result<Quantity, Refused> {
     let quantity = Quantity::from_key(entry.key).ok_or_else(|| {
         let allowed: Vec<&str> = Quantity::all().map(Quantity::key).chain(also.iter().copied()).collect();
         entry.unknown(title, &allowed)
     })?;
-    places.set(quantity, entry.at, false);
+    places.set(quantity, entry.at, title);
     Ok(quantity)
 }
 

@@ -14,11 +14,12 @@ pub struct Change {
 }
 
 const AXES: &str = "axes";
-const SECTIONS: [&str; 4] = ["model", AXES, "record", "solver"];
+const SECTIONS: [&str; 6] = ["model", AXES, "record", "solver", "precision", "refine"];
 const SOLVER: [&str; 4] = ["method", "tolerance", "resolve", "dt"];
-/// Keys of a sweep in rounds, and the sections that they may stand in.
-const ROUNDS: [&str; 8] = ["of", "relative", "absolute", "by", "threshold", "to", "seeds", "jobs"];
-const OF_ROUNDS: [&str; 2] = ["refine", "precision"];
+/// Keys that take each other's place.
+const RIVALS: [&[&str]; 3] = [&["T", "eta", "frequency"], &["relative", "absolute"], &["seed", "seeds"]];
+/// What has no effect without modulation.
+const OF_MODULATION: [&str; 7] = ["T", "eta", "frequency", "ramp_time", "T_to", "Delta_to", "control"];
 
 impl Change {
     /// A key with one value. The sweep file's reader refuses what is unknown, in the section of what it is nearest to.
@@ -26,7 +27,8 @@ impl Change {
         let recording = RecordingKey::ALL.map(RecordingKey::key);
         let known: Vec<&str> = Quantity::all().map(Quantity::key).chain(recording).chain(SOLVER).collect();
         let section = match nearest(key, &known) {
-            _ if ROUNDS.contains(&key) => OF_ROUNDS[0],
+            _ if matches!(key, "of" | "relative" | "absolute" | "seeds") => "precision",
+            _ if matches!(key, "axis" | "by" | "value" | "threshold" | "to" | "jobs") => "refine",
             Some(known) if recording.contains(&known) => "record",
             Some(known) if SOLVER.contains(&known) => "solver",
             _ => "model",
@@ -34,20 +36,22 @@ impl Change {
         Self { section, key: key.to_owned(), value: scalar(value) }
     }
 
-    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them;
-    /// `None` for what is no TOML.
-    pub fn axis(key: &str, values: &str) -> Option<Self> {
+    /// A key with several values: `1e-5,1e-4`, `log:1e-5:1e-3:9`, `linear:0:1e-6:5`, `count:4`, or as a sweep file has them.
+    /// The error is what to write in place of others.
+    pub fn axis(key: &str, values: &str) -> Result<Self, &'static str> {
         let value = match values.split(':').map(str::trim).collect::<Vec<_>>()[..] {
             _ if values.starts_with(['[', '{']) => values.to_owned(),
             [form @ ("log" | "linear"), low, high, points] => {
                 let [low, high, points] = [low, high, points].map(scalar);
                 format!("{{ {form} = [{low}, {high}], points = {points} }}")
             }
+            ["log" | "linear", ..] => return Err("log:LOW:HIGH:POINTS, or linear, with the number of points"),
             ["count", count] => format!("{{ count = {} }}", scalar(count)),
+            ["count", ..] => return Err("count:N, with the number of values"),
             _ => format!("[{}]", values.split(',').map(str::trim).map(scalar).collect::<Vec<_>>().join(", ")),
         };
-        value.parse::<Value>().ok()?;
-        Some(Self { section: AXES, key: key.to_owned(), value })
+        value.parse::<Value>().map_err(|_| "VALUES, such as 1e-5,1e-4")?;
+        Ok(Self { section: AXES, key: key.to_owned(), value })
     }
 }
 
@@ -65,23 +69,27 @@ fn scalar(text: &str) -> String {
 }
 
 /// The text of a sweep file with these changes. A key leaves all other sections, so that an axis becomes a parameter, or the
-/// other way round; what fixes the period takes the place of what else does. A text that is no TOML stays as it is.
+/// other way round; what fixes the period, a target or seeds takes the place of what else does; what has no effect at
+/// Delta = 0 goes with the modulation. A text that is no TOML stays as it is.
 pub fn varied(text: &str, changes: &[Change]) -> String {
     let Ok(mut document) = text.parse::<DocumentMut>() else { return text.to_owned() };
-    let is_period = |key: &str| Quantity::from_key(key).is_some_and(Quantity::is_period);
+    let is_still = changes.iter().any(|change| change.key == "Delta" && matches!(change.value.parse(), Ok(0.0)));
+    let seeds_of = if document.contains_key("refine") { "refine" } else { "precision" };
+    let section_of = |change: &Change| if change.key == "seeds" { seeds_of } else { change.section };
     for section in SECTIONS {
         let Some(table) = document.get_mut(section).and_then(Item::as_table_like_mut) else { continue };
-        let stays = |key: &str| changes.iter().any(|change| change.section == section && change.key == key);
-        let goes =
-            |key: &str| changes.iter().any(|change| change.key == key || is_period(&change.key) && is_period(key));
+        let stays = |key: &str| changes.iter().any(|change| section_of(change) == section && change.key == key);
+        let goes = |key: &str| {
+            let replaces = |new| new == key || RIVALS.iter().any(|keys| keys.contains(&new) && keys.contains(&key));
+            changes.iter().any(|change| replaces(&*change.key)) || is_still && OF_MODULATION.contains(&key)
+        };
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
         for key in keys.iter().filter(|key| goes(key) && !stays(key)) {
             table.remove(key);
         }
     }
-    for Change { section, key, value } in changes {
-        let is_there = |section: &&str| document.contains_key(section);
-        let section = OF_ROUNDS.into_iter().filter(|_| OF_ROUNDS.contains(section)).find(is_there).unwrap_or(section);
+    for change @ Change { key, value, .. } in changes {
+        let section = section_of(change);
         let table = document.entry(section).or_insert_with(toml_edit::table);
         let Ok(mut value) = value.parse::<Value>() else { continue };
         // The old comment may be about the old value.
@@ -145,6 +153,37 @@ mod tests {
     }
 
     #[test]
+    fn what_has_no_effect_without_modulation_goes_with_it_unless_it_is_set() {
+        let text = TEXT.replace("slips = 3\n", "slips = 3\ncontrol = true\n");
+        let still = varied(&text, &[Change::setting("Delta", "0")]);
+        assert!(!still.contains("T ") && !still.contains("control"), "{still}");
+        assert_eq!(Sweep::parse(&still, Path::new("mine.toml")).unwrap().jobs().count(), 2);
+        let set = varied(&text, &[Change::setting("Delta", "0.0"), Change::setting("T", "1")]);
+        assert!(set.contains("T = 1  # --set") && set.contains("Delta = 0.0"), "{set}");
+        assert!(varied(&text, &[Change::setting("Delta", "1e-7")]).contains("control"));
+    }
+
+    #[test]
+    fn a_target_and_seeds_take_the_place_of_what_was_there() {
+        let parsed = |text: &str| Sweep::parse(text, Path::new("mine.toml")).unwrap();
+        let precise = [Change::setting("of", "tau_mean"), Change::setting("relative", "0.02")];
+        let seeds = Change::setting("seeds", "{ from = 24, to = 48 }");
+        let fixed = TEXT.replace("[record]", "seed = { count = 4 }\n[record]");
+        let text = varied(&fixed, &[precise.as_slice(), &[seeds]].concat());
+        assert!(!text.contains("seed = "), "{text}");
+        assert!(parsed(&text).rounds().unwrap().precision.is_some(), "{text}");
+        let text =
+            varied(&text, &[Change::setting("absolute", "1e-3"), Change::setting("seeds", "{ from = 30, to = 40 }")]);
+        assert!(!text.contains("relative") && text.contains("absolute = 0.001  # --set"), "{text}");
+        assert_eq!(parsed(&text).rounds().unwrap().seeds, 30..=40);
+        let refined = "name = \"edge\"\n[refine]\nto = 0.1\nseeds = { from = 24, to = 48 }\n";
+        let text =
+            varied(refined, &[Change::setting("axis", "V0"), Change::setting("seeds", "{ from = 30, to = 40 }")]);
+        let expected = "[refine]\nto = 0.1\nseeds = { from = 30, to = 40 }  # --set\naxis = \"V0\"  # --set\n";
+        assert!(text.ends_with(expected), "{text}");
+    }
+
+    #[test]
     fn every_form_of_an_axis_and_a_file_without_sections_are_read() {
         let text = "name = \"mine\"\nmodel = { Ns = 4, V0 = 1e-5 }\n";
         for (values, count) in [("1e-5", 1), ("[1e-5, 1e-4]", 2), ("{ log = [1e-5, 1e-3], points = 3 }", 3)] {
@@ -153,7 +192,7 @@ mod tests {
             let sweep = Sweep::parse(&text, Path::new("mine.toml")).unwrap();
             assert_eq!((sweep.jobs().count(), sweep.jobs().next().unwrap().parameters.contacts_per_block), (count, 9));
         }
-        assert_eq!(Change::axis("V0", "[1e-5"), None);
+        assert!(Change::axis("V0", "[1e-5").is_err());
         assert_eq!(Change::setting("break_on", "tension").value, "\"tension\"");
     }
 }

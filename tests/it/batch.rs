@@ -69,6 +69,13 @@ fn the_script_for_slurm_submits_as_it_is_and_its_job_runs_what_is_left() {
     assert!(folder.path(&format!("{ODD}/out/run/batch")).is_dir(), "Slurm makes no folder for its logs");
     assert_eq!(fs::read_to_string(folder.path("options")).unwrap(), "--partition=short\n--qos=a b\n");
 
+    // From a folder beside it, too, the paths are the same.
+    let (sweep, out) = (format!("../{ODD}/small sweep.toml"), format!("../{ODD}/out"));
+    let command = [PROGRAM, "batch", "slurm", &sweep, "--out", &out, "--workers", "40", "--threads", "2"];
+    let mut beside = Command::new(PROGRAM);
+    let beside = beside.args(&command[1..]).args(flags).current_dir(folder.path("bin")).output().unwrap();
+    assert_eq!(String::from_utf8(beside.stdout).unwrap(), fs::read_to_string(folder.path("script")).unwrap());
+
     let job = fs::read_to_string(folder.path("job")).unwrap();
     let root = folder.path("").display().to_string();
     let output = format!("{root}it's \\\"50%%\\\" $HOME/out/run/batch/%A_%a.log");

@@ -43,7 +43,8 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
     let planned = folder.ends(0, &format!("plan mine.toml {flags}")).stdout;
     assert!(planned.contains("3 after conditions") && planned.contains("none yet"), "{planned}");
     let refused = folder.ends(2, &format!("run mine.toml {flags}")).stderr;
-    assert!(refused.contains("another sweep than that of results/mine") && refused.contains("--out"), "{refused}");
+    let choices = "results/mine holds another sweep; give a new directory with -o DIR, or -o results/mine to extend";
+    assert!(refused.contains(choices), "{refused}");
     folder.ends(0, &format!("run mine.toml {flags} -o other --no-reduce"));
     let jobs = folder.table("other", "jobs");
     assert_eq!(jobs.reals("V0"), [3e-4; 3]);
@@ -59,6 +60,9 @@ fn a_sweep_is_varied_without_an_editor_and_goes_to_a_directory_of_its_own() {
         );
     }
     assert_eq!(folder.table("results/mine", "jobs").reals("V0"), [1e-4, 2e-4]);
+    // Where there is no directory yet, none can be extended by mistake.
+    folder.ends(0, "run --preset eq1 --set N=3 --set Ns=4 --no-reduce");
+    assert_eq!(folder.table("results/eq1", "jobs").counts("N"), [3]);
     folder.ends(0, &format!("init other.toml --preset velocity {flags}"));
     assert!(folder.ends(0, "plan other.toml").stdout.contains("3 after conditions"));
     folder.ends(0, "simulate mine.toml --set V0=1e-4");

@@ -129,8 +129,12 @@ fn a_target_that_cannot_be_met_ends_at_the_cap_and_says_so() {
     let planned = folder.ends(0, "plan hard.toml");
     assert!(planned.stderr.contains("warning: seeds: from = 3 is raised to 11"), "{}", planned.stderr);
     let planned = planned.stdout;
-    assert!(planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs"), "{planned}");
+    assert!(
+        planned.contains("jobs                 22 ") && planned.contains("at most 2 sets, 22 jobs; estimated"),
+        "{planned}"
+    );
     let ended = folder.ends(0, "run hard.toml --out r");
+    assert!(ended.stderr.contains("running 22 jobs of this round, 0 there already"), "{}", ended.stderr);
     assert!(ended.stdout.contains("2 sets with all seeds allowed, above the target"), "{}", ended.stdout);
     assert!(folder.ends(0, "status r").stdout.contains("round         1 (the last): 0 sets done, 0 open; 2 sets"));
     let sets = folder.file("r/reduced/sets.parquet");
@@ -157,6 +161,9 @@ fn edges_have_intervals_and_say_how_they_ended_and_rows_without_one_say_so() {
         assert_eq!(ended == "width", high / low < 1.1 * (1.0 + 1e-9), "{ended}: {low} to {high}");
     }
     assert!(folder.path("r/figures/edges.svg").exists());
+    let told = json(&folder.ends(0, "show r --json").stdout)["edges"].as_array().unwrap().clone();
+    let of_json = |key: &str| told.iter().map(|edge| edge[key].as_f64().unwrap()).collect::<Vec<_>>();
+    assert!(of_json("edge") == place && of_json("edge_high") == high && told[0]["statistic"].is_string(), "{told:?}");
     assert!(folder.table("r", "jobs").counts("seed").into_iter().min() == Some(5));
     folder.ends(0, "run few.toml --out few");
     let none = folder.file("few/reduced/edges.parquet");

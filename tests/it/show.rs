@@ -26,6 +26,9 @@ fn run_ends_with_the_result_and_show_tells_it_again() {
     let of_json: Vec<f64> =
         all["sets"].as_array().unwrap().iter().map(|set| set["tau_mean"].as_f64().unwrap()).collect();
     assert_eq!(of_json, of_table);
+    // Each column stands once, whether it is asked for or goes with another.
+    let ends = "show out --csv --columns tau_sd_high,tau_sd,tau_sd_low";
+    assert!(folder.ends(0, ends).stdout.starts_with("tau_sd_high,tau_sd,tau_sd_low\n"));
 }
 
 #[test]
@@ -83,8 +86,20 @@ fn jobs_without_slips_are_told_with_a_command_that_shows_one() {
         "name = \"fast\"\n[model]\nN = 5\nNs = 5\n[axes]\nV0 = [1e-4, 1]\nseed = { count = 2 }\n[record]\nslips = 4\ngive_up_after = 0.5\n",
     );
     let run = folder.ends(0, "run fast.toml --out out").stdout;
-    let note = "2 jobs of 1 set without slips: they slide, or give_up_after is too short for their slips; the first: stickslip \
-                simulate";
-    assert!(run.contains(note), "{run}");
+    let note = "2 jobs of 1 set ended as no further slip came: they slide, or give_up_after is too short";
+    assert!(run.contains(&format!("{note}; a job of one such set: stickslip simulate ")), "{run}");
     assert!(run.contains("--set V0=1"), "{run}");
+    // Without an end of any interval, the unit is that of what it is at least.
+    let shown = folder.ends(0, "show out --where V0==1 --columns tau_mean,tau_mean_bound").stdout;
+    let (head, of_set) = shown.split_once('\n').unwrap();
+    let unit = head.strip_prefix("⟨τ⟩ (").and_then(|head| head.split_once(')')).unwrap().0;
+    assert_eq!(head, format!("⟨τ⟩ ({unit})  ⟨τ⟩, at least ({unit})"));
+    let bounds = of_set.lines().next().unwrap().trim_start().strip_prefix("> ").unwrap();
+    let bounds: Vec<f64> = bounds.split_whitespace().map(|bound| bound.parse().unwrap()).collect();
+    assert!(bounds[0] == bounds[1] && (1.0..1000.0).contains(&bounds[0]), "{shown}");
+    // A sweep that no longer has the set has no command for it.
+    let fast = std::fs::read_to_string(folder.path("fast.toml")).unwrap();
+    folder.write("fast.toml", &fast.replace("[1e-4, 1]", "[1e-4]"));
+    let narrowed = folder.ends(0, "run fast.toml --out out").stdout;
+    assert!(narrowed.contains(&format!("{note}\nno longer in the sweep: 1 set of these\n")), "{narrowed}");
 }

@@ -110,7 +110,7 @@ RECIPES = re.findall(r"`stickslip (run [^`]*-o [^`]*)`", (ROOT / "docs" / "guide
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.rpartition("/")[2])
 def test_recipes_end_with_a_figure(program, tmp_path, recipe):
-    assert len(RECIPES) == 10
+    assert len(RECIPES) == 11
     # As it stands, but with few contacts and slips.
     small = ["--set", "Ns=3", "--set", "slips=4"]
     small += [] if "N=" in recipe.replace("Kd=", "") else ["--set", "N=5"]

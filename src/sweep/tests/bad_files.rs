@@ -128,7 +128,11 @@ fn wrong_kinds_and_impossible_values_are_refused_with_what_is_allowed() {
 fn contradictions_and_settings_without_effect_are_refused_with_the_other_place() {
     assert_refused(&[
         ("name = \"a\"\n[model]\nV0 = 1e-4\n[axes]\nV0 = [1]", 5, &["V0", "[model]", "line 3", "keep one"]),
-        ("name = \"a\"\n[axes]\nV0 = [1]\n[axes.zip]\nV0 = [2]\nN = [1]", 5, &["V0", "[axes]", "line 3"]),
+        (
+            "name = \"a\"\n[axes]\nV0 = [1]\n[axes.zip]\nV0 = [2]\nN = [1]",
+            5,
+            &["V0 in [axes.zip]: is set in [axes], too (line 3)"],
+        ),
         ("name = \"a\"\n[model]\nT = 1\nDelta = 1\n[axes]\neta = [1]", 6, &["eta", "T in [model]", "line 3"]),
         ("name = \"a\"\n[axes]\nDelta = [1]\neta = [1]\nfrequency = [1]", 5, &["frequency", "eta in [axes]"]),
         ("name = \"a\"\n[axes]\neta = [1, 2]", 3, &["eta", "no effect while Delta = 0"]),
@@ -138,7 +142,7 @@ fn contradictions_and_settings_without_effect_are_refused_with_the_other_place()
         (
             "name = \"a\"\n[model]\nDelta = 1\neta = 3\nT = 1",
             5,
-            &["T: fixes the period, as does eta in [model] (line 4)"],
+            &["T in [model]: fixes the period, as does eta in [model] (line 4)"],
         ),
         ("name = \"a\"\n[axes]\nDelta = [0, 1]", 3, &["Delta > 0", "frequency (Hz) or eta"]),
         ("name = \"a\"\n[axes]\nDelta = [1]\neta = [1, 1.00000000000001]", 4, &["eta", "repeats value 1"]),
@@ -199,7 +203,7 @@ fn all_errors_of_a_file_are_reported_at_once_in_the_order_of_its_lines() {
         (8, "slps = 3: unknown key in [record]; did you mean slips?"),
         (10, "T = -1: must be"),
         (11, "gama = 3: unknown key in [model]; did you mean gamma?"),
-        (13, "eta: fixes the period, as does T in [model] (line 10)"),
+        (13, "eta in [axes]: fixes the period, as does T in [model] (line 10)"),
         (14, "point = 3: unknown key in an axis; did you mean points?"),
     ];
     let mistakes = refused(MANY);
