@@ -136,7 +136,7 @@ pub trait Field: Sized {
 }
 
 /// Types of fields: their kind, and how they are read from values.
-macro_rules! fields {
+macro_rules! field_types {
     ($($type:ty as $kind:ident($own:ident => $held:expr) from $value:ident => $read:expr;)*) => {$(
         impl Field for $type {
             const KIND: Kind = Kind::$kind;
@@ -153,7 +153,7 @@ macro_rules! fields {
     )*};
 }
 
-fields! {
+field_types! {
     f64 as Real(own => own) from value => value.number();
     u64 as Count(own => own) from value => match value {
         Value::Count(count) => Some(count),

@@ -105,7 +105,10 @@ impl Observer for Trace {
     }
 
     fn contact(&mut self, event: &ContactEvent) {
-        self.attached = event.attached;
+        match event.change {
+            Change::Attach => self.attached += 1,
+            Change::Break => self.attached -= 1,
+        }
     }
 }
 
