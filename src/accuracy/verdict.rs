@@ -67,7 +67,7 @@ pub fn verdict(study: &Study, findings: &Findings) -> Vec<String> {
         let excluded_from = |row: &&&DistanceRow| percent(row, row.distances.mean_bias.abs() + row.half_width());
         let conclusion = match most {
             Some(_) => "",
-            None if intervals.iter().all(|row| excluded_from(&row) <= largest) => {
+            None if intervals.iter().all(|row| excluded_from(row) <= largest) => {
                 ", so the solver is not what limits you"
             }
             None => "; more --seeds here would show whether the solver adds to it",
