@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 from hosts import wait_until
 
 VERSIONS = ("4.2", "3")
@@ -56,7 +57,11 @@ class Guest:
             env=os.environ | {"TMPDIR": str(folder)},
         )
         wait_until(lambda: (folder / "mounts").exists() or self.process.poll() is not None, 60, "the guest is up")
-        assert self.process.poll() is None, console.read_text(errors="replace")
+        said = console.read_text(errors="replace")
+        # Linux 6.1 as a guest has no room for the state of processors with AMX, and dies at its first program.
+        if self.process.poll() is not None and "ptrace set fp regs failed" in said:
+            pytest.skip("user-mode-linux does not run on this processor: its registers do not fit")
+        assert self.process.poll() is None, said
 
     def start(self, host, command):
         """Starts a command of the shell on a host of the guest, or on the server."""
