@@ -314,11 +314,11 @@ fn column(values: &Values, rows: &[SetRow], most: usize) -> Vec<String> {
     cells
 }
 
-/// Part of its half-width by which an interval may lie off its value and be shown by that half-width.
+/// How far the middle of an interval may lie from its value, as a share of the half-width, to be shown as ±.
 const LOPSIDED: f64 = 0.2;
 
-/// A value and the half-width of its interval, with the digits that this leaves; the ends where these lie unlike, or where
-/// half of the interval would reach beyond zero, and the interval does not.
+/// A value and the half-width of its interval, with the digits that this leaves; or its ends, if the value is not in the
+/// middle, or ± would reach beyond zero and the interval does not.
 fn with_interval(value: f64, low: f64, high: f64) -> String {
     let half = 0.5 * (high - low);
     if half.is_nan() || half <= 0.0 {
@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_that_lies_unlike_about_its_value_is_shown_by_its_ends() {
+    fn an_interval_that_is_not_symmetric_is_shown_by_its_ends() {
         let shown =
             [(4.03, 1.42, 13.78), (0.9, 0.05, 1.9), (136.4, 120.0, 150.0), (0.046, 0.031, 0.112), (-0.5, -1.1, -0.01)];
         assert_eq!(

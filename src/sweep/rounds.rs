@@ -86,7 +86,7 @@ pub struct Standing {
 pub struct Bounds {
     pub sets: u64,
     pub jobs: u64,
-    /// Predicted CPU time of so many jobs, in s; of sets that are not known yet, that of the dearest of the first round.
+    /// Predicted CPU time of these jobs, in s; sets that are not known yet count as the dearest of the first round.
     pub predicted_cost: f64,
 }
 
