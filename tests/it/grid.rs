@@ -79,8 +79,8 @@ fn the_tolerance_chooses_the_grid_and_a_ramp_or_an_end_does_not_leave_it() {
 
 #[test]
 fn observers_that_ignore_attachments_see_the_same_slips() {
-    /// Follows attachments and passes on the rest.
-    struct Following(SlipObserver);
+    /// Follows attachments, counts what is attached and passes everything on.
+    struct Following(SlipObserver, u64);
 
     impl stickslip::solver::Observer for Following {
         fn advance(&mut self, segment: &stickslip::solver::Segment<'_>) {
@@ -88,6 +88,11 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
         }
 
         fn contact(&mut self, event: &ContactEvent) {
+            match event.change {
+                Change::Attach => self.1 += 1,
+                Change::Break => self.1 -= 1,
+            }
+            assert!(event.attached == self.1 || event.time == 0.0, "{event:?}, not {}", self.1);
             self.0.contact(event);
         }
 
@@ -102,13 +107,14 @@ fn observers_that_ignore_attachments_see_the_same_slips() {
         let recording = Recording { slips: 8, discard: 0, drop_size: Some(20.0), ..Recording::default() };
         let limits = Limits { end_time: f64::INFINITY, events: u64::MAX, interrupt: None };
         let mut alone = SlipObserver::new(&parameters, &recording);
-        let mut following = Following(alone.clone());
+        let mut following = Following(alone.clone(), 0);
         simulate(&parameters, Solver::default(), limits, &mut alone).unwrap();
         simulate(&parameters, Solver::default(), limits, &mut following).unwrap();
         let (alone, following) = (alone.into_rows().0, following.0.into_rows().0);
         assert_eq!(alone.len(), 8);
         for (slip, other) in alone.iter().zip(&following) {
             assert_eq!((slip.size, slip.precursors, slip.nucleation), (other.size, other.precursors, other.nucleation));
+            assert_eq!((slip.attached_before, slip.least_attached), (other.attached_before, other.least_attached));
             // Segments are cut elsewhere: rounding.
             assert!((slip.onset - other.onset).abs() < 1e-9, "{slip:?} {other:?}");
             assert!((slip.peak_force - other.peak_force).abs() < 1e-6, "{slip:?} {other:?}");

@@ -53,7 +53,7 @@ pub struct ContactEvent {
 
 /// The number of attached contacts, and its integral over time.
 #[derive(Clone, Copy, Debug)]
-struct Attached {
+pub(crate) struct Attached {
     count: u64,
     /// The integral up to the origin of time, if nothing changed from there on, in s.
     offset: f64,
@@ -62,7 +62,7 @@ struct Attached {
 impl Attached {
     /// Counts what happens at a time in s.
     #[inline(always)]
-    fn change(&mut self, change: Change, time: f64) {
+    pub fn change(&mut self, change: Change, time: f64) {
         match change {
             Change::Attach => {
                 self.count += 1;
@@ -128,7 +128,7 @@ pub struct Interface {
     rows: Vec<ContactRow>,
     lives: Vec<Lives>,
     reattachments: Reattachments,
-    attached: Attached,
+    pub(crate) attached: Attached,
     /// Per block: Σ k_i of the attached contacts, in N/m.
     pub block_stiffness: Vec<f64>,
     /// Per block: Σ k_i a_i of the attached contacts, in N.
@@ -183,6 +183,7 @@ impl Interface {
         (0..self.block_stiffness.len())
             .flat_map(move |block| (0..self.contacts_per_block).map(move |contact| (block, contact)))
             .map(|(block, contact)| self.event(block, contact, 0.0, 0.0, Change::Attach))
+            .map(|event| ContactEvent { attached: self.attached.count, ..event })
     }
 
     /// Time of the next reattachment, in s; infinite when no contact is detached.
@@ -241,10 +242,11 @@ impl Interface {
     pub fn reattach_next(&mut self, displacement: f64) -> ContactEvent {
         let event = self.reattach_running(Scalar512b, displacement);
         self.sum(Scalar512b, event.block);
-        event
+        self.counted(event)
     }
 
-    /// The same with the sums of the block carried on, rounded once more, and not computed again.
+    /// The same, not [counted](Self::counted), with the sums of the block carried on, rounded once more, and not computed
+    /// again.
     ///
     /// # Panics
     /// When nothing is due: a bug in the solver.
@@ -255,7 +257,6 @@ impl Interface {
         let [upper, lower] = self.attach(simd, block, contact, displacement);
         self.block_upper[block] = self.block_upper[block].min(upper);
         self.block_lower[block] = self.block_lower[block].max(lower);
-        self.attached.change(Change::Attach, due.time());
         let event = self.event(block, contact, due.time(), displacement, Change::Attach);
         self.block_stiffness[block] += event.stiffness;
         self.block_pull[block] += event.stiffness * displacement;
@@ -274,7 +275,8 @@ impl Interface {
                     // A displacement that is not finite reaches lanes beyond the last contact.
                     break;
                 }
-                log(self.break_contact(Scalar512b, block, contact, time, displacement).0);
+                let (event, _) = self.break_contact(Scalar512b, block, contact, time, displacement);
+                log(self.counted(event));
                 reached &= reached - 1;
             }
         }
@@ -309,8 +311,8 @@ impl Interface {
         }
     }
 
-    /// Breaks one contact, at a break position in m. Returns the event, and when the contact reattaches, in s. The block's
-    /// sums and nearest break positions are left as they are: see [`Self::gather`].
+    /// Breaks one contact, at a break position in m. Returns the event, not [counted](Self::counted), and when the contact
+    /// reattaches, in s. The block's sums and nearest break positions are left as they are: see [`Self::gather`].
     #[inline(always)]
     pub(crate) fn break_contact<S: Simd>(
         &mut self,
@@ -320,9 +322,15 @@ impl Interface {
         time: f64,
         displacement: f64,
     ) -> (ContactEvent, f64) {
-        self.attached.change(Change::Break, time);
         let event = self.event(block, contact, time, displacement, Change::Break);
         (event, self.detach(simd, block, contact, time))
+    }
+
+    /// Counts an event, in the order of time, and enters how many contacts are attached after it.
+    #[inline(always)]
+    pub(crate) fn counted(&mut self, event: ContactEvent) -> ContactEvent {
+        self.attached.change(event.change, event.time);
+        ContactEvent { attached: self.attached.count, attached_time: self.attached.integral(event.time), ..event }
     }
 
     /// Moves the frame: subtracts `shift` m from every position.
@@ -381,8 +389,8 @@ impl Interface {
             force: stiffness * (displacement - self.rows[row].anchor[lane]),
             threshold,
             stiffness,
-            attached: self.attached.count,
-            attached_time: self.attached.integral(time),
+            attached: 0,
+            attached_time: 0.0,
             mean_displacement: 0.0,
         }
     }

@@ -105,10 +105,7 @@ impl Observer for Trace {
     }
 
     fn contact(&mut self, event: &ContactEvent) {
-        match event.change {
-            Change::Attach => self.attached += 1,
-            Change::Break => self.attached -= 1,
-        }
+        self.attached = event.attached;
     }
 }
 

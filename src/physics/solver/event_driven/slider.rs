@@ -58,7 +58,7 @@ impl Slider {
     pub fn attach_next(&mut self, x: f64) -> ContactEvent {
         let event = self.interface.reattach_running(Scalar512b, x);
         self.chain.update(event.block, &self.interface);
-        event
+        self.interface.counted(event)
     }
 
     /// Moves the origin by `time` s and `displacement` m.

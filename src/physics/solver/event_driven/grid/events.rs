@@ -9,7 +9,7 @@ use super::super::slider::Slider;
 use super::Grid;
 use super::step::{GridDrive, GridStep, Place};
 use crate::model::simd::Simd;
-use crate::model::{ContactEvent, Interface, Row};
+use crate::model::{Change, ContactEvent, Interface, Row};
 use crate::solver::polynomial::safeguarded_halley;
 
 const SIXTH: f64 = 1.0 / 6.0;
@@ -153,6 +153,8 @@ pub(super) struct StepEvents {
     pub mean: [f64; 2],
     /// Blocks that reach a break position, and where in the step.
     paths: Vec<(Path, f64)>,
+    /// Times of attachments that are not collected, in the frame, in s, in order.
+    attachments: Vec<f64>,
     /// Contacts that a block reaches, and where they break, in m.
     contacts: Vec<(f64, usize)>,
 }
@@ -184,9 +186,23 @@ pub(super) fn change_contacts<S: Simd>(simd: S, slider: &mut Slider, grid: &mut 
         break_along(simd, &mut slider.interface, step, events, &mut path, None, start);
         settle(simd, slider, step, &path);
     }
-    if !events.events.is_sorted_by(|a, b| a.time <= b.time) {
-        events.events.sort_by(|a, b| a.time.total_cmp(&b.time));
+    count_in_order(&mut slider.interface, events);
+}
+
+/// Puts the events of a step, in which block came after block, in the order of time and counts them.
+#[inline(always)]
+fn count_in_order(interface: &mut Interface, StepEvents { events, attachments, .. }: &mut StepEvents) {
+    if !events.is_sorted_by(|a, b| a.time <= b.time) {
+        events.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
+    let mut attachments = attachments.drain(..).peekable();
+    for event in events {
+        while let Some(due) = attachments.next_if(|due| *due <= event.time) {
+            interface.attached.change(Change::Attach, due);
+        }
+        *event = interface.counted(*event);
+    }
+    attachments.for_each(|due| interface.attached.change(Change::Attach, due));
 }
 
 /// Breaks what a block reaches along its path, contact after contact, up to where the next one is due to attach. `first` is
@@ -260,6 +276,8 @@ fn attach<S: Simd>(
     let event = interface.reattach_running(simd, x);
     if events.tells_attachments {
         events.events.push(event);
+    } else {
+        events.attachments.push(event.time);
     }
     events.reattachments += 1;
     let stiffened = step.by_mass * event.stiffness;
