@@ -80,11 +80,6 @@ impl Attached {
     fn integral(&self, time: f64) -> f64 {
         self.offset + self.count as f64 * time
     }
-
-    /// Moves the origin of time: subtracts `shift` s.
-    fn shift(&mut self, shift: f64) {
-        self.offset = self.integral(shift);
-    }
 }
 
 /// What a block feels of eight contacts, and where they break. Contact i of a block lies in row i div 8 of the block, lane
@@ -117,7 +112,7 @@ impl ContactRow {
     }
 }
 
-/// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::shift`].
+/// All contacts of the slider. Displacements are those of the caller's frame; see [`Interface::move_origin`].
 #[derive(Clone, Debug)]
 pub struct Interface {
     contacts_per_block: usize,
@@ -333,22 +328,18 @@ impl Interface {
         ContactEvent { attached: self.attached.count, attached_time: self.attached.integral(event.time), ..event }
     }
 
-    /// Moves the frame: subtracts `shift` m from every position.
-    pub fn shift(&mut self, shift: f64) {
+    /// Moves the origin by `time` s and `displacement` m.
+    pub fn move_origin(&mut self, time: f64, displacement: f64) {
+        self.reattachments.shift(time);
+        self.attached.offset = self.attached.integral(time);
         for row in &mut self.rows {
             for positions in [&mut row.anchor, &mut row.upper, &mut row.lower] {
-                positions.iter_mut().for_each(|position| *position -= shift);
+                positions.iter_mut().for_each(|position| *position -= displacement);
             }
         }
         for block in 0..self.block_stiffness.len() {
             self.gather(Scalar512b, block);
         }
-    }
-
-    /// Moves the origin of time: subtracts `shift` s from every reattachment that is due.
-    pub fn shift_time(&mut self, shift: f64) {
-        self.reattachments.shift(shift);
-        self.attached.shift(shift);
     }
 
     /// Elastic energy in the attached contacts for given displacements in m, in J.

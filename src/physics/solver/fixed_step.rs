@@ -79,19 +79,8 @@ impl Motion {
     }
 }
 
-/// Runs the scheme with a stable `time_step`, in s; see [`super::simulate`].
+/// Runs the scheme with a stable `time_step`, in s, compiled for these features of the processor; see [`super::simulate`].
 pub(super) fn run(
-    parameters: &Parameters,
-    time_step: f64,
-    limits: Limits<'_>,
-    observer: &mut dyn Observer,
-    audit: Option<&Audit>,
-) -> Result<Summary, SimulationError> {
-    run_compiled_for(Arch::new(), parameters, time_step, limits, observer, audit)
-}
-
-/// The same, compiled for these features of the processor.
-fn run_compiled_for(
     features: Arch,
     parameters: &Parameters,
     time_step: f64,
@@ -280,7 +269,7 @@ mod tests {
                 let limits = Limits { end_time: 0.25, events: u64::MAX, interrupt: None };
                 let mut told = Told::default();
                 let audited = ledger::audited(&parameters, &mut told, |observer, audit| {
-                    run_compiled_for(features, &parameters, 2e-6, limits, observer, Some(audit))
+                    run(features, &parameters, 2e-6, limits, observer, Some(audit))
                 });
                 (format!("{features:?}"), (told, audited.unwrap()))
             });

@@ -19,6 +19,7 @@ use self::ledger::Audit;
 use crate::model::equation::stability_limit;
 use crate::model::{ContactEvent, Parameters};
 use crate::value::words;
+use pulp::Arch;
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
 
@@ -247,6 +248,6 @@ fn run(
         Solver::EventDriven { tolerance, resolve } => {
             event_driven::run(parameters, tolerance, resolve, limits, observer, audit)
         }
-        Solver::FixedStep { time_step } => fixed_step::run(parameters, time_step, limits, observer, audit),
+        Solver::FixedStep { time_step } => fixed_step::run(Arch::new(), parameters, time_step, limits, observer, audit),
     }
 }

@@ -52,12 +52,6 @@ impl Frame {
         self.origin_time + self.time
     }
 
-    /// Whether it is time to move the frame.
-    #[inline]
-    pub fn is_worn(&self) -> bool {
-        self.time > self.span
-    }
-
     /// Whether the clock is fine enough to locate events within a step of `length` s.
     #[inline]
     pub fn resolves(&self, length: f64) -> bool {

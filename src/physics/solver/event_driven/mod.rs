@@ -159,7 +159,7 @@ impl<'a> Integration<'a> {
             if !self.slider.state.displacement[0][0].is_finite() {
                 return Err(SimulationError::NotFinite { time: self.frame.now() });
             }
-            if self.frame.is_worn() {
+            if self.frame.time > self.frame.span {
                 self.move_frame(observer);
             }
             let is_check = self.summary.steps >= next_check;

@@ -63,8 +63,7 @@ impl Slider {
 
     /// Moves the origin by `time` s and `displacement` m.
     pub fn move_origin(&mut self, time: f64, displacement: f64) {
-        self.interface.shift_time(time);
-        self.interface.shift(displacement);
+        self.interface.move_origin(time, displacement);
         for block in 0..self.chain.layout.blocks {
             let (row, lane) = self.chain.layout.slot(block);
             self.state.displacement[row][lane] -= displacement;
