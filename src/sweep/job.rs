@@ -146,9 +146,9 @@ mod tests {
             ..Parameters::default()
         };
         let default = Identity::new(Solver::default(), &Recording::default());
-        assert_eq!(default.job(&Parameters::default()), "5a03d318da4b4d433cb4649f6cb112c1");
-        assert_eq!(identity().job(&modulated), "99900668d7355ca885476379621e7dee");
-        assert_eq!(identity().set(&modulated), "c114d52bf333477369486ef0b16ce1dd");
+        assert_eq!(default.job(&Parameters::default()), "bab35d576d47772b9e873ad5feec74a9");
+        assert_eq!(identity().job(&modulated), "c1c5713d6c70a765d8aecf2654bff0c4");
+        assert_eq!(identity().set(&modulated), "65055c1b1d57b93a6d5536d6da740b90");
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(
             (MODEL_VERSION, defaults.join(" ").as_str()),
             (
-                4,
+                5,
                 "N=70 Ns=20 M=11.5 K=1e8 Kd=4e7 ki=5e6 fs=1.37 dfs=0.0069 tau_r=0.005 gamma=6462 \
                 V0=1e-4 Delta=0 T=none T_to=none Delta_to=none ramp_time=0 FN=4000 L=0.15 break_on=magnitude seed=0 \
                 solver.method=event-driven solver.tolerance=0.001 solver.resolve=auto record.slips=40 record.discard=5 \
